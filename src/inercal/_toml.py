@@ -1,0 +1,104 @@
+"""TOML files in: read, check against a pydantic model, and one clear sentence for whatever is wrong."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from inercal.errors import InputError
+from inercal.units import shown
+
+
+class Strict(BaseModel):
+    """Base of every model read from a file: frozen, and unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def read_toml(path: str | Path, error: type[InputError]) -> dict[str, Any]:
+    """Parse a TOML file; raises ``error`` naming file, line and column."""
+    try:
+        return tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
+    except OSError as problem:
+        raise error(path, f"cannot be read ({problem.strerror}), expected a TOML file") from problem
+    except UnicodeDecodeError as problem:
+        raise error(path, f"byte {problem.start} is not UTF-8 text, expected a TOML file") from problem
+    except ValueError as problem:  # a TOMLDecodeError, an integer of thousands of digits, a NUL in the path
+        raise error(path, f"not valid TOML: {str(problem)[:200]}") from problem
+    except RecursionError as problem:
+        raise error(path, "tables or lists are nested too deeply, expected a TOML file") from problem
+
+
+def check(model: type[M], data: Mapping[str, Any], where: object, error: type[InputError]) -> M:
+    """Validate ``data``; raises ``error`` for the first thing wrong, naming the key and what was expected."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as problem:
+        faults = problem.errors()
+        # a misspelt key also shows as a missing one: the misspelling is what to say
+        first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
+        cause = first.get("ctx", {}).get("error")
+        if isinstance(cause, InputError):
+            raise error(where, f"{_dotted(first['loc'])}: {cause.message}") from problem
+        raise error(where, _sentence(model, first)) from problem
+    except InputError as problem:  # raised by a validator with its own words
+        raise error(where, str(problem)) from problem
+
+
+def _dotted(location: tuple[Any, ...]) -> str:
+    """``imu.static_start`` for ("imu", "static_start"); a key that needs quotes gets them."""
+    return ".".join(text if re.fullmatch(r"[\w-]+", text := str(part)) else shown(text) for part in location)
+
+
+def _sentence(model: type[BaseModel], first: Any) -> str:
+    """One sentence for one pydantic error."""
+    key, found = _dotted(first["loc"]), first.get("input")
+    match first["type"]:
+        case "extra_forbidden":
+            known = _known_keys(model, first["loc"][:-1])
+            near = difflib.get_close_matches(str(first["loc"][-1])[:80], known, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(known)}"
+            return f"{key}: unknown key, {hint}"
+        case "missing":
+            return f"{key}: missing, expected a value"
+        case "literal_error":
+            return f"{key}: found {shown(found)}, expected {first['ctx']['expected']}"
+        case "model_type" | "dict_type":
+            return f"{key}: found {shown(found)}, expected a table"
+        case "bool_type":
+            return f"{key}: found {shown(found)}, expected true or false"
+        case "string_type":
+            return f"{key}: found {shown(found)}, expected a text in quotes"
+        case _:
+            words = first["msg"].removeprefix("Value error, ").removeprefix("Input ").rstrip(".")
+            return f"{key}: found {shown(found)}, {words.replace('should be', 'expected')}"
+
+
+def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
+    """Keys of the (nested) model at that path."""
+    for part in path:
+        info = model.model_fields.get(str(part)) or next(
+            (field for field in model.model_fields.values() if field.alias == part), None
+        )
+        inner = None if info is None else _model_in(info.annotation)
+        if inner is None:
+            # a table of tables keyed by the user's own names: the model is one level up
+            continue
+        model = inner
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _model_in(part))), None)

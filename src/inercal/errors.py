@@ -1,0 +1,71 @@
+"""The exceptions of inercal.
+
+InercalError
+ ├── InputError            a file, a study key, an option: what was found and what was expected
+ │    ├── RecordError      a recording that cannot be read
+ │    ├── MapError         a column map that does not fit its file
+ │    ├── StudyError       a study file that does not validate
+ │    └── QuantityError    a text that is not a quantity of the expected kind
+ ├── MissingExtraError     an optional package is not installed
+ ├── RunError              a run of a Monte Carlo that failed (`inercal.estimate.runs`)
+ └── CalibrationError      an estimate whose status is not ``ok`` (``raise_for_status``)
+
+Every message is one sentence: where, what was found, what was expected. The command line turns an
+`InercalError` into one line on standard error and exit code 2.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
+
+
+class InercalError(Exception):
+    """Anything inercal raises on purpose."""
+
+
+class InputError(InercalError):
+    """Bad input. ``where`` names the file, line, column, key or option at fault."""
+
+    def __init__(self, where: object, message: str) -> None:
+        self.where = str(where)
+        self.message = message
+        super().__init__(f"{where}: {message}")
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.where, self.message)
+
+
+class RecordError(InputError):
+    """A recording that cannot be read."""
+
+
+class MapError(InputError):
+    """A column map that is wrong in itself or does not fit its file."""
+
+
+class StudyError(InputError):
+    """A study file that does not validate."""
+
+
+class QuantityError(InputError):
+    """A text that is not a quantity, or one of another dimension."""
+
+
+class MissingExtraError(InercalError):
+    """An optional package is missing; the message holds the ``pip install`` line."""
+
+    def __init__(self, feature: str, extra: str) -> None:
+        self.extra = extra
+        super().__init__(f"{feature} needs the extra '{extra}': pip install 'inercal[{extra}]'")
+
+
+class CalibrationError(InercalError):
+    """An estimate that ended with a bad verdict; ``estimate`` holds it in full."""
+
+    def __init__(self, message: str, estimate: Estimate) -> None:
+        self.estimate = estimate
+        super().__init__(message)

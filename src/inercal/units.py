@@ -1,0 +1,252 @@
+"""Units and quantities at the edge: texts people type, SI and radians inside.
+
+The everyday units of the field are a small table, so that reading a study costs no import; anything else
+(``mdeg/s``, ``inch``) is looked up in pint. The unit g is 9.80665 m/s² everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from inercal.errors import QuantityError
+
+STANDARD_GRAVITY = 9.80665
+"""The unit g [m/s²], by definition; the gravity of a site is another quantity."""
+
+_DEG = math.pi / 180.0
+_G = STANDARD_GRAVITY
+
+#: dimension -> (SI unit, {unit: factor to SI})
+_TABLE: dict[str, tuple[str, dict[str, float]]] = {
+    "number": ("1", {"1": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9}),
+    "count": ("count", {"count": 1.0}),
+    "time": ("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}),
+    "frequency": ("Hz", {"Hz": 1.0, "kHz": 1e3, "mHz": 1e-3}),
+    "length": ("m", {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3}),
+    "angle": (
+        "rad",
+        {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": _DEG, "arcmin": _DEG / 60, "arcsec": _DEG / 3600},
+    ),
+    "rate": (
+        "rad/s",
+        {
+            "rad/s": 1.0,
+            "mrad/s": 1e-3,
+            "urad/s": 1e-6,
+            "deg/s": _DEG,
+            "mdeg/s": 1e-3 * _DEG,
+            "deg/min": _DEG / 60,
+            "deg/h": _DEG / 3600,
+            "arcsec/s": _DEG / 3600,
+            "rpm": math.pi / 30,
+        },
+    ),
+    "acceleration": ("m/s^2", {"m/s^2": 1.0, "cm/s^2": 1e-2, "g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G}),
+    "velocity": ("m/s", {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "ug*s": 1e-6 * _G, "mg*s": 1e-3 * _G}),
+    "temperature": ("degC", {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0}),
+    "voltage": ("V", {"V": 1.0, "mV": 1e-3, "uV": 1e-6}),
+    "angle random walk": (
+        "rad/sqrt(s)",
+        {"rad/sqrt(s)": 1.0, "deg/sqrt(s)": _DEG, "deg/sqrt(h)": _DEG / 60, "deg/s/sqrt(Hz)": _DEG,
+         "rad/s/sqrt(Hz)": 1.0},
+    ),
+    "velocity random walk": (
+        "m/s/sqrt(s)",
+        {"m/s/sqrt(s)": 1.0, "m/s^2/sqrt(Hz)": 1.0, "m/s/sqrt(h)": 1 / 60, "ug/sqrt(Hz)": 1e-6 * _G,
+         "mg/sqrt(Hz)": 1e-3 * _G},
+    ),
+}  # fmt: skip
+
+#: zero of the temperature scales [degC]
+_ZERO = {"K": -273.15, "degF": -32.0 * 5.0 / 9.0}
+
+_ALIASES = {
+    "": "1",
+    "counts": "count",
+    "lsb": "count",
+    "LSB": "count",
+    "raw": "count",
+    "sec": "s",
+    "seconds": "s",
+    "hz": "Hz",
+    "°": "deg",
+    "degrees": "deg",
+    '"': "arcsec",
+    "'": "arcmin",
+    "dps": "deg/s",
+    "°/s": "deg/s",
+    "°/h": "deg/h",
+    "°/√h": "deg/sqrt(h)",
+    "deg/hr": "deg/h",
+    "deg/rt(h)": "deg/sqrt(h)",
+    "°C": "degC",
+    "C": "degC",
+    "rads": "rad/s",
+    "G": "g",
+    "g0": "g",
+    "m/s/s": "m/s^2",
+}
+
+_PINT_DIMENSIONS = {
+    "second": "time", "1 / second": "frequency", "meter": "length", "radian": "angle",
+    "radian / second": "rate", "meter / second ** 2": "acceleration", "meter / second": "velocity",
+    "kilogram * meter ** 2 / ampere / second ** 3": "voltage", "dimensionless": "number",
+}  # fmt: skip
+
+#: names with one-digit powers, joined by * and /: pint would compute 9^9^9^9 for as long as it takes
+_FOR_PINT = re.compile(r"(?:1/)?[^\W\d]+(?:\^-?\d)?(?:[*/][^\W\d]+(?:\^-?\d)?)*")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: its normal spelling, its dimension, and ``SI value = factor * value + zero``."""
+
+    symbol: str
+    dimension: str
+    factor: float
+    zero: float = 0.0
+
+    @property
+    def si(self) -> str:
+        """Spelling of the SI unit of the same dimension."""
+        return _TABLE[self.dimension][0]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number with a unit as typed, in SI: ``value`` and standard uncertainty ``u`` (0 if not given)."""
+
+    value: float
+    u: float
+    unit: Unit
+    text: str
+
+
+def parse_unit(text: str, where: object = "unit") -> Unit:
+    """Look a unit up by its text.
+
+    Parameters
+    ----------
+    text : str
+        For example ``m/s^2``, ``m/s²``, ``deg/h``, ``ug``, ``count``.
+    where : object
+        Named in the error: a file and column, or a key.
+
+    Raises
+    ------
+    QuantityError
+        The text is no unit known here or to pint.
+    """
+    plain = text.strip().replace("²", "^2").replace("³", "^3").replace("**", "^").replace("µ", "u")
+    plain = re.sub(r"\s*([*/^()])\s*", r"\1", plain.replace("μ", "u").replace("s2", "s^2"))
+    plain = re.sub(r"\s+", "*", plain)
+    plain = _ALIASES.get(plain, plain)
+    for dimension, (_, factors) in _TABLE.items():
+        if plain in factors:
+            return Unit(plain, dimension, factors[plain], _ZERO.get(plain, 0.0))
+    return _from_pint(plain, text, where)
+
+
+def _from_pint(plain: str, text: str, where: object) -> Unit:
+    """Ask pint, loaded only now, for a unit outside the table."""
+    expected = "expected one such as m/s^2, g, ug, rad/s, deg/h, deg, s, count"
+    if len(plain) > 40 or not _FOR_PINT.fullmatch(plain):
+        raise QuantityError(where, f"found the unit {shown(text)}, {expected}")
+    import pint
+
+    try:
+        registry = pint.application_registry
+        zero, one = (registry.Quantity(value, plain).to_base_units() for value in (0.0, 1.0))
+        if zero.magnitude != 0.0:
+            raise ValueError("a scale with another zero, or a logarithm")
+        return Unit(plain, _PINT_DIMENSIONS[f"{one.units:D}"], float(one.magnitude))
+    except Exception as error:  # pint raises its own, tokenizer and attribute errors for junk
+        raise QuantityError(where, f"found the unit {shown(text)}, {expected}") from error
+
+
+_NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
+_QUANTITY = re.compile(
+    rf"^\s*(?P<number>{_NUMBER})"
+    r"(?:\((?P<digits>[0-9]+(?:\.[0-9]+)?)\))?"
+    r"(?P<power>[eE][+-]?[0-9]+)?"
+    rf"(?:\s*(?:±|\+/-|\+-)\s*(?P<plusminus>{_NUMBER}(?:[eE][+-]?[0-9]+)?))?"
+    r"\s*(?P<unit>[^\d\s(.].*|1)?\s*$"
+)
+
+
+def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
+    """Read ``"9.81744(2) m/s^2"``: a number, perhaps its standard uncertainty, and a unit.
+
+    The uncertainty is written in the last digits (``9.81744(2)``) or after ``±`` (or ``+/-``). A bare
+    number is accepted only where a dimensionless one is expected.
+
+    Parameters
+    ----------
+    text : object
+        What the user typed.
+    dimension : str
+        What it must measure: ``"acceleration"``, ``"angle"``, ``"time"``, ... (a key of the unit table).
+    where : object
+        Named in the error: usually the study key.
+
+    Raises
+    ------
+    QuantityError
+        Not a quantity, or one of another dimension.
+    """
+    kind = "a number" if dimension == "number" else f"a quantity with a unit of {dimension}"
+    expected = f"{kind}, such as {_example(dimension)}"
+    if isinstance(text, int | float) and not isinstance(text, bool) and abs(text) < 1e60:
+        text = repr(text)
+    match = _QUANTITY.match(text) if isinstance(text, str) else None
+    if match is None or (match["digits"] and match["plusminus"]):
+        raise QuantityError(where, f"found {shown(text)}, expected {expected}")
+    assert isinstance(text, str)
+    if match["unit"] is None and dimension != "number":
+        raise QuantityError(where, f"found {shown(text)} without a unit, expected {expected}")
+    unit = parse_unit(match["unit"] or "1", where)
+    if unit.dimension != dimension:
+        raise QuantityError(where, f"found {shown(text)}, which is of {unit.dimension}, expected {expected}")
+    value = float(match["number"] + (match["power"] or "")) * unit.factor + unit.zero
+    u = _typed_u(match) * unit.factor
+    if not (math.isfinite(value) and math.isfinite(u)):
+        raise QuantityError(where, f"found {shown(text)}, which is out of range, expected {expected}")
+    return Quantity(value, u, unit, text.strip())
+
+
+def shown(value: object) -> str:
+    """Text of a value for a message: its repr, at most 80 characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of thousands of digits, tables in tables without end
+        return f"a {type(value).__name__} too large to print"
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _typed_u(match: re.Match[str]) -> float:
+    """Standard uncertainty as typed, in the typed unit."""
+    if match["plusminus"]:
+        return abs(float(match["plusminus"]))
+    if not match["digits"]:
+        return 0.0
+    decimals = len(match["number"].partition(".")[2])
+    last = float(f"1e{-decimals}") if "." not in match["digits"] else 1.0
+    return float(match["digits"]) * last * float("1" + (match["power"] or ""))
+
+
+def _example(dimension: str) -> str:
+    """A quantity of that dimension, for error messages."""
+    return f'"{_EXAMPLES.get(dimension, "1.5 " + _TABLE[dimension][0])}"'
+
+
+_EXAMPLES = {
+    "acceleration": "9.81744(2) m/s^2",
+    "angle": "40 deg",
+    "rate": "5 deg/h",
+    "time": "50 s",
+    "frequency": "100 Hz",
+    "number": "10 ppm",
+    "length": "120 m",
+}
