@@ -1,0 +1,90 @@
+"""The one decorator for compiled kernels.
+
+numba's own disk cache is keyed on the file that holds the kernel, not on the kernels it calls: after an
+upgrade that changes only a callee, a cached caller would silently go on with the old numbers. So the
+cache folder carries a hash over every source file of the package, and any change starts a fresh one.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+import numba.core.config
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+def source_hash(package: Path = PACKAGE) -> str:
+    """SHA-256 over names and contents of all Python sources below ``package``."""
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0")
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def _user_caches() -> Iterator[Path]:
+    """Places for the cache, best first: the user's cache folder, then a private temporary one."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    with suppress(RuntimeError):  # no home directory
+        yield (Path(base) if base else Path.home() / ".cache") / "inercal"
+    owner = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    with suppress(FileNotFoundError):  # no temporary folder either
+        yield Path(tempfile.gettempdir()) / f"inercal-{owner}"
+
+
+def _usable(folder: Path) -> bool:
+    """Make the folder; true if it is ours and a file can be written there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        # In a shared temporary folder somebody else could have planted code under our name.
+        if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+            return False
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Folder of the compiled kernels of exactly these sources, or None where nothing can be written."""
+    key = source_hash()
+    for base in _user_caches():
+        if _usable(base) and _usable(base / key):
+            return base / key
+    return None
+
+
+def kernel(function: F) -> F:
+    """Compile a function with numba (nopython, no GIL, no fastmath), cached on disk where possible."""
+    folder = cache_folder()
+    config = cast(Any, numba.core.config)
+    before = config.CACHE_DIR
+    config.CACHE_DIR = "" if folder is None else str(folder)
+    try:
+        return cast(F, numba.njit(nogil=True, cache=folder is not None)(function))
+    finally:
+        config.CACHE_DIR = before
+
+
+@contextmanager
+def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
+    """Surround the tiny first calls of a system's kernels; says so once when they must be compiled."""
+    folder = cache_folder()
+    done = None if folder is None else folder / f"{name}.compiled"
+    if done is None or not done.exists():
+        say("compiling kernels, once")
+    yield
+    if done is not None:
+        done.touch()

@@ -1,0 +1,83 @@
+"""The compiled kernels agree to rounding with their NumPy twins."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from inercal.geometry import kernels, rotations
+
+EPS = np.finfo(float).eps
+RNG = np.random.default_rng(20)
+
+ROTVECS = np.concatenate(
+    [
+        np.zeros((1, 3)),
+        RNG.normal(size=(20, 3)),
+        RNG.normal(size=(20, 3)) * np.geomspace(1e-12, 1e-2, 20)[:, None],
+        np.pi * np.eye(3),
+        (np.pi - 1e-7) * np.eye(3),
+    ]
+)
+QUATERNIONS = rotations.exp(ROTVECS)
+
+
+def test_multiply_agrees():
+    got = [kernels.multiply(p, q) for p, q in zip(QUATERNIONS, QUATERNIONS[::-1], strict=True)]
+    assert_allclose(got, rotations.multiply(QUATERNIONS, QUATERNIONS[::-1]), atol=2 * EPS)
+
+
+def test_normalize_agrees():
+    q = RNG.normal(size=(20, 4))
+    assert_allclose([kernels.normalize(row) for row in q], rotations.normalize(q), rtol=2 * EPS)
+
+
+def test_exp_agrees_relatively_also_for_tiny_angles():
+    assert_allclose([kernels.exp(row) for row in ROTVECS], QUATERNIONS, rtol=4 * EPS)
+
+
+def test_rotate_agrees():
+    v = RNG.normal(size=ROTVECS.shape)
+    got = [kernels.rotate(q, row) for q, row in zip(QUATERNIONS, v, strict=True)]
+    assert_allclose(got, rotations.rotate(QUATERNIONS, v), atol=8 * EPS)
+
+
+def test_step_agrees():
+    got = [kernels.step(q, row, 0.3) for q, row in zip(QUATERNIONS, ROTVECS, strict=True)]
+    assert_allclose(got, rotations.step(QUATERNIONS, ROTVECS, 0.3), atol=4 * EPS)
+
+
+@pytest.mark.parametrize("kind", [tuple, np.array])
+def test_tuples_and_rows_of_arrays_are_the_same_to_a_kernel(kind):
+    q, v = QUATERNIONS[3], ROTVECS[4]
+    assert kernels.rotate(kind(q), kind(v)) == kernels.rotate(q, v)
+
+
+def test_integrate_is_step_after_step():
+    n = 200
+    omega, dt = RNG.normal(size=(n, 3)), RNG.uniform(0.005, 0.02, n)
+    out = np.full((n + 1, 4), np.nan)
+    kernels.integrate(QUATERNIONS[5], omega, dt, out)
+    assert_array_equal(out[0], QUATERNIONS[5])
+    assert_allclose(out[1:], rotations.step(out[:-1], omega, dt), atol=4 * EPS)
+
+
+def test_integrate_of_a_constant_rate_is_the_closed_form():
+    n, omega = 2000, np.array([0.3, -0.7, 1.1])
+    dt = np.full(n, 0.01)
+    out = np.empty((n + 1, 4))
+    kernels.integrate(QUATERNIONS[5], np.tile(omega, (n, 1)), dt, out)
+    exact = rotations.step(QUATERNIONS[5], omega, np.arange(n + 1) * 0.01)
+    assert rotations.attitude_difference(out, exact).max() < 1e-13
+
+
+def test_integrate_does_not_lose_the_unit_length():
+    n = 100_000
+    out = np.empty((n + 1, 4))
+    kernels.integrate(QUATERNIONS[5], RNG.normal(size=(n, 3)), np.full(n, 0.01), out)
+    assert_allclose(np.linalg.norm(out, axis=-1), 1.0, atol=4 * EPS)
+
+
+def test_integrate_of_nothing_leaves_the_first_attitude():
+    out = np.empty((1, 4))
+    kernels.integrate(QUATERNIONS[5], np.empty((0, 3)), np.empty(0), out)
+    assert_array_equal(out, QUATERNIONS[5:6])

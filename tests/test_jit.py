@@ -1,0 +1,137 @@
+"""Promises of the kernel decorator: never stale, never in the way, compiled once.
+
+Each test runs other processes, on a copy of the package where sources change, since a cache lives between
+processes and not in one.
+"""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import inercal
+
+PACKAGE = Path(inercal.__file__).parent
+NOWHERE = "/dev/null/nowhere"  # below a file: nobody can make it, not even root
+
+
+def python(program, *, path=PACKAGE.parent, **environment):
+    """Run a program in a new process with ``path`` as its package folder; what it printed."""
+    kept = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env=kept | {"PYTHONPATH": str(path)} | {key: str(value) for key, value in environment.items()},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()
+
+
+USE_A_KERNEL = """
+import numpy as np
+from inercal import _jit
+from inercal.geometry import kernels
+assert kernels.normalize(np.array([2.0, 0.0, 0.0, 0.0])) == (1.0, 0.0, 0.0, 0.0)
+print(_jit.cache_folder())
+"""
+
+
+def test_a_changed_callee_changes_the_result_of_its_cached_caller(tmp_path):
+    """numba's own cache would give the old number here: it hashes the caller's file alone."""
+    package = tmp_path / "tiny"
+    package.mkdir()
+    shutil.copy(PACKAGE / "_jit.py", package)
+    (package / "__init__.py").touch()
+    callee = "from tiny._jit import kernel\n\n@kernel\ndef inner(x):\n    return x + {}\n"
+    (package / "callee.py").write_text(callee.format(1.0))
+    (package / "caller.py").write_text(
+        "from tiny._jit import kernel\nfrom tiny.callee import inner\n\n"
+        "@kernel\ndef outer(x):\n    return 10.0 * inner(x)\n"
+    )
+    program = "from tiny.caller import outer; print(outer(1.0), sum(outer.stats.cache_misses.values()))"
+    here = {"path": tmp_path, "XDG_CACHE_HOME": tmp_path / "cache"}
+    assert python(program, **here) == "20.0 1"
+    assert python(program, **here) == "20.0 0"
+    (package / "callee.py").write_text(callee.format(2.0))
+    assert python(program, **here) == "30.0 1"
+
+
+def test_a_second_process_compiles_nothing(tmp_path):
+    """Of the whole package a copy, so that nobody's editing meanwhile starts a new cache."""
+    shutil.copytree(PACKAGE, tmp_path / "inercal", ignore=shutil.ignore_patterns("__pycache__"))
+    program = """
+import numpy as np
+from inercal.geometry import kernels
+q, v = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+kernels.multiply(q, q), kernels.normalize(q), kernels.rotate(q, v), kernels.exp(v), kernels.step(q, v, 0.1)
+kernels.integrate(q, np.zeros((1, 3)), np.zeros(1), np.zeros((2, 4)))
+every = [value for value in vars(kernels).values() if hasattr(value, "stats")]
+assert len(every) == 6 and all(kernel.signatures for kernel in every)
+print(sum(sum(kernel.stats.cache_misses.values()) for kernel in every))
+"""
+    here = {"path": tmp_path, "XDG_CACHE_HOME": tmp_path / "cache"}
+    assert int(python(program, **here)) > 0
+    assert int(python(program, **here)) == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the unwritable place is a POSIX one")
+def test_without_a_writable_home_the_cache_is_in_the_temporary_folder(tmp_path):
+    folder = python(USE_A_KERNEL, HOME=NOWHERE, XDG_CACHE_HOME=NOWHERE, TMPDIR=tmp_path)
+    assert Path(folder).parent == tmp_path / f"inercal-{os.getuid()}"
+    assert list(Path(folder).rglob("*.nbi"))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the unwritable place is a POSIX one")
+@pytest.mark.parametrize("gettempdir", [f"lambda: {NOWHERE!r}", "lambda: open('/nowhere')"])
+def test_where_nothing_can_be_written_kernels_work_without_a_cache(gettempdir):
+    """A read-only machine, where ``gettempdir`` gives a folder of no use or raises FileNotFoundError."""
+    program = f"import tempfile; tempfile.gettempdir = {gettempdir}" + USE_A_KERNEL
+    assert python(program, HOME=NOWHERE, XDG_CACHE_HOME=NOWHERE, TMPDIR=NOWHERE) == "None"
+
+
+def test_kernels_run_as_plain_python_too():
+    """For debuggers and coverage, which do not see compiled bodies."""
+    program = """
+import numpy as np
+from inercal.geometry import kernels, rotations
+assert not hasattr(kernels.step, "stats")
+rng = np.random.default_rng(4)
+q0, omega = rotations.normalize(rng.normal(size=4)), rng.normal(size=(9, 3))
+dt, out = np.full(9, 0.1), np.empty((10, 4))
+omega[3] = 0.0
+kernels.integrate(q0, omega, dt, out)
+np.testing.assert_allclose(out[1:], rotations.step(out[:-1], omega, dt), atol=1e-15)
+np.testing.assert_allclose(kernels.rotate(q0, omega[0]), rotations.rotate(q0, omega[0]), atol=1e-15)
+print("same")
+"""
+    assert python(program, NUMBA_DISABLE_JIT=1) == "same"
+
+
+def imports_numba(tree):
+    """True if a module imports numba in any way, or names njit."""
+    for node in ast.walk(tree):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [node.module or "", *(alias.name for alias in node.names)]
+        elif isinstance(node, ast.Name):
+            names = [node.id]
+        elif isinstance(node, ast.Attribute):
+            names = [node.attr]
+        if any(name.split(".")[0] in ("numba", "njit") for name in names):
+            return True
+    return False
+
+
+def test_only_the_decorator_module_knows_numba():
+    sources = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*.py")}
+    users = {
+        name for name, path in sources.items() if imports_numba(ast.parse(path.read_text(encoding="utf-8")))
+    }
+    assert users == {"_jit.py"}
