@@ -1,0 +1,47 @@
+"""Findings: what is suspicious about a recording or a result, said and left to the user to decide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: code -> what it means. Codes are a contract; more may be added.
+CODES: dict[str, str] = {
+    "gap": "samples are missing",
+    "duplicate_time": "a time stamp is repeated",
+    "backward_time": "time runs backward",
+    "nan": "values are missing or not numbers",
+    "bad_row": "rows that cannot be read as numbers",
+    "truncated": "the file ends within a row",
+    "saturation": "a sensor sits at an extreme of its range",
+    "rate_change": "the sample rate changes",
+    "unit_suspect": "the values do not fit the stated unit",
+    "sign_suspect": "an axis looks reversed",
+    "channel_swap": "axes look exchanged",
+    "stuck_encoder": "an angle stands still while the instrument turns",
+    "command_shift": "commanded and measured motion are shifted in time",
+    "wrap_2pi": "an angle jumps by a full turn",
+    "at_prior": "a parameter is no better known than before the measurement",
+    "gimbal_lock": "two axes of the gimbals come close to each other",
+    "outlier": "single samples far from their neighbours",
+    "gyro_missing": "there are no gyro channels",
+    "gyro_restless": "the gyro is too restless in the holds to help in finding them",
+    "g_sensitivity": "the gyro output changes with the pose",
+    "bias_drift": "a bias drifts over the recording",
+    "excess_scatter": "the scatter of the residuals exceeds what the sensor noise explains",
+    "few_degrees_of_freedom": "hardly more data than unknowns",
+    "skipped_turn": "a turn was left out of the fit",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing worth knowing: a code of `CODES`, a sentence, and where it was seen."""
+
+    code: str
+    message: str
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a code that is not in the table."""
+        if self.code not in CODES:
+            raise ValueError(f"unknown finding code {self.code!r}")

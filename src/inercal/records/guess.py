@@ -1,0 +1,302 @@
+"""A first column map for files nobody has described, with the reason for each guess beside it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from inercal.errors import QuantityError, RecordError
+from inercal.records.channels import Origin, is_channel, misfit
+from inercal.records.read import format_of
+from inercal.records.read.table import Sample
+from inercal.records.record import Array
+from inercal.units import parse_unit
+
+_SENSORS = {
+    "acc": r"a|f|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha",
+    "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega",
+}
+_IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
+_TIME = r"t|time|timestamp|time stamp|stamp|sec|secs|seconds|time (?:s|ms|us|ns)|timestamp (?:s|ms|us|ns)"
+_LABEL = r"label|part|section|pose"
+_RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
+_EVERYDAY = ("s", "m/s^2", "deg/s", "deg", "degC", "1")
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A channel thought to be in a column: where that is, its values, a unit if it was said, and why."""
+
+    name: str
+    origin: Origin
+    values: Array
+    unit: str | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class _File:
+    """What was guessed about one file."""
+
+    path: Path
+    guesses: Mapping[str, _Guess]
+    leading: tuple[str, ...]
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def guess_map(paths: str | Path | Sequence[str | Path]) -> str:
+    """Guess a column map from the files themselves.
+
+    Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``), arrays without a header
+    by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
+    a unit by the size of gravity.
+
+    Parameters
+    ----------
+    paths : path or sequence of paths
+        The files of one record; of repeat runs the first is looked at.
+
+    Returns
+    -------
+    str
+        A map in TOML that reads these files, with a comment on each guess.
+
+    Raises
+    ------
+    RecordError
+        A file cannot be read, or nothing in it looks like a channel.
+    """
+    files: list[_File] = []
+    for path in [paths] if isinstance(paths, str | Path) else paths:
+        file = _look(Path(path))
+        if not any(file.guesses.keys() & other.guesses.keys() - {"t"} for other in files):
+            files.append(file)
+    lines = [
+        f"# Guessed from {', '.join(_quoted(file.path.name) for file in files)}: check each line, above all",
+        "# the units, the order of the axes and their signs.",
+    ]
+    if len(files) == 1:
+        lines += _options(files[0], "file") + _columns(files[0], "columns")
+    else:
+        for file, name in zip(files, _table_names(files), strict=True):
+            table = f"file.{name}"
+            lines += ["", f"[{table}]", f"path = {_quoted(file.path.name)}", *_options(file, "")]
+            lines += _columns(file, f"{table}.columns")
+    if any("t" not in file.guesses for file in files):
+        lines += _rate([line for file in files for line in file.leading])
+    return "\n".join(lines) + "\n"
+
+
+def _look(path: Path) -> _File:
+    """Guess the channels of one file."""
+    try:
+        samples = sorted(format_of(path).peek(path), key=lambda sample: -len(sample.values))
+    except OSError as error:
+        raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
+    guesses: dict[str, _Guess] = {}
+    for sample in samples:
+        if len(sample.values) != len(samples[0].values):
+            continue
+        for guess in _by_header(sample) if sample.names else _by_shape(sample, path):
+            guesses.setdefault(guess.name, guess)
+    if not guesses.keys() - {"t", "label"}:
+        held = "; ".join(", ".join(sample.names) or f"{sample.values.shape[1]} columns" for sample in samples)
+        raise RecordError(path, f"found {held[:100]}, expected columns that look like those of an instrument")
+    return _File(path, guesses, tuple(line for sample in samples for line in sample.leading))
+
+
+def _by_header(sample: Sample) -> list[_Guess]:
+    """Channels by the names in the header."""
+    guesses = []
+    for index, title in enumerate(sample.names):
+        match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title)
+        plain, unit = (match[1], match[2]) if match else (title, None)
+        name = plain if is_channel(plain) else _named(plain)
+        if name is not None:
+            origin = title if sample.names.count(title) == 1 else index
+            reason = f"the header says {_quoted(title)}"
+            guesses.append(_Guess(name, origin, sample.values[:, index], unit, reason))
+    return guesses
+
+
+def _named(title: str) -> str | None:
+    """The channel a header's name stands for, if any."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title)
+    words = re.sub(r"[^a-z0-9]+", " ", words.lower()).strip()
+    for sensor, names in _SENSORS.items():
+        match = re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz]) (?:{names})", words)
+        if match:
+            return f"{sensor}_{match[1] or match[2]}"
+    for channel, names in (("t", _TIME), ("label", _LABEL), ("temperature", r"temp|temperature")):
+        if re.fullmatch(rf"(?:.* )?(?:{names})", words):
+            return channel
+    return None
+
+
+def _by_shape(sample: Sample, path: Path) -> list[_Guess]:
+    """Channels of an array without a header: a time that rises, and one triad or two."""
+    values = sample.values
+
+    def guess(name: str, index: int, reason: str) -> _Guess:
+        origin: Origin = (sample.variable, index) if sample.variable else index
+        return _Guess(name, origin, values[:, index], None, reason)
+
+    rising = [index for index in range(values.shape[1]) if (np.diff(values[:, index]) > 0).all()]
+    guesses = [guess("t", rising[0], "the column that always rises")] if rising else []
+    rest = [index for index in range(values.shape[1]) if index not in rising[:1]]
+    if len(rest) not in (3, 6):
+        return guesses if not rest else []
+    triads = [rest[:3], rest[3:]] if len(rest) == 6 else [rest]
+    for sensor, triad, reason in _sensors(values, triads, (sample.variable, path.name)):
+        guesses += [
+            guess(f"{sensor}_{axis}", index, reason) for axis, index in zip("xyz", triad, strict=True)
+        ]
+    return guesses
+
+
+def _sensors(
+    values: Array, triads: list[list[int]], names: tuple[str, ...]
+) -> list[tuple[str, list[int], str]]:
+    """Which triad is which sensor, and why."""
+    for name in names if len(triads) == 1 else ():
+        said = [sensor for sensor, pattern in _IN_NAMES.items() if re.search(pattern, name, re.IGNORECASE)]
+        if len(said) == 1:
+            return [(said[0], triads[0], f"the name says {_quoted(name)}")]
+    spread = [_spread(values[:, triad]) for triad in triads]
+    acc = int(np.argmin(spread))
+    if len(triads) == 1:
+        sensor = "acc" if spread[0] < 0.2 else "gyro"
+        return [(sensor, triads[0], "its norm is steady" if sensor == "acc" else "its norm varies")]
+    return [
+        ("acc", triads[acc], "of the two triads the one with the steadier norm"),
+        ("gyro", triads[1 - acc], "of the two triads the one with the less steady norm"),
+    ]
+
+
+def _spread(triad: Array) -> float:
+    """Scatter of a triad's norm over its median."""
+    norm = np.linalg.norm(triad, axis=1)
+    middle = _median(norm)
+    return _median(np.abs(norm - middle)) / middle if middle > 0 else np.inf
+
+
+def _median(values: Array) -> float:
+    """Median of the numbers there are, 0 if there are none."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else 0.0
+
+
+def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
+    """Unit of each channel, and why."""
+    acc = _acc_unit(guesses)
+    units = {}
+    for name, guess in guesses.items():
+        if guess.unit is not None and _fits(name, guess.unit):
+            units[name] = (guess.unit, "with this unit")
+        elif name == "t":
+            units[name] = _time_unit(guess.values)
+        elif name.startswith("acc_"):
+            units[name] = acc
+        elif name.startswith("gyro"):
+            units[name] = _gyro_unit(guesses, acc[0])
+        else:
+            units[name] = (next(unit for unit in _EVERYDAY if _fits(name, unit)), "the unit is an example")
+    return units
+
+
+def _fits(name: str, unit: str) -> bool:
+    """True if there is such a unit and the channel may have it."""
+    try:
+        return misfit(name, parse_unit(unit)) is None
+    except QuantityError:
+        return False
+
+
+def _acc_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
+    """Unit of the accelerometers by the size of gravity."""
+    axes = [guesses[name].values for name in ("acc_x", "acc_y", "acc_z") if name in guesses]
+    if len(axes) < 3:
+        return "count", "no triad to tell the unit by"
+    norm = _median(np.linalg.norm(axes, axis=0))
+    for unit, low, high in (("m/s^2", 8.5, 11.0), ("g", 0.85, 1.15)):
+        if low < norm < high:
+            return unit, f"the median norm is {norm:.4g}, gravity in {unit}"
+    return "count", f"the median norm is {norm:.5g}, gravity in neither m/s^2 nor g"
+
+
+def _gyro_unit(guesses: Mapping[str, _Guess], acc_unit: str) -> tuple[str, str]:
+    """Unit of the gyros: counts if they are whole numbers, else by the largest rate."""
+    axes = [guess.values for name, guess in guesses.items() if name.startswith("gyro")]
+    known = np.concatenate([axis[np.isfinite(axis)] for axis in axes])
+    if (known == np.round(known)).all():
+        return "count", "all are whole numbers"
+    if acc_unit == "count" and "acc_x" in guesses:
+        return "count", "as the accelerometers"
+    largest = np.abs(known).max()
+    unit = "deg/s" if largest > 35.0 else "rad/s"
+    return unit, f"the largest is {largest:.4g}; check whether deg/s or rad/s"
+
+
+def _time_unit(t: Array) -> tuple[str, str]:
+    """Unit of the time by its interval: inertial instruments are read some 1 to 10 000 times a second."""
+    steps = np.diff(t)
+    interval = _median(steps[steps > 0])
+    unit = next(
+        unit for unit, limit in (("s", 2.0), ("ms", 500.0), ("us", 5e5), ("ns", np.inf)) if interval < limit
+    )
+    return unit, f"the interval is {interval:.6g}"
+
+
+def _columns(file: _File, table: str) -> list[str]:
+    """The columns of a file as TOML."""
+    units = _units(file.guesses)
+    lines = []
+    for name, guess in file.guesses.items():
+        unit, reason = units[name]
+        comment = guess.reason if name == "label" else f"{guess.reason}; {reason}"
+        origin = list(guess.origin) if isinstance(guess.origin, tuple) else guess.origin
+        lines += ["", f"# {comment}", f"[{table}.{name}]", f"from = {_quoted(origin)}"]
+        lines += [] if name == "label" else [f"unit = {_quoted(unit)}"]
+    return lines
+
+
+def _options(file: _File, table: str) -> list[str]:
+    """The layout of a file as TOML, as far as it is not found out on reading."""
+    if not file.leading:
+        return []
+    lines = [f"skip = {len(file.leading)}", f"# the first of these lines is {_quoted(file.leading[0][:60])}"]
+    return ["", f"[{table}]", *lines] if table else lines
+
+
+def _rate(leading: Iterable[str]) -> list[str]:
+    """The sample rate as TOML, where there is no time column."""
+    said = next((line for line in leading if _RATE.search(line)), None)
+    match = _RATE.search(said) if said is not None else None
+    if said is not None and match:
+        return [
+            "",
+            f"# there is no time column; a line says {_quoted(said[:60])}",
+            "[time]",
+            f'rate = "{match[1]} Hz"',
+        ]
+    return ["", "# there is no time column: PUT THE SAMPLE RATE HERE", "[time]", 'rate = "100 Hz"']
+
+
+def _table_names(files: Sequence[_File]) -> list[str]:
+    """``acc`` or ``gyro`` for a file of that triad alone, else by its number."""
+    names = []
+    for number, file in enumerate(files, 1):
+        sensors = {name.rpartition("_")[0] for name in file.guesses if name not in ("t", "label")}
+        name = sensors.pop() if sensors in ({"acc"}, {"gyro"}) else f"part{number}"
+        names.append(name if name not in names else f"part{number}")
+    return names
+
+
+def _quoted(value: object) -> str:
+    """A number, text or list as TOML writes it."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

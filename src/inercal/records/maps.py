@@ -1,0 +1,188 @@
+"""Column maps: which column of which file is which channel, in which unit (TOML)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from inercal._toml import Strict, check, read_toml
+from inercal.errors import MapError
+from inercal.records.channels import Channel, Origin, is_channel, misfit, nearest, needs_unit
+from inercal.records.read.table import FileOptions, Part
+from inercal.units import parse_quantity, parse_unit, shown
+
+
+class ColumnEntry(Strict):
+    """``[columns.NAME]``: where the column is found, its unit, sign and scale."""
+
+    origin: Any = Field(alias="from")
+    unit: str | None = None
+    sign: Literal[1, -1] = 1
+    scale: float = 1.0
+    kind: Literal["rate", "increment"] = "rate"
+
+    @field_validator("origin")
+    @classmethod
+    def _is_origin(cls, value: object) -> Origin:
+        """A column number, a header's name, or [variable, column]."""
+        match value:
+            case bool():
+                pass
+            case int() if value >= 0:
+                return value
+            case str() if value:
+                return value
+            case [str(variable), int(column)] if variable and column >= 0 and not isinstance(column, bool):
+                return variable, column
+        raise ValueError('expected a column number from 0, a header\'s name or ["variable", column]')
+
+    @field_validator("scale")
+    @classmethod
+    def _is_scale(cls, value: float) -> float:
+        """A scale of zero would leave nothing."""
+        if value == 0:
+            raise ValueError("expected a number other than 0")
+        return value
+
+
+class FileEntry(Strict):
+    """``[file]``: how the files are laid out; what is left out is found out."""
+
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str | None = None
+    skip: int = Field(default=0, ge=0)
+    variable: str | None = None
+
+    @field_validator("delimiter")
+    @classmethod
+    def _is_delimiter(cls, value: str | None) -> str | None:
+        """One character that no number is written with."""
+        if value is not None and (len(value) != 1 or value.isalnum() or value in '+-."\r\n'):
+            raise ValueError('expected one character such as ",", ";", "\\t" or " " (any blanks)')
+        return value
+
+    @field_validator("decimal")
+    @classmethod
+    def _is_decimal(cls, value: str | None, info: ValidationInfo) -> str | None:
+        """A comma cannot both part fields and mark decimals."""
+        if value == "," and info.data.get("delimiter") == ",":
+            raise ValueError("expected another than the delimiter")
+        return value
+
+
+class NamedFileEntry(FileEntry):
+    """``[file.NAME]``: one of several files, with its own layout and columns."""
+
+    path: str = Field(min_length=1)
+    columns: dict[str, ColumnEntry] = Field(min_length=1)
+
+
+class TimeEntry(Strict):
+    """``[time]``: the sample rate of files without a time column, or whose stamps can't be trusted."""
+
+    rate: str | None = None
+    ignore: bool = False
+
+
+class MapEntry(Strict):
+    """A whole map file, less its ``[file.NAME]`` tables."""
+
+    columns: dict[str, ColumnEntry] = Field(default_factory=dict)
+    time: TimeEntry = TimeEntry()
+    file: FileEntry = FileEntry()
+
+
+@dataclass(frozen=True)
+class RecordMap:
+    """A column map, checked.
+
+    ``parts`` holds the plain ``[columns]`` (its name is empty) and each ``[file.NAME]``; ``rate`` is the
+    sample rate [Hz] of ``[time]`` or None, and ``ignore_time`` asks to use it in place of any time column.
+    """
+
+    path: Path
+    parts: tuple[Part, ...]
+    rate: float | None = None
+    ignore_time: bool = False
+
+
+def read_map(path: str | Path) -> RecordMap:
+    """Read a column map.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file as in the reference of records.
+
+    Raises
+    ------
+    MapError
+        Naming the key, what was found and what was expected.
+    """
+    data = read_toml(path, MapError)
+    table = data.get("file")
+    named = {}
+    if isinstance(table, dict):
+        named = {key: value for key, value in table.items() if isinstance(value, dict)}
+        data["file"] = {key: value for key, value in table.items() if key not in named}
+    entry = check(MapEntry, data, path, MapError)
+    if not entry.columns and not named:
+        raise MapError(path, "columns: missing, expected at least one [columns.NAME] or [file.NAME]")
+    plain = (Part(_channels(entry.columns, path), _options(entry.file)),) if entry.columns else ()
+    rate = _rate(entry.time, path)
+    parts = (*plain, *(_part(name, named[name], path) for name in named))
+    files = [Path(part.path).name for part in parts if part.name]
+    if len(set(files)) < len(files):
+        raise MapError(path, f"file: found one file name twice in {', '.join(files)}, expected distinct ones")
+    return RecordMap(Path(path), parts, rate, entry.time.ignore)
+
+
+def _part(name: str, table: Mapping[str, Any], path: object) -> Part:
+    """One ``[file.NAME]``."""
+    where = f"{path}: file.{name}"
+    entry = check(NamedFileEntry, table, where, MapError)
+    return Part(_channels(entry.columns, where), _options(entry), name, entry.path)
+
+
+def _options(entry: FileEntry) -> FileOptions:
+    """The layout as the readers take it."""
+    return FileOptions(entry.delimiter, entry.decimal, entry.comment, entry.skip, entry.variable)
+
+
+def _rate(entry: TimeEntry, path: object) -> float | None:
+    """The stated sample rate [Hz]."""
+    where = f"{path}: time.rate"
+    if entry.rate is None:
+        if entry.ignore:
+            raise MapError(where, 'missing, expected a rate such as "100 Hz" where time.ignore = true')
+        return None
+    rate = parse_quantity(entry.rate, "frequency", where).value
+    if rate <= 0:
+        raise MapError(where, f"found {shown(entry.rate)}, expected a rate above 0")
+    return rate
+
+
+def _channels(columns: Mapping[str, ColumnEntry], where: object) -> tuple[Channel, ...]:
+    """The channels of a ``columns`` table, names and units checked."""
+    return tuple(
+        _channel(name, entry, f"{where}: columns.{shown(name)[1:-1]}") for name, entry in columns.items()
+    )
+
+
+def _channel(name: str, entry: ColumnEntry, where: str) -> Channel:
+    """One ``[columns.NAME]``."""
+    if not is_channel(name):
+        raise MapError(where, f"unknown channel, {nearest(name)}")
+    increment = entry.kind == "increment"
+    if entry.unit is None and needs_unit(name):
+        raise MapError(f"{where}.unit", 'missing, expected a unit such as "m/s^2", "deg/s", "s" or "count"')
+    unit = parse_unit(entry.unit or "1", f"{where}.unit")
+    problem = misfit(name, unit, increment)
+    if problem:
+        raise MapError(f"{where}.unit", problem)
+    return Channel(name, entry.origin, unit, entry.sign * entry.scale, increment)

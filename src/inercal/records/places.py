@@ -1,0 +1,26 @@
+"""Counts and places in words: ``3 gaps``, ``line 17``, ``rows 102-118, 240 and 3 more``."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+_SHOWN = 3
+
+
+def counted(count: int, noun: str) -> str:
+    """The count with its noun, in the plural unless it is one."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def places(word: str, numbers: ArrayLike) -> str:
+    """Numbers (ascending, counted from 1) as ranges: the first few, and how many ranges more."""
+    found = np.asarray(numbers, dtype=np.int64)
+    if found.size == 0:
+        return ""
+    breaks = np.flatnonzero(np.diff(found) > 1)
+    starts, ends = found[np.r_[0, breaks + 1]], found[np.r_[breaks, -1]]
+    shown = zip(starts[:_SHOWN].tolist(), ends[:_SHOWN].tolist(), strict=True)
+    text = ", ".join(str(start) if start == end else f"{start}-{end}" for start, end in shown)
+    more = f" and {len(starts) - _SHOWN} more" if len(starts) > _SHOWN else ""
+    return f"{word}{'' if found.size == 1 else 's'} {text}{more}"

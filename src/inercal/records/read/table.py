@@ -1,0 +1,89 @@
+"""What a reader is asked for and what it gives back: the contract of the formats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from inercal.records.channels import Channel
+from inercal.records.findings import Finding
+from inercal.records.record import Array
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """How a file is laid out, where it was said; None is found out from the file.
+
+    ``delimiter`` " " is any run of blanks; ``comment`` begins lines to pass over (``#`` and ``%`` if None);
+    ``skip`` counts lines before the header; ``variable`` is the array of a file that holds several.
+    """
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    comment: str | None = None
+    skip: int = 0
+    variable: str | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """A file's share of a map: its options and the channels wanted from it.
+
+    ``name`` and ``path`` are those of ``[file.NAME]``, empty for the plain ``[columns]``. ``channels`` is
+    None without a map: the file's own header must then name quantities and units.
+    """
+
+    channels: tuple[Channel, ...] | None
+    options: FileOptions = FileOptions()
+    name: str = ""
+    path: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Raw columns of one file.
+
+    ``values`` holds an array (n,) for each channel found, as in the file, before sign, scale and unit; what
+    is missing or infinite is NaN and is in ``findings``, with rows that could not be read. ``contents``
+    says in words what the file holds, for the error about a channel that is not there.
+    """
+
+    channels: tuple[Channel, ...]
+    values: Mapping[str, Array]
+    contents: str
+    rows: int
+    labels: tuple[str, ...] = field(default=(), repr=False)
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A first look at an array of a file, to guess a map from.
+
+    ``values`` (n, k) are its columns (text is NaN) and ``names`` (k,) its header, if any; ``leading`` holds
+    the lines passed over by ``options.skip``.
+    """
+
+    values: Array
+    names: tuple[str, ...]
+    options: FileOptions
+    variable: str = ""
+    leading: tuple[str, ...] = ()
+
+
+class Format(Protocol):
+    """A module that knows one file format."""
+
+    def read(
+        self,
+        path: Path,
+        options: FileOptions,
+        channels: tuple[Channel, ...] | None,
+        progress: Callable[[int], None],
+    ) -> Table:
+        """Read those of the channels that the file holds; ``progress`` is told the bytes done."""
+
+    def peek(self, path: Path) -> list[Sample]:
+        """Look at the beginning of each array in the file."""

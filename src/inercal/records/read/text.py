@@ -1,0 +1,238 @@
+"""Text files: CSV and its many dialects.
+
+NumPy reads a block of lines in one go. Only where it can't, or where something is missing, is the block gone
+through line by line: every row is kept, with NaN for what is no number, and the lines are said.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import chain, repeat
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import RecordError
+from inercal.records.channels import Channel, is_channel, misfit, needs_unit
+from inercal.records.findings import Finding
+from inercal.records.places import counted, places
+from inercal.records.read.layout import Layout, find_layout
+from inercal.records.read.lines import Block, blocks
+from inercal.records.read.table import FileOptions, Sample, Table
+from inercal.records.record import Array
+from inercal.units import parse_unit, shown
+
+_EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
+_HEADER_LINES = 50
+_LAYOUT_LINES = 400
+
+
+@dataclass(frozen=True)
+class _Flaws:
+    """Numbers of the lines that can't be read, and of those where a column (by index) is empty."""
+
+    bad: NDArray[np.int64]
+    missing: tuple[NDArray[np.int64], ...]
+
+
+def read(
+    path: Path,
+    options: FileOptions,
+    channels: tuple[Channel, ...] | None,
+    progress: Callable[[int], None],
+) -> Table:
+    """Read a text file; without ``channels`` its header must be canonical (``t [s],acc_x [m/s^2]``)."""
+    with path.open("rb") as file:
+        stream = blocks(file, path)
+        head = next(stream)
+        layout = find_layout(head.lines, options, path)
+        if channels is None:
+            channels = _canonical(layout, head.lines, path)
+        found = {
+            channel: index for channel in channels if (index := _index(channel, layout, path)) is not None
+        }
+        numbers = {channel.name: index for channel, index in found.items() if channel.name != "label"}
+        label = next((index for channel, index in found.items() if channel.name == "label"), None)
+        if not numbers:
+            return Table((), {}, _contents(layout), 0)
+
+        pieces: list[list[Array]] = [[] for _ in numbers]
+        labels: list[str] = []
+        flaws: list[_Flaws] = []
+        block = head
+        for block in chain([head.after(layout.first)], stream):
+            rows = _at_once(block, layout, tuple(numbers.values()))
+            if rows is None:
+                rows, flaw = _line_by_line(block, layout, tuple(numbers.values()))
+                flaws.append(flaw)
+            for column, piece in zip(pieces, rows.T, strict=True):
+                column.append(piece.copy())
+            if label is not None:
+                labels += _labels(block, layout, label)
+            progress(file.tell())
+    values = {name: np.concatenate(pieces.pop(0)) for name in numbers}
+    if all(np.isnan(column).all() for column in values.values()):
+        line = head.lines[layout.first]
+        raise RecordError(
+            path, f"no row of numbers, line {layout.first + 1} is {line[:60]!r}, expected numbers"
+        )
+    return Table(
+        tuple(found),
+        values,
+        _contents(layout),
+        len(next(iter(values.values()))),
+        tuple(labels),
+        _findings(flaws, tuple(numbers), block, layout.width),
+    )
+
+
+def peek(path: Path) -> list[Sample]:
+    """Look at the first 2 MB of a text file; lines before the header are found out."""
+    with path.open("rb") as file:
+        head = next(blocks(file, path))
+    skip = _leading(head.lines, path)
+    layout = find_layout(head.lines, FileOptions(skip=skip), path)
+    rows, _ = _line_by_line(head.after(layout.first), layout, tuple(range(layout.width)))
+    names = (*layout.header, *repeat("", layout.width))[: layout.width] if layout.header else ()
+    return [Sample(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))]
+
+
+def _leading(lines: list[str], path: Path) -> int:
+    """Number of odd lines before the header or the first row."""
+    for skip in range(min(_HEADER_LINES, len(lines))):
+        try:
+            layout = find_layout(lines[:_LAYOUT_LINES], FileOptions(skip=skip), path)
+        except RecordError:
+            continue
+        if layout.header or layout.fields(lines[layout.first]) is not None:
+            return skip
+    return 0
+
+
+def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, ...]:
+    """The channels a canonical header names; columns of other names are none of ours."""
+    where = f"{path}: line {layout.header_line}"
+    if not layout.header:
+        line = layout.first
+        raise RecordError(
+            path, f"line {line + 1}: found {lines[line][:60]!r}, expected a header such as {_EXAMPLE}"
+        )
+    channels: dict[str, Channel] = {}
+    for index, title in enumerate(layout.header):
+        match = re.fullmatch(r"(\w+)\s*(?:\[(.*)\])?", title)
+        if match is None or not is_channel(name := match[1]):
+            continue
+        if name in channels:
+            raise RecordError(where, f"found {name} twice, expected each column once")
+        if match[2] is None and needs_unit(name):
+            raise RecordError(
+                where,
+                f"found {shown(title)} without a unit, expected it in brackets or a map, as in {_EXAMPLE}",
+            )
+        unit = parse_unit(match[2] or "1", f"{where}: {name}")
+        if problem := misfit(name, unit):
+            raise RecordError(where, f"{name}: {problem}")
+        channels[name] = Channel(name, index, unit)
+    if not channels.keys() - {"label"}:
+        found = ", ".join(layout.header)[:100]
+        raise RecordError(where, f"found the columns {found}, expected known ones as in {_EXAMPLE}, or a map")
+    return tuple(channels.values())
+
+
+def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
+    """Number of the column a channel comes from, None if this file has none such."""
+    match channel.origin:
+        case int(number):
+            return number if number < layout.width else None
+        case str(title):
+            plain = [name.partition("[")[0].strip() for name in layout.header]
+            titles = layout.header if title in layout.header else plain
+            if titles.count(title) > 1:
+                raise RecordError(
+                    path, f"line {layout.header_line}: {title!r} twice, expected a column number"
+                )
+            return titles.index(title) if title in titles else None
+        case _:
+            return None
+
+
+def _contents(layout: Layout) -> str:
+    """What the file holds, in words."""
+    return (
+        f"columns {', '.join(layout.header)}" if layout.header else f"{layout.width} columns without a header"
+    )
+
+
+def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | None:
+    """All rows (n, k) of a block; None if any line is other than full of numbers."""
+    lines, delimiter = block.lines, layout.delimiter
+    if delimiter is None:
+        widths = set(map(len, map(str.split, lines)))
+    else:
+        widths = {count + 1 for count in set(map(str.count, lines, repeat(delimiter)))}
+    if widths != {layout.width} or any(map(str.startswith, lines, repeat(layout.comments))):
+        return None
+    if layout.decimal == ",":
+        lines = [line.replace(",", ".") for line in lines]
+    try:
+        rows: Array = np.loadtxt(lines, delimiter=delimiter, usecols=indices, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return rows if len(rows) == len(lines) and np.isfinite(rows).all() else None
+
+
+def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, _Flaws]:
+    """All rows (n, k) of a block, NaN where there is no number, and where that is."""
+    rows = np.full((len(block.lines), len(indices)), np.nan)
+    lines: list[int] = []
+    bad: list[int] = []
+    for number, line in enumerate(block.lines, block.first):
+        if not layout.is_row(line):
+            continue
+        fields = layout.fields(line)
+        found = [None] if fields is None else [layout.number(fields[index]) for index in indices]
+        if None in found:
+            bad.append(number)
+        if fields is not None:
+            rows[len(lines)] = [math.nan if value is None else value for value in found]
+        lines.append(number)
+    rows = rows[: len(lines)]
+    rows[~np.isfinite(rows)] = np.nan
+    place, badly = np.array(lines, np.int64), np.array(bad, np.int64)
+    empty = np.isnan(rows) & ~np.isin(place, badly)[:, np.newaxis]
+    return rows, _Flaws(badly, tuple(place[column] for column in empty.T))
+
+
+def _labels(block: Block, layout: Layout, index: int) -> list[str]:
+    """The text of the label column, one for each row."""
+    rows = (layout.fields(line) for line in block.lines if layout.is_row(line))
+    return [sys.intern(fields[index].strip()) if fields else "" for fields in rows]
+
+
+def _findings(
+    flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, width: int
+) -> tuple[Finding, ...]:
+    """What to say of rows that could not be read, and of a file that ends too soon."""
+    none = np.empty(0, np.int64)
+    bad = np.concatenate([none, *(flaw.bad for flaw in flaws)])
+    findings = []
+    if last.cut and bad.size and bad[-1] == last.last:
+        bad = bad[:-1]
+        findings.append(Finding("truncated", "the file ends within a row", f"line {last.last}"))
+    elif last.early:
+        findings.append(Finding("truncated", "the compressed data ends too soon", f"line {last.last}"))
+    if bad.size:
+        text = f"{counted(bad.size, 'row')} other than {width} fields with numbers, left as NaN"
+        findings.append(Finding("bad_row", text, places("line", bad)))
+    for index, name in enumerate(names):
+        lines = np.concatenate([none, *(flaw.missing[index] for flaw in flaws)])
+        if lines.size:
+            findings.append(
+                Finding("nan", f"{name}: {counted(lines.size, 'missing value')}", places("line", lines))
+            )
+    return tuple(findings)

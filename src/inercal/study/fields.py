@@ -1,0 +1,101 @@
+"""Fields that hold quantities: a text with a unit in the file, an `inercal.units.Quantity` in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import PydanticCustomError, core_schema
+
+from inercal.errors import InputError, QuantityError
+from inercal.units import Quantity, parse_quantity, shown
+
+# What `parse_quantity` accepts, for editors; the unit itself is looked up only when the study is read.
+_NUMBER = r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)"
+_VALUE = rf"^\s*{_NUMBER}(\([0-9]+(\.[0-9]+)?\))?([eE][+-]?[0-9]+)?"
+_PLUS_MINUS = rf"(\s*(±|\+/-|\+-)\s*{_NUMBER}([eE][+-]?[0-9]+)?)?"
+_UNIT = r"\s*[^0-9\s(.].*"
+
+
+def anything(value: float) -> bool:
+    """Accept every value."""
+    return True
+
+
+def positive(value: float) -> bool:
+    """Accept values above zero."""
+    return value > 0.0
+
+
+@dataclass(frozen=True)
+class QuantityText:
+    """Makes a pydantic field read a quantity from its text: ``Annotated[Quantity, QuantityText("time")]``.
+
+    Parameters
+    ----------
+    dimension : str
+        What it measures, a key of the unit table: ``"time"``, ``"angle"``, ``"number"``, ...
+    example : str
+        A good value, shown in the JSON Schema.
+    accepts : callable
+        Whether a value [SI] makes sense here.
+    expected : str
+        The same in words, for the error message: "a time above zero".
+    """
+
+    dimension: str
+    example: str
+    accepts: Callable[[float], bool] = anything
+    expected: str = ""
+
+    def parse(self, text: object) -> Quantity:
+        """Read one value; what is wrong goes to pydantic, which knows the key."""
+        try:
+            quantity = parse_quantity(text, self.dimension, "quantity")
+        except QuantityError as error:
+            raise refusal(error.message) from error
+        if self.accepts(quantity.value):
+            return quantity
+        si = "" if quantity.unit.symbol == quantity.unit.si else f", that is {_in_si(quantity)}"
+        raise refusal(f"found {shown(text)}{si}, expected {self.expected}")
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Any], handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Validate by `parse`; write the text back as it was typed."""
+        as_typed = core_schema.plain_serializer_function_ser_schema(lambda quantity: quantity.text)
+        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """A text of that shape; a bare number too where no unit is needed."""
+        bare = self.dimension == "number"
+        unit = rf"({_UNIT}|\s*1)?" if bare else _UNIT
+        return {
+            "type": ["string", "number"] if bare else "string",
+            "pattern": rf"{_VALUE}{_PLUS_MINUS}{unit}\s*$",
+            "examples": [self.example],
+        }
+
+
+def refusal(message: str) -> PydanticCustomError:
+    """An error that `inercal._toml.check` reports in just these words, after the dotted key."""
+    return PydanticCustomError("refused", "refused", {"error": InputError("key", message)})
+
+
+def _in_si(quantity: Quantity) -> str:
+    """The value in SI, short."""
+    return f"{quantity.value:.6g} {quantity.unit.si}".removesuffix(" 1")
+
+
+Duration = Annotated[Quantity, QuantityText("time", "50 s", positive, "a time above zero")]
+"""A time above zero."""
+
+Temperature = Annotated[
+    Quantity,
+    QuantityText("temperature", "23 degC", lambda t: t > -273.15, "a temperature above absolute zero"),
+]
+"""A temperature."""

@@ -1,0 +1,87 @@
+"""The study of ``inercal calibrate imu``: a multi-position calibration without a turntable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, StrictBool
+
+from inercal._toml import Strict, check
+from inercal.errors import StudyError
+from inercal.imu.settings import ImuSettings
+from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_of
+from inercal.study.fields import Duration, QuantityText, refusal
+from inercal.units import Quantity
+
+RelativeUncertainty = Annotated[
+    Quantity, QuantityText("number", "20 ppm", lambda u: 0.0 <= u < 1.0, "0 or more, and below 1")
+]
+
+
+def _available(method: object) -> object:
+    """Refuse the methods that are still to come in words of their own."""
+    if method in ("ferraris", "aided"):
+        raise refusal(
+            f"found {method!r}, which this version of inercal does not have yet, expected 'multiposition'"
+        )
+    return method
+
+
+class ImuTable(Strict):
+    """How to calibrate the IMU."""
+
+    method: Annotated[Literal["multiposition"], BeforeValidator(_available)] = Field(
+        default="multiposition", description="multiposition: many poses held still by hand, no turntable"
+    )
+    static_start: Duration | None = Field(
+        default=None, description="length of the still period at the start; found automatically if absent"
+    )
+    g_sensitivity: StrictBool = Field(
+        default=False, description="also estimate how the gyro's drift depends on specific force"
+    )
+    time_base: RelativeUncertainty | None = Field(
+        default=None, description="relative standard uncertainty of the record's clock; 0 if absent"
+    )
+
+
+class ImuStudyFile(Strict):
+    """A study for ``inercal calibrate imu``."""
+
+    version: Literal[1] = Field(default=1, alias="schema", description="version of the study format")
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
+    imu: ImuTable = Field(default=ImuTable(), title="Imu", description="how to calibrate the IMU")
+    traceability: TraceabilityTable = Field(
+        default=TraceabilityTable(), title="Traceability", description="free texts that go with the result"
+    )
+    conditions: ConditionsTable = Field(
+        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
+    )
+
+
+def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
+    """Check the parsed TOML of a study and put it in SI.
+
+    Parameters
+    ----------
+    data : mapping
+        As parsed from TOML.
+    path : str or Path
+        Where it came from; named in the error.
+
+    Raises
+    ------
+    StudyError
+        The first thing wrong: file, key, what was found, what was expected.
+    """
+    file = check(ImuStudyFile, data, path, StudyError)
+    return ImuSettings(
+        site=site_of(file.site, path),
+        static_start=None if file.imu.static_start is None else file.imu.static_start.value,
+        g_sensitivity=file.imu.g_sensitivity,
+        time_base_u=0.0 if file.imu.time_base is None else file.imu.time_base.value,
+        traceability=file.traceability.model_dump(),
+        temperature=file.conditions.temperature,
+        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+    )

@@ -1,0 +1,81 @@
+"""Study files in: TOML, then ``--set key=value``, then the kind of study the command wants."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from inercal._toml import read_toml
+from inercal.errors import StudyError
+from inercal.imu.settings import ImuSettings
+from inercal.study.imu import imu_study
+from inercal.units import shown
+
+#: rig.kind -> the command whose studies have it
+_COMMANDS = {
+    "two_axis_turntable": "calibrate turntable",
+    "three_axis_gimbals": "selfcal",
+    "sting": "aoa",
+}
+
+
+def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
+    """Read the study of ``inercal calibrate imu``.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file.
+    overrides : iterable of str
+        Keys to set over those of the file, ``"imu.static_start=50 s"``. A value that is TOML
+        (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text.
+
+    Raises
+    ------
+    StudyError
+        One sentence: file and key, what was found, what was expected.
+    """
+    return imu_study(_read(path, overrides, "calibrate imu"), path)
+
+
+def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
+    """The file with the overrides put in; refused where it is a study for another command."""
+    data = read_toml(path, StudyError)
+    rig = data.get("rig")
+    kind = rig.get("kind") if isinstance(rig, dict) else None
+    meant_for = _COMMANDS.get(kind, command) if isinstance(kind, str) else command
+    if meant_for != command:
+        raise StudyError(
+            path,
+            f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, "
+            f"expected one for `inercal {command}`",
+        )
+    for override in overrides:
+        _put(data, override)
+    return data
+
+
+def _put(data: dict[str, Any], override: str) -> None:
+    """Set one key of the freshly read ``data`` by its dotted name."""
+    where = f"--set {shown(override)}"
+    name, equals, text = override.partition("=")
+    keys = [key.strip() for key in name.split(".")]
+    if not (equals and all(keys)):
+        raise StudyError(where, "found no key and value, expected key=value such as imu.static_start=50 s")
+    table = data
+    for depth, key in enumerate(keys[:-1], start=1):
+        table = table.setdefault(key, {})
+        if not isinstance(table, dict):
+            raise StudyError(where, f"{'.'.join(keys[:depth])} is no table, expected the key of a value")
+    table[keys[-1]] = _value(text.strip())
+
+
+def _value(text: str) -> Any:
+    """A TOML value, or else the text itself."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return parsed["value"] if len(parsed) == 1 else text

@@ -1,0 +1,157 @@
+"""A guessed map says why, and reads the files it was guessed from."""
+
+import gzip
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from inercal.errors import RecordError
+from inercal.records.guess import guess_map
+from inercal.records.maps import read_map
+from inercal.records.read import read
+
+EXAMPLES = Path(str(files("inercal"))) / "examples"
+RNG = np.random.default_rng(3)
+N = 200
+T = np.arange(N) / 100
+REST = np.array([0.1, -0.2, 9.8])
+ACC = REST + 0.01 * RNG.standard_normal((N, 3))
+GYRO = 0.3 * RNG.standard_normal((N, 3))
+
+
+def guessed(tmp_path, paths):
+    """The map guessed for the files, and the record it reads from them."""
+    record_map = tmp_path / "guess.toml"
+    record_map.write_text(guess_map(paths), encoding="utf-8")
+    return read_map(record_map), read(paths, record_map)
+
+
+def table(path, header, rows, delimiter=",", leading=""):
+    lines = [header.replace(",", delimiter)] if header else []
+    lines += [delimiter.join(f"{value:.10g}" for value in row) for row in rows]
+    path.write_text(leading + "\n".join(lines) + "\n")
+    return path
+
+
+def units(record):
+    return [column.unit.symbol for column in record.columns.values()]
+
+
+def test_the_xsens_files_are_read_as_counts_on_their_clock(tmp_path):
+    record_map, record = guessed(tmp_path, [EXAMPLES / "xsens_acc.mat", EXAMPLES / "xsens_gyro.mat"])
+    assert [part.name for part in record_map.parts] == ["acc", "gyro"]
+    assert list(record.columns) == [f"{sensor}_{axis}" for sensor in ("acc", "gyro") for axis in "xyz"]
+    assert set(units(record)) == {"count"}
+    assert record["acc_y"].values[0] == 33329
+    assert record["gyro_x"].values[-1] == 48789
+    assert record["acc_x"].t[-1] == 511.718
+    assert record.findings == ()
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time,ax,ay,az,gx,gy,gz",
+        "t,accX,accY,accZ,gyrX,gyrY,gyrZ",
+        "timestamp,imu.acc.x,imu.acc.y,imu.acc.z,imu.gyro.x,imu.gyro.y,imu.gyro.z",
+        "Time [s],Accel_X,Accel_Y,Accel_Z,Gyro_X,Gyro_Y,Gyro_Z",
+        "t,linear_acceleration_x,linear_acceleration_y,linear_acceleration_z,"
+        "angular_velocity_x,angular_velocity_y,angular_velocity_z",
+        "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "",
+    ],
+)
+@pytest.mark.parametrize("delimiter", [",", "\t", ";"])
+def test_many_headers_mean_the_same(tmp_path, header, delimiter):
+    path = table(tmp_path / "run.csv", header, np.column_stack([T, ACC, GYRO]), delimiter)
+    _, record = guessed(tmp_path, [path])
+    assert list(record.columns) == [f"{sensor}_{axis}" for sensor in ("acc", "gyro") for axis in "xyz"]
+    assert units(record) == ["m/s^2"] * 3 + ["rad/s"] * 3
+    np.testing.assert_allclose(record.triad("acc").values, ACC, rtol=1e-8)
+    np.testing.assert_allclose(record["acc_x"].t, T)
+
+
+@pytest.mark.parametrize(
+    ("factor", "offset", "unit"),
+    [(1, 0, "m/s^2"), (1 / 9.8, 0, "g"), (400, 0, "count"), (400, 32768, "count")],
+)
+def test_gravity_tells_the_unit(tmp_path, factor, offset, unit):
+    rows = np.column_stack([T, ACC * factor + offset])
+    _, record = guessed(tmp_path, [table(tmp_path / "acc.csv", "", rows)])
+    assert set(units(record)) == {unit}
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1, "s"), (1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_the_interval_tells_the_unit_of_time(tmp_path, factor, unit):
+    path = table(tmp_path / "a.csv", "timestamp,ax,ay,az", np.column_stack([T * factor, ACC]))
+    assert f'unit = "{unit}"' in guess_map(path)
+    _, record = guessed(tmp_path, [path])
+    np.testing.assert_allclose(record["acc_x"].t, T, atol=1e-9)
+
+
+def test_a_rate_is_looked_for_in_the_lines_before_the_header(tmp_path):
+    leading = "Fs,50\nLogging Type,0\nWaiting time,3\n"
+    path = table(
+        tmp_path / "a.csv",
+        "ax,ay,az,gx,gy,gz",
+        np.round(np.column_stack([ACC, GYRO]) * 1000),
+        leading=leading,
+    )
+    packed = tmp_path / "a.csv.gz"
+    packed.write_bytes(gzip.compress(path.read_bytes()))
+    for file in (path, packed):
+        record_map, record = guessed(tmp_path, [file])
+        assert (record_map.rate, record_map.parts[0].options.skip) == (50.0, 3)
+        assert len(record["acc_x"].values) == N
+        assert set(units(record)) == {"count"}
+        assert record.findings == ()
+
+
+def test_without_time_or_rate_one_is_asked_for(tmp_path):
+    path = table(tmp_path / "a.csv", "n,ax,ay,az", np.column_stack([np.arange(N), ACC]))
+    assert "PUT THE SAMPLE RATE HERE" in guess_map(path)
+    assert len(guessed(tmp_path, [path])[1]["acc_x"].values) == N
+
+
+def test_labels_and_temperatures_are_found(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("part,t,acc_x,acc_y,acc_z,temp\n" + "".join(f"up,{t},0.0,0.1,1.0,25.5\n" for t in T))
+    _, record = guessed(tmp_path, [path])
+    assert set(record.labels) == {"up"}
+    assert record["temperature"].unit.symbol == "degC"
+
+
+def test_arrays_of_one_mat_file_are_put_together(tmp_path):
+    path = tmp_path / "run.mat"
+    savemat(path, {"K": np.eye(3), "omega": GYRO, "time": T, "accel": ACC})
+    _, record = guessed(tmp_path, [path])
+    assert set(record.columns) == {f"{sensor}_{axis}" for sensor in ("acc", "gyro") for axis in "xyz"}
+    np.testing.assert_array_equal(record.triad("gyro").values, GYRO)
+    np.testing.assert_array_equal(record["acc_x"].t, T)
+
+
+def test_of_repeat_runs_the_first_is_described(tmp_path):
+    first, second = (
+        table(tmp_path / name, "t,ax,ay,az", np.column_stack([T, ACC])) for name in ("a.csv", "b.csv")
+    )
+    assert guess_map([first, second]) == guess_map(first)
+
+
+def test_each_guess_says_why(tmp_path):
+    text = guess_map(table(tmp_path / "a.csv", "t,ax,ay,az", np.column_stack([T, ACC])))
+    tables = [block for block in text.split("\n\n") if "[columns" in block]
+    assert len(tables) == 4
+    assert all(block.startswith("# ") for block in tables)
+
+
+@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "1,2\n3,4\n", "\x00\x00", "hello\n"])
+def test_nothing_to_guess_is_said(tmp_path, content):
+    path = tmp_path / "a.csv"
+    path.write_text(content)
+    with pytest.raises(RecordError):
+        guess_map(path)
+    with pytest.raises(RecordError, match="no such file"):
+        guess_map(tmp_path / "none.csv")

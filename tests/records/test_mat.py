@@ -1,0 +1,121 @@
+"""MAT files, the shipped Xsens recording among them."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from inercal.errors import MapError, RecordError
+from inercal.records.read import read
+
+EXAMPLES = Path(str(files("inercal"))) / "examples"
+TABLE = np.column_stack([np.arange(50) / 100, np.random.default_rng(0).standard_normal((50, 3))])
+
+
+def saved(path, **arrays):
+    savemat(path, arrays)
+    return path
+
+
+def mapped(path, variable=None, t="0", acc="{index}", rows=""):
+    text = f'[columns.t]\nfrom = {t}\nunit = "s"\n' if t else ""
+    for index, axis in enumerate("xyz", 1):
+        text += f'[columns.acc_{axis}]\nfrom = {acc.format(index=index)}\nunit = "g"\n'
+    text += f'[file]\nvariable = "{variable}"\n' if variable else ""
+    path.write_text(text + rows)
+    return path
+
+
+def holds_table(record):
+    return np.array_equal(record["acc_x"].t, TABLE[:, 0]) and np.array_equal(
+        record.triad("acc").values, TABLE[:, 1:]
+    )
+
+
+def test_the_only_array_needs_no_name(tmp_path):
+    path = saved(tmp_path / "a.mat", data=TABLE, note="hand held", gain=2.0)
+    assert holds_table(read(path, mapped(tmp_path / "map.toml")))
+
+
+def test_an_array_is_taken_by_its_name(tmp_path):
+    path = saved(tmp_path / "a.mat", data=TABLE, other=TABLE + 1)
+    assert holds_table(read(path, mapped(tmp_path / "map.toml", variable="data")))
+    assert holds_table(read(path, mapped(tmp_path / "map.toml", t='["data", 0]', acc='["data", {index}]')))
+    with pytest.raises(
+        RecordError, match=r"holds the arrays data \(50 x 4\), other \(50 x 4\), expected `variable`"
+    ):
+        read(path, mapped(tmp_path / "map.toml"))
+
+
+def test_vectors_are_taken_by_their_names_as_rows_or_columns(tmp_path):
+    path = saved(tmp_path / "a.mat", time=TABLE[:, 0], acc=TABLE[:, 1:])
+    record_map = mapped(tmp_path / "map.toml", t='"time"', acc='["acc", {index}]')
+    record_map.write_text(record_map.read_text().replace("3]", "0]"))
+    record = read(path, record_map)
+    np.testing.assert_array_equal(record["acc_x"].t, TABLE[:, 0])
+    np.testing.assert_array_equal(record["acc_z"].values, TABLE[:, 1])
+    record_map.write_text('[columns.t]\nfrom = "acc"\nunit = "s"\n')
+    with pytest.raises(RecordError, match=r'acc has 3 columns, expected \["acc", column\]'):
+        read(path, record_map)
+
+
+def test_missing_values_are_nan_and_their_rows_said(tmp_path):
+    table = TABLE.copy()
+    table[6:8, 2] = np.nan, np.inf
+    record = read(saved(tmp_path / "a.mat", data=table), mapped(tmp_path / "map.toml"))
+    assert np.isnan(record["acc_y"].values[6:8]).all()
+    assert [(finding.code, finding.where) for finding in record.findings] == [("nan", "rows 7-8")]
+
+
+def test_what_cannot_be_read_is_said(tmp_path):
+    record_map = mapped(tmp_path / "map.toml")
+    path = saved(tmp_path / "a.mat", data=TABLE)
+    with pytest.raises(RecordError, match="a MAT file names no units, expected a column map"):
+        read(path)
+    with pytest.raises(MapError, match=r"columns.acc_z.from: found no 3 in .*the arrays data \(50 x 3\)"):
+        read(saved(tmp_path / "b.mat", data=TABLE[:, :3]), record_map)
+    with pytest.raises(RecordError, match="holds no two-dimensional array of numbers"):
+        read(saved(tmp_path / "c.mat", note="nothing"), record_map)
+    unequal = mapped(tmp_path / "unequal.toml", t='["time", 0]', acc='["data", {index}]')
+    with pytest.raises(RecordError, match="found 49 rows of t, 50 rows of acc_x"):
+        read(saved(tmp_path / "d.mat", time=TABLE[1:, :1], data=TABLE), unequal)
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(RecordError, match="cannot be read as a MAT file"):
+        read(path, record_map)
+    path.write_bytes(b"")
+    with pytest.raises(RecordError, match="cannot be read as a MAT file"):
+        read(path, record_map)
+
+
+def test_version_7_3_is_named(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["data"] = TABLE
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    with pytest.raises(RecordError, match=r"found MAT v7.3 \(HDF5\), which is not read yet, expected v7"):
+        read(path, mapped(tmp_path / "map.toml"))
+
+
+def test_the_xsens_recording_shares_one_clock_and_raises_no_suspicion(tmp_path):
+    text = '[columns.t]\nfrom = ["IMU0x2Dalpha", 0]\nunit = "s"\n'
+    for sensor, variable in (("acc", "IMU0x2Dalpha"), ("gyro", "IMU0x2Domega")):
+        for index, axis in enumerate("xyz", 1):
+            text += f'[columns.{sensor}_{axis}]\nfrom = ["{variable}", {index}]\nunit = "count"\n'
+    (tmp_path / "map.toml").write_text(text)
+    told = []
+    record = read(
+        [EXAMPLES / "xsens_acc.mat", EXAMPLES / "xsens_gyro.mat"],
+        tmp_path / "map.toml",
+        lambda done, total: told.append((done, total)),
+    )
+    assert record["acc_x"].values.shape == (51175,)
+    assert record["acc_x"].t is record["gyro_z"].t
+    assert record["acc_x"].values[0] == 33108
+    assert record["gyro_z"].values[-1] == 13676
+    assert abs(record.triad("gyro").rate - 100.0) < 0.01
+    assert record.findings == ()
+    assert told[-1][0] == told[-1][1]
