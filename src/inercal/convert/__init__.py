@@ -1,0 +1,1 @@
+"""Calibrations put to use."""

@@ -1,0 +1,107 @@
+"""A calibration applied to a recording: outputs to truth, and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate
+from inercal.instruments.triad import TriadModel, triad_from_terms
+from inercal.records.record import Column, Record
+from inercal.units import parse_unit
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ImuModel:
+    """The instrument that a calibration describes, forward: truth to indication.
+
+    ``units`` are those of the outputs it was calibrated for, by sensor; ``gyro`` is None where only the
+    accelerometers were calibrated; ``g_sensitivity`` (3, 3) [gyro output/(m/s^2)].
+    """
+
+    accelerometer: TriadModel
+    gyro: TriadModel | None
+    g_sensitivity: Array
+    units: dict[str, str]
+
+    def correct(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:
+        """Specific force (*batch, 3) [m/s^2] and rate (*batch, 3) [rad/s] from outputs."""
+        f = self.accelerometer.correct(acc)
+        if gyro is None or self.gyro is None:
+            return f, None
+        return f, self.gyro.correct(gyro - f @ self.g_sensitivity.T)
+
+    def indicate(self, f: Array, omega: Array | None) -> tuple[Array, Array | None]:
+        """Outputs from specific force [m/s^2] and rate [rad/s]: the inverse of `correct`."""
+        acc = self.accelerometer.indicate(f)
+        if omega is None or self.gyro is None:
+            return acc, None
+        return acc, self.gyro.indicate(omega) + f @ self.g_sensitivity.T
+
+
+def imu_model(estimate: Estimate) -> ImuModel:
+    """The instrument of an estimate of `calibrate imu`; raises `InputError` for any other."""
+    values = {name: p.value for name, p in estimate.parameters.items()}
+    if "K1_x" not in values or not np.all(np.isfinite(estimate.values)):
+        found = ", ".join(estimate.names) or "no coefficients"
+        raise InputError("calibration", f"found {found}, expected the coefficients of an IMU")
+    g = [[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"]
+    return ImuModel(
+        triad_from_terms(values, "K1", "M", "K0"),
+        triad_from_terms(values, "S", "T", "D_F") if "S_x" in values else None,
+        np.array(g),
+        {str(sensor): str(unit) for sensor, unit in estimate.result.get("unit", {}).items()},
+    )
+
+
+def apply_to(record: Record, model: ImuModel, invert: bool = False) -> Record:
+    """Correct the ``acc`` and ``gyro`` columns of a record, all others unchanged.
+
+    With ``invert`` the record holds true values and the outputs of the instrument are made of them. A gyro
+    that the calibration does not cover is an error, not passed on as if it were corrected.
+
+    Raises
+    ------
+    InputError
+        Units that are not those of the calibration, missing or uncalibrated channels, two clocks.
+    """
+    acc = record.triad("acc")
+    gyro = record.triad("gyro") if "gyro_x" in record else None
+    if gyro is not None:
+        if model.gyro is None:
+            raise InputError(gyro.source.path, "has a gyro, but the calibration is of accelerometers alone")
+        if gyro.t is not acc.t and not np.array_equal(gyro.t, acc.t):
+            raise InputError(gyro.source.path, "gyro and accelerometers have different clocks, expected one")
+    truth = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
+    output = {sensor: parse_unit(symbol) for sensor, symbol in model.units.items()}
+    for triad in (acc, gyro):
+        if triad is None:
+            continue
+        wanted = (truth if invert else output).get(triad.sensor, triad.unit)
+        if triad.unit.dimension != wanted.dimension or (not invert and triad.unit != wanted):
+            raise InputError(
+                triad.source.path,
+                f"{triad.sensor} is in {triad.unit.symbol}, expected {wanted.symbol} as "
+                f"{'true values' if invert else 'the instrument was calibrated'}",
+            )
+    values = {
+        triad.sensor: triad.values * (triad.unit.factor if invert else 1.0) for triad in (acc, gyro) if triad
+    }
+    found = (model.indicate if invert else model.correct)(values["acc"], values.get("gyro"))
+    units = output if invert else truth
+    columns = dict(record.columns)
+    for triad, new in zip((acc, gyro), found, strict=True):
+        if triad is None or new is None:
+            continue
+        for i, axis in enumerate("xyz"):
+            name = f"{triad.sensor}_{axis}"
+            unit = units.get(triad.sensor, triad.unit)
+            columns[name] = Column(
+                name, triad.sensor, axis, unit, np.ascontiguousarray(new[:, i]), acc.t, triad.source
+            )
+    return Record(columns, record.findings, record.sources, record.labels)

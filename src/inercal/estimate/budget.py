@@ -1,0 +1,95 @@
+"""Uncertainty budgets: type A covariances and type B inputs combined, with shares (GUM, JCGM 100:2008)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TypeA:
+    """A source evaluated from scatter in the data.
+
+    ``u`` [``unit``] the standard deviation of one observation, ``covariance`` (p, p) what it does to the
+    parameters, ``dof`` its degrees of freedom.
+    """
+
+    source: str
+    u: float
+    unit: str
+    covariance: Array
+    dof: float
+
+
+@dataclass(frozen=True)
+class TypeB:
+    """A source known from elsewhere: gravity, table angle, latitude, fixture, time base.
+
+    ``u`` [``unit``] its standard uncertainty, ``sensitivity`` (p,) the derivative of each parameter with
+    respect to it; one value for the whole test, so that it is common to all observations.
+    """
+
+    source: str
+    u: float
+    unit: str
+    sensitivity: Array
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) what it does to the parameters."""
+        shift = self.sensitivity * self.u
+        return np.outer(shift, shift)
+
+
+@dataclass(frozen=True)
+class BudgetItem:
+    """One line of a budget: a source, its u, and the share of each parameter's variance that it causes."""
+
+    source: str
+    type: str
+    u: float
+    unit: str
+    share: Mapping[str, float]
+
+
+def combine(
+    names: Sequence[str], sources: Sequence[TypeA | TypeB]
+) -> tuple[Array, Array, tuple[BudgetItem, ...]]:
+    """Add up independent sources.
+
+    Returns
+    -------
+    covariance : (p, p)
+    dof : (p,)
+        Effective degrees of freedom of each parameter (Welch-Satterthwaite, GUM G.4); inf without type A.
+    budget : tuple of `BudgetItem`
+        In the order of the sources; a parameter to which a source adds nothing has no share there.
+    """
+    p = len(names)
+    total = np.zeros((p, p))
+    weight = np.zeros(p)
+    for source in sources:
+        total += source.covariance
+        if isinstance(source, TypeA) and np.isfinite(source.dof):
+            weight += np.diag(source.covariance) ** 2 / source.dof
+    variance = np.diag(total)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        dof = np.where(weight > 0, variance**2 / weight, np.inf)
+    budget = tuple(_item(names, source, variance) for source in sources)
+    return total, dof, budget
+
+
+def _item(names: Sequence[str], source: TypeA | TypeB, variance: Array) -> BudgetItem:
+    """A source's line of the budget."""
+    own = np.diag(source.covariance)
+    share = {
+        name: float(part / whole)
+        for name, part, whole in zip(names, own, variance, strict=True)
+        if part > 0 and whole > 0
+    }
+    return BudgetItem(source.source, "A" if isinstance(source, TypeA) else "B", source.u, source.unit, share)

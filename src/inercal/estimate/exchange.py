@@ -1,0 +1,179 @@
+"""Estimates as JSON and TOML: the contract of the JSON result, written atomically and read back."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inercal._files import write_text
+from inercal.errors import InputError
+from inercal.estimate.budget import BudgetItem
+from inercal.estimate.result import Estimate
+from inercal.estimate.status import Status
+from inercal.records.findings import Finding
+from inercal.records.record import Source
+
+
+def to_json(estimate: Estimate) -> dict[str, Any]:
+    """The estimate as plain objects, in the order of the contract; what is not finite becomes None."""
+    from inercal import __version__
+
+    parameters = [
+        {"name": p.name, "value": p.value, "u": p.u, "U": p.U, "k": p.k, "dof": p.dof, "unit": p.unit}
+        for p in estimate.parameters.values()
+    ]
+    whole = {
+        "inercal": __version__,
+        "command": estimate.command,
+        "status": {"code": estimate.status.value, "message": estimate.message},
+        "parameters": parameters,
+        "covariance": {"names": list(estimate.names), "matrix": estimate.covariance},
+        "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in estimate.findings],
+        "statistics": estimate.statistics,
+        "budget": [
+            {"source": b.source, "type": b.type, "u": b.u, "unit": b.unit, "share": b.share}
+            for b in estimate.budget
+        ],
+        "model": estimate.model,
+        "conditions": estimate.conditions,
+        "traceability": estimate.traceability,
+        "inputs": [{"path": s.path, "sha256": s.sha256} for s in estimate.inputs],
+        "timing_s": estimate.timing,
+        "provenance": estimate.provenance,
+        "references": list(estimate.references),
+        "result": estimate.result,
+    }
+    plain: dict[str, Any] = plain_objects(whole)
+    return plain
+
+
+def plain_objects(value: Any) -> Any:
+    """Arrays, tuples and mappings as lists and dicts; numbers that are not finite as None.
+
+    In texts, bytes that no encoding knew (as in file names) are written out: they could not be saved.
+    """
+    match value:
+        case Mapping():
+            return {plain_objects(str(key)): plain_objects(item) for key, item in value.items()}
+        case np.ndarray() | np.generic():
+            return plain_objects(value.tolist())
+        case list() | tuple():
+            return [plain_objects(item) for item in value]
+        case float() if not math.isfinite(value):
+            return None
+        case str():
+            return value.encode("utf-8", "backslashreplace").decode("utf-8")
+        case _:
+            return value
+
+
+def from_json(data: Mapping[str, Any]) -> Estimate:
+    """The inverse of `to_json`; raises KeyError, TypeError or ValueError where the contract is not met."""
+    parameters = data["parameters"]
+    covariance = data["covariance"]
+    names = tuple(str(p["name"]) for p in parameters)
+    if tuple(covariance["names"]) != names:
+        raise ValueError("the covariance does not belong to the parameters")
+    return Estimate(
+        command=str(data["command"]),
+        names=names,
+        units=tuple(str(p["unit"]) for p in parameters),
+        values=np.array([_number(p["value"]) for p in parameters]),
+        covariance=np.array(covariance["matrix"], dtype=float).reshape(len(names), len(names)),
+        dof=np.array([math.inf if p.get("dof") is None else float(p["dof"]) for p in parameters]),
+        k=np.array([_number(p.get("k", 2.0)) for p in parameters]),
+        status=Status(data["status"]["code"]),
+        message=str(data["status"]["message"]),
+        findings=tuple(Finding(f["code"], f["message"], f["where"]) for f in data.get("findings", ())),
+        statistics={key: _number(value) for key, value in data.get("statistics", {}).items()},
+        budget=tuple(
+            BudgetItem(b["source"], b["type"], _number(b["u"]), b["unit"], b["share"])
+            for b in data.get("budget", ())
+        ),
+        model=data.get("model", ""),
+        conditions=data.get("conditions", {}),
+        traceability=data.get("traceability", {}),
+        inputs=tuple(Source(s["path"], s["sha256"]) for s in data.get("inputs", ())),
+        provenance=data.get("provenance", {}),
+        timing=data.get("timing_s", {}),
+        result=data.get("result", {}),
+        references=tuple(data.get("references", ())),
+    )
+
+
+def _number(value: Any) -> float:
+    """A float; None is NaN."""
+    return math.nan if value is None else float(value)
+
+
+def save(estimate: Estimate, path: str | Path) -> None:
+    """Write the estimate to a ``.json`` or ``.toml`` file, whole or not at all; raises `InputError`."""
+    data = to_json(estimate)
+    match Path(path).suffix.lower():
+        case ".json":
+            write_text(path, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
+        case ".toml":
+            write_text(path, _toml(data))
+        case other:
+            raise InputError(path, f"found the suffix {other!r}, expected .json or .toml")
+
+
+def load(path: str | Path) -> Estimate:
+    """Read an estimate that `save` wrote; raises `InputError` in one sentence."""
+    expected = "expected a calibration written by inercal (.json or .toml)"
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror}), {expected}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start} is not UTF-8 text, {expected}") from error
+    except ValueError as error:  # a NUL in the path
+        raise InputError(repr(str(path)), f"{error}, {expected}") from error
+    try:
+        if Path(path).suffix.lower() == ".toml":
+            import tomllib
+
+            return from_json(plain_objects(tomllib.loads(text)))
+        return from_json(json.loads(text))
+    except KeyError as error:
+        raise InputError(path, f"the key {error} is missing, {expected}") from error
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise InputError(path, f"{str(error)[:120]}, {expected}") from error
+
+
+def _toml(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:
+    """A TOML document of nested tables; None is nan, lest lists get shorter and keys get lost."""
+    plain = {k: v for k, v in table.items() if not isinstance(v, Mapping)}
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in plain.items()]
+    if path and (lines or not table):
+        lines.insert(0, f"\n[{'.'.join(map(_key, path))}]")
+    inner = [_toml(v, (*path, k)) for k, v in table.items() if isinstance(v, Mapping)]
+    return "\n".join([*lines, *(text.rstrip("\n") for text in inner)]) + "\n"
+
+
+def _key(key: str) -> str:
+    """A TOML key, quoted where it must be."""
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else _value(key)
+
+
+def _value(value: Any) -> str:
+    """A TOML value on one line; a list of tables as inline tables."""
+    match value:
+        case Mapping():
+            items = (f"{_key(key)} = {_value(item)}" for key, item in value.items())
+            return "{ " + ", ".join(items) + " }"
+        case list():
+            return "[" + ", ".join(map(_value, value)) + "]"
+        case None:
+            return "nan"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case _:
+            return repr(value)

@@ -1,0 +1,90 @@
+"""What the data can tell: rank, condition, null vectors and weak combinations, in terms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """Singular value decomposition of a Jacobian (n, p) whose columns were scaled to unit length.
+
+    ``singular_values`` (p,) descending; ``directions`` (p, p), row i the combination of *scaled* parameters
+    that belongs to value i; ``left`` (n, min(n, p)) the combinations of observations; ``scale`` (p,) the
+    column lengths. A combination v of scaled parameters is v / scale in the parameters' own units.
+    """
+
+    names: tuple[str, ...]
+    singular_values: Array
+    directions: Array
+    left: Array
+    scale: Array
+    rank: int
+
+    @property
+    def condition(self) -> float:
+        """Largest over smallest singular value of the scaled Jacobian; inf when rank-deficient."""
+        if self.rank < len(self.names):
+            return float("inf")
+        return float(self.singular_values[0] / self.singular_values[-1])
+
+    @property
+    def null_vectors(self) -> Array:
+        """Combinations (p - rank, p) of scaled parameters of which the data say nothing."""
+        return self.directions[self.rank :]
+
+    @property
+    def unit_covariance(self) -> Array:
+        """(p, p) covariance of the parameters for observations of unit variance (pseudo-inverse)."""
+        root = self._root()
+        return np.asarray(root @ root.T)
+
+    def solution(self, y: Array) -> Array:
+        """(p,) least-squares solution for whitened observations ``y`` (n,), of minimum scaled length.
+
+        Never by way of the covariance: that would square the condition number.
+        """
+        return np.asarray(self._root() @ (self.left[:, : self.rank].T @ y))
+
+    def _root(self) -> Array:
+        """(p, rank) root of the unit covariance, in the parameters' own units."""
+        return self.directions[: self.rank].T / self.singular_values[: self.rank] / self.scale[:, None]
+
+    def weakest(self) -> str:
+        """The worst-known combination in words, for example ``M_xy - 0.86 K1_y``."""
+        return in_words(self.directions[-1], self.names)
+
+    def leading_term(self) -> str:
+        """The term with the largest part in the worst-known combination."""
+        return self.names[int(np.argmax(np.abs(self.directions[-1])))]
+
+
+def identify(J: Array, names: Sequence[str]) -> Identifiability:
+    """Decompose a whitened Jacobian ``J`` (n, p); ``names`` has length p.
+
+    A column within rounding of the longest (cos 90 deg is 6e-17, not 0) counts as zero: scaled to unit
+    length, it would look as well known as any.
+    """
+    n, p = J.shape
+    length = np.linalg.norm(J, axis=0)
+    longest = length.max(initial=0.0)
+    scale = np.where(length > longest * max(n, p) * np.finfo(float).eps, length, longest or 1.0)
+    u, s, vt = np.linalg.svd(J / scale, full_matrices=n < p)  # all p directions, but never an n by n matrix
+    values = np.concatenate([s, np.zeros(p - len(s))])
+    tolerance = values[0] * max(n, p) * np.finfo(float).eps if p else 0.0
+    return Identifiability(tuple(names), values, vt, u, scale, int(np.sum(values > tolerance)))
+
+
+def in_words(direction: Array, names: Sequence[str], smallest: float = 0.3) -> str:
+    """A combination in words: its terms by size, those of at least ``smallest`` of the largest."""
+    order = np.argsort(-np.abs(direction))
+    top = direction[order[0]]
+    kept = [k for k in order if abs(direction[k]) >= smallest * abs(top)]
+    signed = [f"{direction[k] / top:+.2f} {names[k]}" for k in kept[1:]]
+    return " ".join([names[kept[0]], *signed]).replace("+", "+ ").replace("-", "- ")

@@ -1,0 +1,148 @@
+"""The result of every command: values with covariance, units and a verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import CalibrationError
+from inercal.estimate.budget import BudgetItem
+from inercal.estimate.status import Status
+from inercal.records.findings import Finding
+from inercal.records.record import Source
+
+Array = NDArray[np.float64]
+
+COVERAGE = 0.9545
+"""Probability of the expanded uncertainty U = k u, so that k is 2 at many degrees of freedom (GUM G.1)."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One estimated coefficient: ``value``, standard uncertainty ``u`` and ``U = k u``, all in ``unit``."""
+
+    name: str
+    value: float
+    u: float
+    k: float
+    dof: float
+    unit: str
+
+    @property
+    def U(self) -> float:
+        """Expanded uncertainty for a coverage of 95.45 %."""
+        return self.k * self.u
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Coverage interval at ``level`` (Student t, the parameter's own degrees of freedom)."""
+        half = coverage_factor(self.dof, level) * self.u
+        return self.value - half, self.value + half
+
+
+def coverage_factor(dof: float, level: float = COVERAGE) -> float:
+    """Two-sided Student t factor k for a coverage ``level`` at ``dof`` degrees of freedom (inf: normal)."""
+    from scipy.special import ndtri, stdtrit
+
+    p = 0.5 * (1.0 + level)
+    return float(ndtri(p) if math.isinf(dof) else stdtrit(dof, p))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Everything a calibration says.
+
+    ``values`` (p,), ``covariance`` (p, p), ``dof`` and ``k`` (p,) belong to ``names`` and ``units``. The
+    other fields are the keys of the JSON result of the same names; ``result`` is the command's own part.
+    """
+
+    command: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    covariance: Array
+    dof: Array
+    k: Array
+    status: Status
+    message: str
+    findings: tuple[Finding, ...] = ()
+    statistics: Mapping[str, float] = field(default_factory=dict)
+    budget: tuple[BudgetItem, ...] = ()
+    model: str = ""
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    traceability: Mapping[str, str] = field(default_factory=dict)
+    inputs: tuple[Source, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    timing: Mapping[str, float] = field(default_factory=dict)
+    result: Mapping[str, Any] = field(default_factory=dict)
+    references: tuple[str, ...] = ()
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """The coefficients by name, in order."""
+        rows = zip(self.names, self.values, self.u, self.k, self.dof, self.units, strict=True)
+        return {
+            name: Parameter(name, float(value), float(u), float(k), float(dof), unit)
+            for name, value, u, k, dof, unit in rows
+        }
+
+    def __getitem__(self, name: str) -> Parameter:
+        """The coefficient of that name."""
+        return self.parameters[name]
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation matrix (p, p); 0 beside a parameter without uncertainty."""
+        u = self.u
+        with np.errstate(divide="ignore", invalid="ignore"):
+            matrix = self.covariance / np.outer(u, u)
+        return np.where(np.isfinite(matrix), matrix, 0.0)
+
+    def raise_for_status(self) -> Estimate:
+        """Return the estimate itself if its status is ok, else raise `CalibrationError` with the message."""
+        if self.status is not Status.OK:
+            raise CalibrationError(f"{self.status.value}: {self.message}", self)
+        return self
+
+    def citations(self) -> str:
+        """The publications and standards behind the methods used, one a line."""
+        return "\n".join(self.references)
+
+    def table(self) -> str:
+        """The coefficients as aligned text, each value rounded to its uncertainty."""
+        head = ("", "value", "u", "U", "k", "unit")
+        rows = [head] + [
+            (p.name, *rounded(p.value, p.u, p.U), f"{p.k:.2f}", p.unit) for p in self.parameters.values()
+        ]
+        widths = [max(len(row[i]) for row in rows) for i in range(6)]
+        return "\n".join(
+            "  ".join(
+                cell.ljust(width) if i in (0, 5) else cell.rjust(width)
+                for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+            ).rstrip()
+            for row in rows
+        )
+
+
+def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
+    """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6)."""
+    if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
+        return tuple(f"{x:.6g}" for x in (value, u, *others))
+    first = Decimal(f"{u:.1e}").adjusted()  # power of ten of the first digit; 0.0996 rounds to 0.10
+    if first >= -4 and max(abs(value), u) < 1e7:
+        places = max(0, 1 - first)
+        return tuple(f"{round(x, 1 - first):.{places}f}" for x in (value, u, *others))
+    value = round(value, 1 - first)  # no digits below the last of u, also of a value smaller than u
+    digits = max(0, Decimal(value).adjusted() - first + 1) if value else 0
+    return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))

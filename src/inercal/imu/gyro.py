@@ -1,0 +1,277 @@
+"""The gyro triad from turns between static poses, against the verticals the accelerometers give.
+
+Two kinds of data, fitted together: in every turn the vertical of one pose, carried through the gyro's
+output, must meet the vertical of the next (Tedaldi, Pretto, Menegatti, ICRA 2014, eqs. (13) to (16)); in
+every pose the mean output is the bias, plus what the vertical part of earth rate and, if asked for, the
+g-sensitive drift make. (The horizontal part of earth rate has an unknown azimuth and stays in the scatter.)
+All scatter is estimated from the data: that of the pose means about their own regression, that of the turns
+as a variance that grows with the duration of the turn, on top of what the accelerometers' scatter makes of
+the verticals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.linear import least_squares
+from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.imu.turns import Turns, carried, carried_with_derivatives, thin
+from inercal.instruments.terms import GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.instruments.triad import TriadModel
+
+Array = NDArray[np.float64]
+
+COARSE = 8
+"""Samples in one step of the coarse rounds."""
+
+_OFF_DIAGONAL = tuple((i, j) for i in range(3) for j in range(3) if i != j)
+
+
+@dataclass(frozen=True)
+class StaticRegression:
+    """Mean gyro outputs in the poses, regressed on a constant and, if asked for, the specific force.
+
+    ``coefficients`` (c, 3), ``unit_covariance`` (c, c), ``scatter`` (3,) standard deviation of a pose mean
+    about the regression [output], ``dof``, ``residuals`` (n, 3).
+    """
+
+    coefficients: Array
+    unit_covariance: Array
+    scatter: Array
+    dof: int
+    residuals: Array
+
+
+def regress_static(means: Array, regressors: Array) -> StaticRegression:
+    """Regress pose means (n, 3) on a constant and further ``regressors`` (n, c - 1), axis by axis."""
+    A = np.column_stack([np.ones(len(means)), regressors])
+    names = [f"column {k}" for k in range(A.shape[1])]
+    fits = [least_squares(A, y, names) for y in means.T]
+    dof = fits[0].dof
+    scatter = np.sqrt([fit.chi2 / max(dof, 1) for fit in fits])
+    return StaticRegression(
+        np.column_stack([fit.beta for fit in fits]),
+        fits[0].unit_covariance,
+        scatter,
+        dof,
+        np.column_stack([fit.residuals for fit in fits]),
+    )
+
+
+@dataclass(frozen=True)
+class GyroFit:
+    """The triad ``model``, ``g_sensitivity`` (3, 3) [output/(m/s^2)], and how they came about.
+
+    ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain`` (p, 3 m +
+    3 n) takes errors of the carried verticals (turn by turn, [rad]) and of the pose means (pose by pose,
+    [output]) to errors of the parameters. ``miss`` (m, 3) is the carried minus the measured vertical [rad].
+    ``vertical_error`` (3 m, 3 n) takes errors of the specific force in the poses to errors of ``miss``.
+    """
+
+    names: tuple[str, ...]
+    model: TriadModel
+    g_sensitivity: Array
+    fit: NonlinearFit
+    gain: Array
+    miss: Array
+    walk: float
+    dof: float
+    static: StaticRegression
+    vertical_error: Array
+
+
+def fit_gyro(
+    turns: Turns,
+    means: Array,
+    f: Array,
+    force_error: Array,
+    scatter: float,
+    start: TriadModel,
+    with_g_sensitivity: bool,
+    vertical_rate: float = 0.0,
+) -> GyroFit:
+    """Fit bias, scale, misalignment and, if asked for, g-sensitivity.
+
+    Parameters
+    ----------
+    turns : Turns
+        At least five turns.
+    means : (n, 3)
+        Mean gyro output in each pose.
+    f : (n, 3)
+        Specific force in each pose [m/s^2], from the calibrated accelerometers.
+    force_error : (3 n, 3 n)
+        Takes independent errors of the pose means of the accelerometers [m/s^2] to errors of ``f``, those
+        through the accelerometers' own parameters included.
+    scatter : float
+        Standard deviation of those independent errors [m/s^2].
+    start : TriadModel
+        First guess (see `first_guess`).
+    with_g_sensitivity : bool
+        Fit the nine g-sensitive drift coefficients too.
+    vertical_rate : float
+        Upward part of earth rate at the site [rad/s].
+    """
+    names = GYRO_TRIAD + (GYRO_G_SENSITIVITY if with_g_sensitivity else ())
+    size = np.linalg.norm(f, axis=1, keepdims=True)
+    verticals = f / size
+    regressors = f if with_g_sensitivity else np.empty((len(f), 0))
+    static = regress_static(without_earth(means, verticals, start, vertical_rate), regressors)
+    design = _static_design(f, len(names))
+    spread = np.repeat(np.maximum(static.scatter, 1e-12 * np.max(start.scale))[None], len(f), axis=0).ravel()
+
+    theta = np.concatenate(
+        [static.coefficients[0], start.scale, [start.misalignment[i, j] for i, j in _OFF_DIAGONAL]]
+    )
+    if with_g_sensitivity:
+        theta = np.concatenate([theta, static.coefficients[1:].T.ravel()])
+    typical = np.concatenate([np.full(3, 0.01 * np.max(start.scale)), start.scale, np.ones(6)])
+    typical = np.concatenate([typical, np.full(len(names) - 12, 1e-3 * np.max(start.scale))])
+
+    durations = np.repeat(turns.durations, 3)
+    dof = 2.0 * len(turns) - 9.0
+    walk2 = 0.01**2 / float(np.median(turns.durations))
+    # Coarse rounds come near cheaply; the last one starts at the minimum with the variance settled.
+    coarse = thin(turns, COARSE)
+    for part in (coarse, coarse, turns, turns):
+        vertical_error = _vertical_errors(part, verticals, size, theta) @ force_error
+        known = scatter**2 * vertical_error @ vertical_error.T
+        factor = np.linalg.cholesky(known + walk2 * np.diag(durations))
+        weigh = np.linalg.inv(factor)
+
+        def residuals(x: Array, part: Turns = part, weigh: Array = weigh) -> Array:
+            miss = carried(part, verticals, *unpack(x)) - verticals[part.last]
+            rest = design @ x - without_earth(means, verticals, unpack(x)[0], vertical_rate).ravel()
+            return np.concatenate([weigh @ miss.ravel(), rest / spread])
+
+        def jacobian(x: Array, part: Turns = part, weigh: Array = weigh) -> Array:
+            by_parameter = carried_with_derivatives(part, verticals, *unpack(x))[1][..., : len(x)]
+            rest = design + _earth_sensitivity(verticals, unpack(x)[0], vertical_rate, len(x))
+            return np.concatenate([weigh @ by_parameter.reshape(-1, len(x)), rest / spread[:, None]])
+
+        fit = solve(residuals, jacobian, theta, names, typical)
+        theta = fit.x
+        model, g = unpack(theta)
+        miss = carried(part, verticals, model, g) - verticals[part.last]
+        dof = max(1.0, 2.0 * len(turns) - _absorbed(fit, len(weigh)))
+        walk2 = _excess(miss.ravel(), known, durations, dof)
+
+    gain = fit.gain()
+    gain = np.hstack([gain[:, : len(weigh)] @ weigh, -gain[:, len(weigh) :] / spread])
+    return GyroFit(names, model, g, fit, gain, miss, float(np.sqrt(walk2)), dof, static, vertical_error)
+
+
+def unpack(theta: Array) -> tuple[TriadModel, Array]:
+    """Triad and g-sensitivity (3, 3) of parameters (12,) or (21,) in the order of the term table."""
+    misalignment = np.eye(3)
+    for value, (i, j) in zip(theta[6:12], _OFF_DIAGONAL, strict=True):
+        misalignment[i, j] = value
+    g = theta[12:].reshape(3, 3) if len(theta) > 12 else np.zeros((3, 3))
+    return TriadModel(theta[3:6], misalignment, theta[:3]), g
+
+
+def _static_design(f: Array, parameters: int) -> Array:
+    """(3 n, p): pose means as a linear function of the parameters."""
+    design = np.zeros((len(f), 3, parameters))
+    design[:, range(3), range(3)] = 1.0
+    if parameters > 12:
+        for j in range(3):
+            design[:, j, 12 + 3 * j : 15 + 3 * j] = f
+    return design.reshape(-1, parameters)
+
+
+def without_earth(means: Array, verticals: Array, model: TriadModel, vertical_rate: float) -> Array:
+    """Pose means (n, 3) less the output that the vertical part of earth rate [rad/s] makes."""
+    return np.asarray(means - vertical_rate * verticals @ model.gain.T)
+
+
+def _earth_sensitivity(verticals: Array, model: TriadModel, vertical_rate: float, parameters: int) -> Array:
+    """(3 n, p): derivative of the output that the vertical part of earth rate makes."""
+    out = np.zeros((len(verticals), 3, parameters))
+    for i in range(3):
+        out[:, i, 3 + i] = verticals @ model.misalignment[i]
+    for k, (i, j) in enumerate(_OFF_DIAGONAL):
+        out[:, i, 6 + k] = model.scale[i] * verticals[:, j]
+    return vertical_rate * out.reshape(-1, parameters)
+
+
+def _vertical_errors(turns: Turns, verticals: Array, size: Array, theta: Array) -> Array:
+    """(3 m, 3 n): miss of each turn by errors of the specific force in the poses."""
+    by_vertical = carried_with_derivatives(turns, verticals, *unpack(theta))[2]
+    across = (np.eye(3) - verticals[:, :, None] * verticals[:, None, :]) / size[:, :, None]
+    out = np.zeros((len(turns), 3, len(verticals), 3))
+    rows = np.arange(len(turns))
+    out[rows, :, turns.first] = by_vertical @ across[turns.first]
+    out[rows, :, turns.last] -= across[turns.last]
+    return out.reshape(3 * len(turns), -1)
+
+
+def _absorbed(fit: NonlinearFit, rows: int) -> float:
+    """Number of parameters that the first ``rows`` residuals determine: the trace of their hat matrix."""
+    J = fit.jacobian[:rows]
+    return float(np.sum((J @ fit.unit_covariance) * J))
+
+
+def _excess(miss: Array, known: Array, durations: Array, dof: float) -> float:
+    """Variance per second that brings the weighted sum of squares of ``miss`` down to ``dof``.
+
+    Mandel and Paule's rule (Anal. Chem. 42 (1970) 1194) with a variance proportional to the duration; not
+    negative, and never quite zero, so that the covariance of the turns stays positive definite.
+    """
+    root = np.sqrt(durations)
+    floor = 1e-6 * float(miss @ miss) / float(np.sum(durations)) + 1e-24
+    # in the eigenvectors of the known part, per second, the covariance is diagonal for every variance
+    values, vectors = np.linalg.eigh(known / np.outer(root, root))
+    parts = (vectors.T @ (miss / root)) ** 2
+
+    def surplus(variance: float) -> float:
+        return float(np.sum(parts / (np.maximum(values, 0.0) + variance))) - dof
+
+    if surplus(floor) <= 0:
+        return floor
+    from scipy.optimize import brentq
+
+    return float(brentq(surplus, floor, float(np.sum(parts)) / dof, rtol=1e-9))
+
+
+def first_guess(
+    turns: Turns, verticals: Array, bias: Array, axes: Array | None = None
+) -> tuple[float, float]:
+    """Scale [output per rad/s] common to the axes that best carries the verticals, and the miss it leaves.
+
+    Parameters
+    ----------
+    turns : Turns
+    verticals : (n, 3)
+        Unit vectors in the poses.
+    bias : (3,)
+        Mean output at rest.
+    axes : (3, 3), optional
+        Signed permutation from the frame to the gyro's channels; identity if absent.
+
+    Returns
+    -------
+    scale : float
+    miss : float
+        Root-mean-square angle [rad] between carried and measured verticals.
+
+    Notes
+    -----
+    A hand turns an instrument by 0.1 to 7 rad between poses, so the integral of the output bounds the scale;
+    steps of 8 % are well inside the catch of the fit that follows.
+    """
+    coarse = thin(turns, max(1, len(turns.intervals) // 80))
+    raw = coarse.outputs - coarse.intervals[..., None] * bias
+    swept = float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0)))
+    channels = np.eye(3) if axes is None else axes
+    best = (1.0, np.inf)
+    for scale in swept / np.geomspace(0.1, 12.0, 62):
+        model = TriadModel(np.full(3, scale), channels, bias)
+        miss = carried(coarse, verticals, model, np.zeros((3, 3))) - verticals[coarse.last]
+        size = float(np.sqrt(np.mean(np.sum(miss**2, axis=-1))))
+        if size < best[1]:
+            best = (float(scale), size)
+    return best

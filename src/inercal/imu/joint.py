@@ -1,0 +1,155 @@
+"""One covariance for accelerometers and gyro: every error of the estimate traced to the scatter behind it.
+
+All estimates are linear in three kinds of independent errors: of the specific force in the poses (scatter of
+the accelerometers), of the verticals carried through the turns (the gyro's random walk), and of the mean
+gyro outputs in the poses. Their gains give the covariance of all parameters together, and the same gains
+give the covariance that the sensors' noise alone would cause.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.budget import TypeA, TypeB
+from inercal.geometry.site import Site
+from inercal.imu.accelerometer import AccelerometerFit
+from inercal.imu.gyro import GyroFit
+from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviation of |f| in a pose about the fit [m/s^2], its degrees of freedom, and whether it
+    exceeds what the sensors' noise explains."""
+
+    s: float
+    dof: float
+    excess: bool
+    over_noise: float
+
+
+def radial(fit: AccelerometerFit) -> Array:
+    """(n, 3 n): errors of |f| in the poses by errors of f."""
+    n = len(fit.f)
+    out = np.zeros((n, n, 3))
+    out[range(n), range(n)] = fit.directions
+    return out.reshape(n, 3 * n)
+
+
+def force_error(fit: AccelerometerFit) -> Array:
+    """(3 n, 3 n): errors of the calibrated specific force by independent errors of f in the poses."""
+    by_parameter = fit.force_sensitivity().reshape(-1, len(ACCELEROMETER_TRIAD))
+    return np.asarray(np.eye(3 * len(fit.f)) + by_parameter @ fit.fit.gain() @ radial(fit))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Names, values and gains of accelerometers and gyro together (p parameters).
+
+    ``by_force`` (p, 3 n), ``by_turn`` (p, 3 m) and ``by_output`` (p, 3 n) take the three kinds of errors to
+    errors of the parameters.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    by_force: Array
+    by_turn: Array
+    by_output: Array
+    accelerometer: AccelerometerFit
+    gyro: GyroFit | None
+    durations: Array
+
+
+def join(accelerometer: AccelerometerFit, gyro: GyroFit | None, durations: Array) -> Joint:
+    """Stack the two fits; ``durations`` (m,) of the turns [s]."""
+    by_force = accelerometer.fit.gain() @ radial(accelerometer)
+    names, values = ACCELEROMETER_TRIAD, accelerometer.fit.x
+    if gyro is None:
+        empty = np.zeros((len(names), 0))
+        return Joint(names, values, by_force, empty, empty, accelerometer, None, durations)
+    turns, poses = gyro.vertical_error.shape[0], by_force.shape[1]
+    to_turn, to_output = gyro.gain[:, :turns], gyro.gain[:, turns:]
+    pad = len(names)
+    return Joint(
+        names + gyro.names,
+        np.concatenate([values, gyro.fit.x]),
+        np.vstack([by_force, to_turn @ gyro.vertical_error]),
+        np.vstack([np.zeros((pad, turns)), to_turn]),
+        np.vstack([np.zeros((pad, poses)), to_output]),
+        accelerometer,
+        gyro,
+        durations,
+    )
+
+
+def type_a(joint: Joint, scatter: Scatter) -> list[TypeA]:
+    """What the scatter in the data does to the parameters."""
+    sources = [
+        TypeA(
+            "pose scatter", scatter.s, "m/s^2", scatter.s**2 * joint.by_force @ joint.by_force.T, scatter.dof
+        )
+    ]
+    if joint.gyro is None:
+        return sources
+    gyro = joint.gyro
+    turn = np.repeat(joint.durations, 3) * gyro.walk**2
+    sources.append(
+        TypeA("turn scatter", gyro.walk, "rad/sqrt(s)", (joint.by_turn * turn) @ joint.by_turn.T, gyro.dof)
+    )
+    output = np.tile(gyro.static.scatter**2, joint.by_output.shape[1] // 3)
+    size = float(np.sqrt(np.mean(gyro.static.scatter**2)))
+    covariance = (joint.by_output * output) @ joint.by_output.T
+    sources.append(TypeA("gyro output at rest", size, "output", covariance, gyro.static.dof))
+    return sources
+
+
+def type_b(joint: Joint, site: Site, time_base_u: float) -> list[TypeB]:
+    """What gravity, the record's clock and an uncertain latitude do to the parameters.
+
+    Gravity sets the scale of specific force: K1 and G go as 1/g. The clock sets the scale of rate: S goes as
+    the length of the record's second. The vertical part of earth rate acts as a g-sensitive drift S/g about
+    the vertical.
+    """
+
+    def scaled(factor: float, *prefixes: str) -> Array:
+        values = zip(joint.names, joint.values, strict=True)
+        return np.array([factor * value if name.startswith(prefixes) else 0.0 for name, value in values])
+
+    by_gravity = scaled(-1.0 / site.gravity, "K1_", "G_")
+    sources = [TypeB(i.source, i.u, i.unit, by_gravity * i.sensitivity) for i in site.inputs]
+    if joint.gyro is None:
+        return sources
+    if time_base_u > 0:
+        sources.append(TypeB("time base", time_base_u, "1", scaled(1.0, "S_")))
+    if site.vertical_rate_u > 0 and "G_xx" in joint.names:
+        gain = joint.gyro.model.gain.ravel()
+        drift = dict(zip(GYRO_G_SENSITIVITY, -gain / site.gravity, strict=True))
+        by_rate = np.array([drift.get(name, 0.0) for name in joint.names])
+        sources.append(TypeB("vertical earth rate", site.vertical_rate_u, "rad/s", by_rate))
+    return sources
+
+
+def noise_covariance(joint: Joint, pose: Array, walk: Array, output: Array) -> Array:
+    """(p, p): what the sensors' noise alone would cause.
+
+    Parameters
+    ----------
+    pose : (3 n,)
+        Variance of the specific force in each pose [(m/s^2)^2].
+    walk : (3,)
+        Angle random walk squared of the gyro axes [rad^2/s].
+    output : (3 n,)
+        Variance of the mean gyro output in each pose [output^2].
+    """
+    covariance = (joint.by_force * pose) @ joint.by_force.T
+    if joint.gyro is not None:
+        # the frames of the turns differ, so the mean of the axes stands for each
+        turn = np.repeat(joint.durations, 3) * float(np.mean(walk))
+        covariance = covariance + (joint.by_turn * turn) @ joint.by_turn.T
+        covariance = covariance + (joint.by_output * output) @ joint.by_output.T
+    return np.asarray(covariance)

@@ -1,0 +1,208 @@
+"""The estimate of a calibration, put together from its fits: covariance, budget, tables, conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.budget import combine
+from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.status import Status
+from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
+from inercal.imu.poses import FEWEST, MULTIPLES, Poses, Recording, distinct, dwells_at
+from inercal.imu.settings import ImuSettings
+from inercal.imu.verdict import rms_miss, verdict
+from inercal.instruments.terms import TERMS
+from inercal.records.findings import Finding
+from inercal.records.record import Record, Triad
+
+Array = NDArray[np.float64]
+
+COMMAND = "calibrate imu"
+
+MODEL = (
+    "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "
+    "frame axis j); accelerometers: K1, M upper-triangular, K0, with |f| = g in every static pose; gyro: S, T full, "
+    "D_F, and + G f where g-sensitivity is estimated. Frame: x along accelerometer x, y in the plane of "
+    "accelerometers x and y."
+)
+
+REFERENCES = (
+    "D. Tedaldi, A. Pretto, E. Menegatti, A robust and easy to implement method for IMU calibration without external "
+    "equipments, ICRA 2014",
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+    "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
+    "Chemistry 42 (1970) 1194",
+    "W. J. Riley, D. A. Howe, Handbook of frequency stability analysis, NIST SP 1065 (2008)",
+)
+
+
+def assemble(
+    record: Record,
+    recording: Recording,
+    poses: Poses,
+    scatter: Scatter,
+    joint: Joint,
+    settings: ImuSettings,
+    findings: list[Finding],
+) -> Estimate:
+    """Put the estimate together."""
+    from_scatter = type_a(joint, scatter)
+    covariance, dof, budget = combine(
+        joint.names, [*from_scatter, *type_b(joint, settings.site, settings.time_base_u)]
+    )
+    residual = np.sum([source.covariance for source in from_scatter], axis=0)
+    u = dict(zip(joint.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    status, message = verdict(poses, joint.gyro, settings.site.gravity, u)
+    noise = noise_covariance(joint, *_noise(recording, poses, joint))
+    acc, gyro = poses.accelerometer, joint.gyro
+    statistics = {
+        "dof": float(acc.fit.dof),
+        "condition": acc.fit.identifiability.condition,
+        "residual_rms": float(np.sqrt(np.mean(acc.fit.residuals**2))),
+        "scatter": scatter.s,
+        "scatter_over_noise": scatter.over_noise,
+        "threshold": poses.multiple,
+        "intervals": float(len(poses.dwells)),
+    }
+    if gyro is not None:
+        statistics |= {
+            "gyro_dof": float(gyro.dof),
+            "gyro_condition": gyro.fit.identifiability.condition,
+            "gyro_residual_rms_rad": rms_miss(gyro),
+            "turns": float(len(gyro.miss)),
+        }
+    return Estimate(
+        command=COMMAND,
+        names=joint.names,
+        units=tuple(_unit(name, recording) for name in joint.names),
+        values=joint.values,
+        covariance=covariance,
+        dof=dof,
+        k=np.array([coverage_factor(float(value)) for value in dof]),
+        status=status,
+        message=message,
+        findings=(*record.findings, *findings),
+        statistics=statistics,
+        budget=budget,
+        model=MODEL,
+        conditions=_conditions(recording, poses, settings),
+        traceability=settings.traceability,
+        inputs=record.sources,
+        provenance={"settings": settings.given},
+        result={
+            "method": "multiposition",
+            "intervals": _interval_table(recording, poses),
+            "turns": _turn_table(joint),
+            "u_residual": _named(joint.names, np.sqrt(np.diag(residual))),
+            "u_noise": _named(joint.names, np.sqrt(np.diag(noise))),
+            "unit": {triad.sensor: triad.unit.symbol for triad in _triads(recording)},
+        },
+        references=REFERENCES,
+    )
+
+
+def _triads(recording: Recording) -> list[Triad]:
+    """The triads there are."""
+    return [triad for triad in (recording.accelerometer, recording.gyro) if triad is not None]
+
+
+def _unit(name: str, recording: Recording) -> str:
+    """Unit of a coefficient, from that of the output of its sensor."""
+    triad = recording.accelerometer if name.startswith(("K", "M")) else recording.gyro
+    assert triad is not None
+    return TERMS[name].unit_for(triad.unit.symbol)
+
+
+def _named(names: tuple[str, ...], values: Array) -> dict[str, float]:
+    """Values by name."""
+    return dict(zip(names, np.asarray(values).tolist(), strict=True))
+
+
+def _noise(recording: Recording, poses: Poses, joint: Joint) -> tuple[Array, Array, Array]:
+    """Variances that the sensors' noise explains: see `noise_covariance`."""
+    pose = np.repeat(poses.noise_variance, 3)
+    if joint.gyro is None:
+        return pose, np.zeros(3), np.zeros(0)
+    lengths = np.array([dwell.samples for dwell in poses.dwells]) / recording.accelerometer.rate
+    noise = recording.noise["gyro"]
+    return pose, noise.coefficients[0] / joint.gyro.model.scale**2, noise.variance(lengths).ravel()
+
+
+def _conditions(recording: Recording, poses: Poses, settings: ImuSettings) -> dict[str, Any]:
+    """Conditions and ranges over which the result is valid, as recorded."""
+    t = recording.accelerometer.t
+    temperature = settings.temperature
+    ranges: dict[str, Any] = {
+        "specific_force_m_s2": [0.0, settings.site.gravity],
+        "duration_s": float(t[-1] - t[0]),
+        "rate_hz": recording.accelerometer.rate,
+    }
+    if recording.gyro is not None:
+        finite = recording.gyro.values[np.isfinite(recording.gyro.values).all(axis=1)]
+        ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
+    return {
+        "temperature": None if temperature is None else temperature.text,
+        "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
+        "date": settings.traceability.get("date", ""),
+        "ranges": ranges,
+    }
+
+
+def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any]]:
+    """One row for each static interval."""
+    t, fit = recording.accelerometer.t, poses.accelerometer
+    return [
+        {
+            "start_s": float(t[d.start]),
+            "end_s": float(t[d.stop - 1]),
+            "samples": d.samples,
+            "direction": direction,
+            "residual_m_s2": float(residual),
+        }
+        for d, direction, residual in zip(poses.dwells, fit.directions, fit.fit.residuals, strict=True)
+    ]
+
+
+def _turn_table(joint: Joint) -> list[Mapping[str, Any]]:
+    """One row for each turn used."""
+    if joint.gyro is None:
+        return []
+    misses = np.linalg.norm(joint.gyro.miss, axis=1)
+    return [
+        {"duration_s": float(d), "miss_rad": float(m)} for d, m in zip(joint.durations, misses, strict=True)
+    ]
+
+
+def too_few(record: Record, recording: Recording, settings: ImuSettings) -> Estimate:
+    """The estimate of a recording without enough poses: no parameters, and what to do."""
+    y = recording.accelerometer.values
+    counts = {m: len(distinct(dwells_at(recording, m, False), y, recording.window)) for m in MULTIPLES}
+    best = max(counts, key=lambda multiple: counts[multiple])
+    message = (
+        f"found {counts[best]} static intervals of at least {recording.window / recording.accelerometer.rate:.1f} s "
+        f"at a threshold of {best:g} times the variance at rest, expected at least {FEWEST}: hold the instrument "
+        "still for 2 s and more in 12 to 40 different poses, each side up and the edges between"
+    )
+    return Estimate(
+        command=COMMAND,
+        names=(),
+        units=(),
+        values=np.zeros(0),
+        covariance=np.zeros((0, 0)),
+        dof=np.zeros(0),
+        k=np.zeros(0),
+        status=Status.TOO_FEW_INTERVALS,
+        message=message,
+        findings=record.findings,
+        statistics={"intervals": float(counts[best]), "threshold": best},
+        model=MODEL,
+        traceability=settings.traceability,
+        inputs=record.sources,
+        provenance={"settings": settings.given},
+        result={"method": "multiposition", "intervals": [], "turns": []},
+        references=REFERENCES,
+    )

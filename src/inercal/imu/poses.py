@@ -1,0 +1,246 @@
+"""The static poses of a hand-held recording: found, averaged, and the threshold chosen.
+
+An interval is static where the windowed variance stays below a multiple of that of an initial static period;
+the multiple is the one whose poses the accelerometer model fits best per degree of freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import RecordError, StudyError
+from inercal.imu.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
+from inercal.noise.allan import AllanFit
+from inercal.noise.allan import fit as fit_allan
+from inercal.records.dwells import Dwell, breaks, static_intervals, window_samples, windowed_variance
+from inercal.records.record import Record, Triad
+
+Array = NDArray[np.float64]
+
+MULTIPLES = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 28.0, 40.0)
+"""Thresholds tried, as multiples of the variance of the initial static period."""
+
+FEWEST = PARAMETERS + 1
+"""Poses without which nothing can be said: as many as parameters fit without residual and prove nothing."""
+
+SAME_POSE = 5e-3
+"""Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
+
+MOVING = 30.0
+"""Variance over that at rest from which the instrument certainly moves."""
+
+SHORTEST_START = 5.0
+"""Shortest initial static period [s]."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The triads of a record, and what its initial static period says about their noise.
+
+    ``restlessness`` holds, for each triad, the windowed variance over that of the initial static period, on
+    the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it.
+    """
+
+    accelerometer: Triad
+    gyro: Triad | None
+    initial: Dwell
+    window: int
+    cuts: NDArray[np.int64]
+    restlessness: dict[str, Array]
+    noise: dict[str, AllanFit]
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Static poses at one threshold, and the accelerometer fit to them.
+
+    ``means`` (n, 3) mean outputs, ``noise_variance`` (n,) the variance [(m/s^2)^2] of each pose's |f| that
+    the sensors' noise explains, with ``noise_dof`` degrees of freedom.
+    """
+
+    dwells: tuple[Dwell, ...]
+    multiple: float
+    with_gyro: bool
+    means: Array
+    accelerometer: AccelerometerFit
+    noise_variance: Array
+    noise_dof: float
+
+    @property
+    def misfit(self) -> float:
+        """Residual variance per degree of freedom [(m/s^2)^2], the noise counted in as prior knowledge.
+
+        Without that, one degree of freedom would let luck choose the threshold.
+        """
+        fit, noise = self.accelerometer.fit, float(np.mean(self.noise_variance))
+        return (fit.chi2 + self.noise_dof * noise) / (fit.dof + self.noise_dof)
+
+
+def prepare(record: Record, static_start: float | None) -> Recording:
+    """Look at the variance of a record, and at its noise at rest.
+
+    Raises
+    ------
+    RecordError
+        No accelerometer triad, hardly any samples, or no quiet start.
+    StudyError
+        ``static_start`` [s] does not fit the record, or the instrument moves in it.
+    """
+    accelerometer = record.triad("acc")
+    gyro = record.triad("gyro") if any(f"gyro_{axis}" in record for axis in "xyz") else None
+    t, where = accelerometer.t, accelerometer.source.path
+    for triad in (accelerometer, gyro):
+        if triad is not None and not np.isfinite(triad.rate):
+            raise RecordError(
+                triad.source.path,
+                f"found {len(triad.t)} samples of {triad.sensor} without increasing time stamps, expected a recording",
+            )
+    window = window_samples(accelerometer.rate)
+    variances = {"acc": windowed_variance(accelerometer.values, window)}
+    if gyro is not None:
+        own = windowed_variance(gyro.values, window_samples(gyro.rate))
+        variances["gyro"] = own if gyro.t is t else _on_other_clock(own, gyro.t, t)
+    cuts = breaks(t)
+    initial = _initial(t, variances["acc"], window, cuts, static_start, where)
+    noise, restlessness = {}, {}
+    for triad in (accelerometer, gyro):
+        if triad is not None:
+            rest = _at_rest(triad, t[initial.start], t[initial.stop - 1], static_start)
+            size = float(np.linalg.norm(np.var(rest, axis=0, ddof=1)))
+            restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
+            noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
+    return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise)
+
+
+def _on_other_clock(values: Array, t: Array, other: Array) -> Array:
+    """Values at the nearest sample of another time axis; infinite outside."""
+    nearest = np.clip(np.searchsorted(t, other), 0, len(t) - 1)
+    out = values[nearest]
+    out[(other < t[0]) | (other > t[-1])] = np.inf
+    return out
+
+
+def _at_rest(triad: Triad, begin: float, end: float, static_start: float | None) -> Array:
+    """Finite samples of a triad in the initial static period; raises where nothing varies."""
+    rest = triad.values[(triad.t >= begin) & (triad.t <= end)]
+    rest = rest[np.isfinite(rest).all(axis=1)]
+    if len(rest) < 16 or not np.any(np.var(rest, axis=0) > 0):
+        length = "" if static_start is None else f" of {static_start:g} s"
+        raise RecordError(
+            triad.source.path,
+            f"{triad.sensor} has no noise in the initial static period{length} ({len(rest)} samples), "
+            "expected raw samples of an instrument at rest",
+        )
+    return rest
+
+
+def _initial(
+    t: Array,
+    variance: Array,
+    window: int,
+    cuts: NDArray[np.int64],
+    static_start: float | None,
+    where: str,
+) -> Dwell:
+    """The initial static period: as stated and then checked, or up to the first movement."""
+    known = np.isfinite(variance)
+    if np.count_nonzero(known) < 2 * window:
+        raise RecordError(
+            where,
+            f"found {len(t)} samples, expected a recording that starts with at least {SHORTEST_START:g} s at rest",
+        )
+    first = int(np.argmax(known))
+    # the calmest twentieth of the record tells what rest looks like before anything else is known
+    calm = float(np.quantile(variance[known], 0.05))
+    restless = np.flatnonzero(variance[first:] > MOVING * max(calm, 1e-300)) + first
+    ends = [*(restless[:1] - window // 2), *cuts[cuts > first][:1], len(t)]
+    stop = max(int(min(ends)), 0)
+    still = float(t[max(stop - 1, 0)] - t[0])
+    if static_start is None:
+        if still < SHORTEST_START:
+            raise RecordError(
+                where,
+                f"the instrument moves {still:.1f} s after the start, expected at least {SHORTEST_START:g} s "
+                "at rest (say how long with imu.static_start)",
+            )
+        return Dwell(0, stop)
+    if not SHORTEST_START <= static_start <= t[-1] - t[0]:
+        raise StudyError(
+            "imu.static_start",
+            f"found {static_start:g} s, expected {SHORTEST_START:g} s to the length of the record, "
+            f"{t[-1] - t[0]:.1f} s",
+        )
+    stated = int(np.searchsorted(t, t[0] + static_start, side="right"))
+    inside = variance[: max(stated - window // 2, 0)]
+    inside = inside[np.isfinite(inside)]
+    if stop < stated - window and (not len(inside) or np.max(inside) > MOVING * np.median(inside)):
+        raise StudyError(
+            "imu.static_start",
+            f"found {static_start:g} s, expected a still period: the instrument moves after {still:.1f} s",
+        )
+    return Dwell(0, stated)
+
+
+def dwells_at(recording: Recording, multiple: float, with_gyro: bool) -> tuple[Dwell, ...]:
+    """Static intervals at a threshold, on the accelerometers' time axis."""
+    still = recording.restlessness["acc"] < multiple
+    if with_gyro:
+        still = still & (recording.restlessness["gyro"] < multiple)
+    return static_intervals(still, recording.cuts, recording.window)
+
+
+def distinct(dwells: tuple[Dwell, ...], y: Array, window: int) -> tuple[Dwell, ...]:
+    """Intervals of different poses: of a pose that was only jolted, the longer interval stands.
+
+    Two intervals less than a ``window`` of samples apart whose mean outputs ``y`` (n, 3) differ by less than
+    `SAME_POSE` of the range of all are one pose, and would not be independent.
+    """
+    if not dwells:
+        return ()
+    means = np.array([dwell.of(y).mean(axis=0) for dwell in dwells])
+    size = 0.5 * float(np.max(np.ptp(means, axis=0)))
+    kept, last = [dwells[0]], means[0]
+    for dwell, mean in zip(dwells[1:], means[1:], strict=True):
+        jolted = dwell.start - kept[-1].stop < window and np.linalg.norm(mean - last) < SAME_POSE * size
+        if not jolted:
+            kept.append(dwell)
+        elif dwell.samples > kept[-1].samples:
+            kept[-1] = dwell
+        last = mean
+    return tuple(kept)
+
+
+def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
+    """Poses at every threshold that yields enough of them, with and without the gyro's help."""
+    y, rate = recording.accelerometer.values, recording.accelerometer.rate
+    seen: set[tuple[Dwell, ...]] = set()
+    start: Array | None = None
+    for with_gyro in (True, False) if recording.gyro is not None else (False,):
+        for multiple in MULTIPLES:
+            dwells = distinct(dwells_at(recording, multiple, with_gyro), y, recording.window)
+            if len(dwells) < FEWEST or dwells in seen:
+                continue
+            seen.add(dwells)
+            means = np.array([dwell.of(y).mean(axis=0) for dwell in dwells])
+            found = fit_accelerometer(means, gravity, start)
+            if not found.fit.converged or np.any(found.model.scale <= 0):
+                continue
+            start = found.fit.x
+            lengths = np.array([dwell.samples for dwell in dwells]) / rate
+            noise = recording.noise["acc"]
+            variance = np.sum(found.output_gradient() ** 2 * noise.variance(lengths), axis=1)
+            dof = 3.0 * noise.dof(float(np.median(lengths)))
+            yield Poses(dwells, multiple, with_gyro, means, found, variance, dof)
+
+
+def choose(candidates: list[Poses]) -> Poses:
+    """The threshold with the least misfit, with the gyro's help if that leaves most of the poses."""
+    alone = [poses for poses in candidates if not poses.with_gyro]
+    aided = [poses for poses in candidates if poses.with_gyro]
+    most = max((len(poses.dwells) for poses in alone), default=0)
+    enough = [poses for poses in aided if 2 * len(poses.dwells) >= most]
+    return min(enough or alone, key=lambda poses: poses.misfit)

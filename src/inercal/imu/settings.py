@@ -1,0 +1,41 @@
+"""What a calibration of an IMU is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from inercal.geometry.site import Site
+from inercal.units import Quantity
+
+
+@dataclass(frozen=True)
+class ImuSettings:
+    """Settings of a multi-position calibration, in SI.
+
+    Attributes
+    ----------
+    site : Site
+        Local gravity and what it is uncertain by.
+    static_start : float or None
+        Length of the still period at the start [s]; None: to be found.
+    g_sensitivity : bool
+        Also estimate the g-sensitive drift of the gyro.
+    time_base_u : float
+        Relative standard uncertainty of the record's clock.
+    traceability : mapping
+        ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
+    temperature : Quantity or None
+        Temperature of the instrument.
+    given : mapping
+        The keys of the study that were given, and their values as typed; ready for JSON.
+    """
+
+    site: Site
+    static_start: float | None = None
+    g_sensitivity: bool = False
+    time_base_u: float = 0.0
+    traceability: Mapping[str, str] = field(default_factory=dict)
+    temperature: Quantity | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)

@@ -1,0 +1,203 @@
+"""Un-aided multi-position calibration of an IMU: a recording and settings in, an estimate out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import Estimate
+from inercal.imu.accelerometer import AccelerometerFit
+from inercal.imu.gyro import GyroFit, first_guess, fit_gyro, without_earth
+from inercal.imu.joint import Scatter, force_error, join
+from inercal.imu.outcome import assemble, too_few
+from inercal.imu.poses import Poses, Recording, choose, prepare, sweep
+from inercal.imu.settings import ImuSettings
+from inercal.imu.turns import Turns, cut_turns
+from inercal.imu.verdict import (
+    EXCESS,
+    WORST_MISS,
+    axis_findings,
+    gyro_findings,
+    rms_miss,
+    scatter_findings,
+)
+from inercal.instruments.triad import TriadModel
+from inercal.records.findings import Finding
+from inercal.records.record import Record
+
+Array = NDArray[np.float64]
+
+FEWEST_TURNS = 7
+"""Turns without which the gyro is not fitted: two equations each, for twelve parameters."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """An ``estimate`` and, where the fit came that far, the evidence behind it for pictures and tests."""
+
+    estimate: Estimate
+    recording: Recording
+    poses: Poses | None = None
+    gyro: GyroFit | None = None
+
+
+def calibrate(
+    record: Record, settings: ImuSettings, progress: Callable[[str], None] = lambda _: None
+) -> Calibration:
+    """Calibrate the accelerometers, and the gyro if the record has one.
+
+    Parameters
+    ----------
+    record : Record
+        ``acc_x..z`` and perhaps ``gyro_x..z``, in any unit, counts included.
+    settings : ImuSettings
+        Site and options.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    Calibration
+        Its estimate's status says whether the values can be used; nothing is raised for a poor fit.
+
+    Raises
+    ------
+    InputError
+        The record has no accelerometer triad, or does not start at rest.
+    """
+    import scipy.optimize  # noqa: F401  (loading it is not part of the computation)
+
+    clock = time.perf_counter()
+    progress("finding static poses")
+    recording = prepare(record, settings.static_start)
+    gravity = settings.site.gravity
+    candidates = list(sweep(recording, gravity))
+    if not candidates:
+        return Calibration(_timed(too_few(record, recording, settings), clock), recording)
+    poses = choose(candidates)
+    scatter = _scatter(poses)
+    findings = [*scatter_findings(poses, scatter)]
+    gyro, turns, static_means = None, None, np.zeros((0, 3))
+    if recording.gyro is None:
+        findings.append(
+            Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated")
+        )
+    else:
+        if not poses.with_gyro:
+            findings.append(
+                Finding(
+                    "gyro_restless",
+                    "the gyro is so restless in most holds that the poses were found by the accelerometers alone",
+                )
+            )
+        progress("fitting the gyro to the turns")
+        turns, skipped = _turns(recording, poses, settings.g_sensitivity)
+        findings += skipped
+        static_means = _gyro_means(recording, poses)
+        if turns is not None:
+            acc = poses.accelerometer
+            vertical_rate = settings.site.vertical_rate
+            gyro = _fit_gyro(turns, static_means, acc, scatter, settings.g_sensitivity, vertical_rate)
+            middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
+            drift = without_earth(static_means, acc.directions, gyro.model, vertical_rate)
+            findings += gyro_findings(middles, drift, acc.f, gyro, recording.gyro.unit.symbol)
+            if rms_miss(gyro) > WORST_MISS:
+                findings += axis_findings(turns, poses.accelerometer.directions, static_means[0])
+    joint = join(
+        poses.accelerometer, gyro, turns.durations if turns is not None and gyro is not None else np.zeros(0)
+    )
+    estimate = assemble(record, recording, poses, scatter, joint, settings, findings)
+    return Calibration(_timed(estimate, clock), recording, poses, gyro)
+
+
+def _timed(estimate: Estimate, clock: float) -> Estimate:
+    """The estimate with the time since ``clock`` as that of the solution."""
+    return replace(estimate, timing={"solve": time.perf_counter() - clock})
+
+
+def _scatter(poses: Poses) -> Scatter:
+    """Residual scatter, pooled with the noise at rest unless it clearly exceeds it (F test)."""
+    from scipy.special import fdtrc
+
+    fit, noise = poses.accelerometer.fit, float(np.mean(poses.noise_variance))
+    own = fit.chi2 / fit.dof
+    ratio = own / noise if noise > 0 else np.inf
+    if noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < EXCESS:
+        return Scatter(float(np.sqrt(own)), fit.dof, True, float(np.sqrt(ratio)))
+    return Scatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
+
+
+def _gyro_index(recording: Recording, sample: int) -> int:
+    """The gyro's sample at the time of a sample of the accelerometers."""
+    gyro, acc = recording.gyro, recording.accelerometer
+    assert gyro is not None
+    if gyro.t is acc.t:
+        return sample
+    return int(np.clip(np.searchsorted(gyro.t, acc.t[sample]), 0, len(gyro.t) - 1))
+
+
+def _gyro_means(recording: Recording, poses: Poses) -> Array:
+    """Mean gyro output (n, 3) in each pose."""
+    assert recording.gyro is not None
+    spans = [(_gyro_index(recording, d.start), _gyro_index(recording, d.stop - 1) + 1) for d in poses.dwells]
+    return np.array([np.nanmean(recording.gyro.values[a:b], axis=0) for a, b in spans])
+
+
+def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns | None, list[Finding]]:
+    """The turns between neighbouring poses that can be integrated, and what is said of the others."""
+    gyro = recording.gyro
+    assert gyro is not None
+    usual = np.median(np.diff(gyro.t))
+    limits = np.nanmin(gyro.values, axis=0), np.nanmax(gyro.values, axis=0)
+    spans, findings = [], []
+    for k, (here, there) in enumerate(zip(poses.dwells, poses.dwells[1:], strict=False)):
+        start, stop = _gyro_index(recording, here.stop - 1), _gyro_index(recording, there.start)
+        part, steps = gyro.values[start : stop + 1], np.diff(gyro.t[start : stop + 1])
+        if not np.isfinite(part).all() or not np.all((steps > 0) & (steps < 1.5 * usual)):
+            why = "samples are missing"
+        elif any(_flat_at(part, limit) for limit in limits):
+            why = "the gyro saturates"
+        else:
+            spans.append((k, start, stop))
+            continue
+        findings.append(Finding("skipped_turn", f"a turn is left out: {why}", f"rows {start + 1}-{stop + 1}"))
+    if len(spans) < FEWEST_TURNS:
+        findings.append(
+            Finding(
+                "gyro_missing",
+                f"found {len(spans)} turns between poses, expected at least {FEWEST_TURNS}: the gyro is not calibrated",
+            )
+        )
+        return None, findings
+    force = np.zeros_like(gyro.values)
+    if with_force:
+        acc = recording.accelerometer
+        f = poses.accelerometer.model.correct(acc.values)
+        same = gyro.t is acc.t
+        force = f if same else np.column_stack([np.interp(gyro.t, acc.t, column) for column in f.T])
+    return cut_turns(gyro.t, gyro.values, force, spans), findings
+
+
+def _flat_at(part: Array, limit: Array) -> bool:
+    """True if an axis stays at its limit for three samples or more."""
+    at = part == limit
+    return bool(np.any(at[2:] & at[1:-1] & at[:-2]))
+
+
+def _fit_gyro(
+    turns: Turns,
+    means: Array,
+    acc: AccelerometerFit,
+    scatter: Scatter,
+    with_g_sensitivity: bool,
+    vertical_rate: float,
+) -> GyroFit:
+    """Guess the scale, then fit."""
+    scale, _ = first_guess(turns, acc.directions, means[0])
+    start = TriadModel(np.full(3, scale), np.eye(3), means[0])
+    error = force_error(acc)
+    return fit_gyro(turns, means, acc.f, error, scatter.s, start, with_g_sensitivity, vertical_rate)

@@ -1,0 +1,179 @@
+"""What to say of a calibration: its status in words, the pose that would cure a weak one, its findings."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import rounded
+from inercal.estimate.status import Status
+from inercal.imu.accelerometer import AccelerometerFit
+from inercal.imu.gyro import GyroFit, first_guess, regress_static
+from inercal.imu.joint import Scatter
+from inercal.imu.poses import Poses
+from inercal.imu.turns import Turns
+from inercal.records.findings import Finding
+
+Array = NDArray[np.float64]
+
+WORST_CONDITION = 30.0
+"""Condition of the scaled Jacobian beyond which a fit is called ill-conditioned; good sets of poses have 3
+to 10."""
+
+WORST_MISS = 0.2
+"""Root-mean-square angle [rad] between carried and measured verticals beyond which gyro and accelerometers
+contradict each other."""
+
+EXCESS = 0.05
+"""Probability below which the scatter of the poses is not put down to the sensors' noise."""
+
+SIGNIFICANCE = 1e-3
+"""Probability below which chance is ruled out as the cause of what a finding says."""
+
+
+def pose_words(direction: Array) -> str:
+    """A direction of specific force in words: ``+x +y`` is half-way between +x up and +y up."""
+    size = np.max(np.abs(direction))
+    return " ".join(
+        f"{'+' if c > 0 else '-'}{axis}"
+        for c, axis in zip(direction, "xyz", strict=True)
+        if abs(c) > 0.3 * size
+    )
+
+
+def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
+    """The direction, of the 26 along axes, edges and corners, that tells most of the weakest combination."""
+    known = fit.fit.identifiability
+    weak = known.directions[-1] / known.scale
+    grid = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    grid /= np.linalg.norm(grid, axis=1, keepdims=True)
+    there = AccelerometerFit(fit.model, gravity * grid, fit.fit)
+    # residual |f| - g changes with the parameters as f does along its own direction
+    told = np.einsum("ni,nip,p->n", grid, there.force_sensitivity(), weak)
+    return np.asarray(grid[np.argmax(np.abs(told))])
+
+
+def rms_miss(gyro: GyroFit) -> float:
+    """Root-mean-square angle [rad] between the carried and the measured verticals."""
+    return float(np.sqrt(np.mean(np.sum(gyro.miss**2, axis=1))))
+
+
+def verdict(poses: Poses, gyro: GyroFit | None, gravity: float, u: dict[str, float]) -> tuple[Status, str]:
+    """Status and message; ``u`` the standard uncertainties by name."""
+    acc = poses.accelerometer
+    known = acc.fit.identifiability
+    if known.condition > WORST_CONDITION:
+        term = known.leading_term()
+        value = float(acc.fit.x[known.names.index(term)])
+        number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
+        lacking = known.rank < len(known.names)
+        return (
+            Status.UNOBSERVABLE if lacking else Status.ILL_CONDITIONED,
+            f"the {len(poses.dwells)} poses {'do not fix' if lacking else 'hardly fix'} {term} ({number}; weak "
+            f"combination {known.weakest()}, condition {known.condition:.0f}): add poses with the specific "
+            f"force along {pose_words(curing_pose(acc, gravity))} and its opposite",
+        )
+    if gyro is None:
+        return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
+    miss = rms_miss(gyro)
+    if not gyro.fit.converged:
+        return Status.NOT_CONVERGED, f"the fit of the gyro ended early: {gyro.fit.message}"
+    if miss > WORST_MISS:
+        return (
+            Status.INCONSISTENT,
+            f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
+            "carried through the turns): check the gyro's unit, signs and order of axes",
+        )
+    known = gyro.fit.identifiability
+    if known.condition > WORST_CONDITION:
+        term = known.leading_term()
+        return (
+            Status.UNOBSERVABLE if known.rank < len(known.names) else Status.ILL_CONDITIONED,
+            f"the {len(gyro.miss)} turns hardly fix {term} (weak combination {known.weakest()}, condition "
+            f"{known.condition:.0f}): add turns of 90 deg and more about every axis, each held horizontal",
+        )
+    return Status.OK, (
+        f"{len(u)} coefficients from {len(poses.dwells)} poses and {len(gyro.miss)} turns; condition "
+        f"{acc.fit.identifiability.condition:.1f} (accelerometers), {known.condition:.1f} (gyro)"
+    )
+
+
+def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
+    """Findings about the fit of the poses."""
+    dof = poses.accelerometer.fit.dof
+    if dof < 5:
+        yield Finding(
+            "few_degrees_of_freedom",
+            f"{len(poses.dwells)} poses leave {dof} degrees of freedom for nine parameters: the uncertainties "
+            "themselves are uncertain, record more poses",
+        )
+    if scatter.excess:
+        yield Finding(
+            "excess_scatter",
+            f"|f| scatters by {scatter.s:.2g} m/s^2 from pose to pose, {scatter.over_noise:.1f} times what the "
+            "noise at rest explains (the instrument was not quite still, or the model lacks a term); the "
+            "uncertainties use the scatter",
+        )
+
+
+def gyro_findings(times: Array, means: Array, f: Array, gyro: GyroFit, unit: str) -> Iterator[Finding]:
+    """Findings about the gyro's output at rest: drift with time, change with the pose."""
+    with_g = len(gyro.names) > 12
+    base = f if with_g else np.empty((len(f), 0))
+    span = times - times.mean()
+    p, fitted = _f_test(means, base, span[:, None])
+    if p < SIGNIFICANCE:
+        total = fitted[-1] * (times[-1] - times[0])
+        words = ", ".join(f"{axis} {d:+.3g}" for axis, d in zip("xyz", total, strict=True))
+        yield Finding(
+            "bias_drift",
+            f"the gyro bias drifts over the recording by {words} {unit}; D_F is its mean, and the scatter of "
+            "the poses is in its uncertainty",
+        )
+    if with_g or len(f) < 8:
+        return
+    p, fitted = _f_test(means, base, f)
+    if p < SIGNIFICANCE:
+        size = float(np.max(np.linalg.norm(fitted[1:4], axis=0)) * np.mean(np.linalg.norm(f, axis=1)))
+        yield Finding(
+            "g_sensitivity",
+            f"the gyro output at rest changes with the pose by up to {size:.3g} {unit} per g: "
+            "set imu.g_sensitivity = true to estimate it",
+        )
+
+
+def axis_findings(turns: Turns, verticals: Array, bias: Array) -> Iterator[Finding]:
+    """Whether other signs or another order of the gyro's axes would make sense of the turns."""
+    tried = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            axes = np.zeros((3, 3))
+            axes[range(3), order] = signs
+            tried.append((first_guess(turns, verticals, bias, axes)[1], order, signs))
+    miss, order, signs = min(tried)
+    if miss > WORST_MISS or (order == (0, 1, 2) and min(signs) > 0):
+        return
+    measured = ", ".join(
+        f"gyro_{name} seems to measure {'+' if sign > 0 else '-'}{'xyz'[axis]}"
+        for name, axis, sign in zip("xyz", order, signs, strict=True)
+    )
+    code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
+    yield Finding(code, f"against the accelerometers {measured}: check the order and signs in the map")
+
+
+def _f_test(means: Array, base: Array, more: Array) -> tuple[float, Array]:
+    """Probability that further regressors help by chance alone, over the three axes; their coefficients."""
+    from scipy.special import fdtrc
+
+    small, large = regress_static(means, base), regress_static(means, np.hstack([base, more]))
+    if large.dof < 3:
+        return 1.0, large.coefficients
+    rest = np.sum(large.residuals**2, axis=0)
+    gained = np.sum(small.residuals**2, axis=0) - rest
+    k = more.shape[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(rest > 0, (gained / k) / (rest / large.dof), 0.0)
+    return float(min(1.0, 3.0 * np.min(fdtrc(k, large.dof, ratio)))), large.coefficients

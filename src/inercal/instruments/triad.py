@@ -1,0 +1,50 @@
+"""Three sensors as one: the linear triad, forward from truth to indication and back.
+
+``y = S M x + b``, S diagonal scale [output per SI unit], M unit-diagonal misalignment, b the output at zero
+input [output]. M_ij is the response of sensor i to the input along j. An accelerometer triad that defines
+the frame has an upper-triangular M (x of the frame along sensor x, y in the plane of sensors x and y).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TriadModel:
+    """Coefficients of a triad: ``scale`` (3,), ``misalignment`` (3, 3) with unit diagonal, ``bias`` (3,)."""
+
+    scale: Array
+    misalignment: Array
+    bias: Array
+
+    @property
+    def gain(self) -> Array:
+        """S M (3, 3) [output per SI unit]."""
+        return self.scale[:, None] * self.misalignment
+
+    def indicate(self, x: Array) -> Array:
+        """Outputs (*batch, 3) for true inputs ``x`` (*batch, 3) in SI units."""
+        return x @ self.gain.T + self.bias
+
+    def correct(self, y: Array) -> Array:
+        """True inputs (*batch, 3) in SI units for outputs ``y`` (*batch, 3): the inverse of `indicate`."""
+        return (y - self.bias) @ np.linalg.inv(self.gain).T
+
+
+def triad_from_terms(values: Mapping[str, float], scale: str, misalignment: str, bias: str) -> TriadModel:
+    """A triad from values by term symbol (prefixes such as ``K1``, ``M``, ``K0``); absent terms are 0."""
+    matrix = np.eye(3)
+    for i, j in ((i, j) for i in range(3) for j in range(3) if i != j):
+        matrix[i, j] = values.get(f"{misalignment}_{'xyz'[i]}{'xyz'[j]}", 0.0)
+    return TriadModel(
+        np.array([values[f"{scale}_{axis}"] for axis in "xyz"]),
+        matrix,
+        np.array([values.get(f"{bias}_{axis}", 0.0) for axis in "xyz"]),
+    )

@@ -1,0 +1,1 @@
+"""Sensor noise: Allan variance and what follows from it."""

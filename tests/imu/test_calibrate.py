@@ -1,0 +1,230 @@
+"""The whole calibration: truth comes back, invariances hold, and bad recordings end with the right verdict."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recordings import arrays, record_of, shipped
+
+from inercal.errors import InputError
+from inercal.estimate.status import Status
+from inercal.geometry.site import GravityInput, Site
+from inercal.imu.settings import ImuSettings
+from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
+from inercal.imu.task import calibrate
+
+SITE = Site(9.81, (), 0.8)
+SETTINGS = ImuSettings(SITE)
+
+
+def recording(seed=1, poses=20, quiet=False, g_sensitivity=0.0, **options):
+    rng = np.random.default_rng(seed)
+    truth = draw_truth(rng, g_sensitivity)
+    if quiet:
+        truth = replace(truth, accelerometer_noise=Noise(1e-7), gyro_noise=Noise(1e-8))
+    return simulate(truth, hand_poses(rng, poses), SITE.gravity, 0.8, rng, **{"rate": 50.0} | options)
+
+
+def compare(estimate, truth):
+    true = truth.values()
+    return estimate.values - np.array([true[name] for name in estimate.names])
+
+
+@pytest.mark.parametrize("g_sensitivity", [0.0, 2e-4])
+def test_without_noise_the_truth_comes_back(g_sensitivity):
+    """What is left is the horizontal part of earth rate, 5e-5 rad/s in turns of 3 s: 1.5e-4 rad."""
+    record, truth = recording(quiet=True, g_sensitivity=g_sensitivity)
+    estimate = calibrate(record, replace(SETTINGS, g_sensitivity=g_sensitivity > 0)).estimate
+    assert estimate.status is Status.OK
+    error = dict(zip(estimate.names, compare(estimate, truth), strict=True))
+    for name, value in error.items():
+        size = {"K0": 415.0, "K1": 415.0, "M": 1.0, "D_F": 4775.0, "S": 4775.0, "T": 1.0, "G": 478.0}
+        relative = abs(value) / size[name.rpartition("_")[0]]
+        assert relative < (1e-5 if name[0] in "KM" else 3e-4), name
+
+
+def test_every_coefficient_within_five_standard_uncertainties():
+    record, truth = recording(seed=2, poses=30, g_sensitivity=2e-4)
+    estimate = calibrate(record, replace(SETTINGS, g_sensitivity=True)).estimate
+    assert estimate.names[-1] == "G_zz"
+    assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
+
+
+def test_another_output_unit_is_the_same_instrument():
+    """Outputs in m/s^2 and deg/s instead of counts: scaled coefficients, equal angles."""
+    record, _ = recording(seed=3)
+    t, acc, gyro = arrays(record)
+    counts = calibrate(record, SETTINGS).estimate
+    other = calibrate(record_of(t, acc / 400.0, gyro / 80.0, "m/s^2", "deg/s"), SETTINGS).estimate
+    for name in counts.names:
+        factor = {"K": 400.0, "D": 80.0, "S": 80.0}.get(name[0], 1.0)
+        # the fit of the turns stops at 1e-9 of the sum of squares, a millionth of the uncertainty
+        assert abs(other[name].value * factor - counts[name].value) < 1e-3 * counts[name].u
+        assert other[name].u * factor == pytest.approx(counts[name].u, rel=1e-3)
+    assert other["K1_x"].unit == "(m/s^2)/(m/s^2)"
+    assert other["S_x"].unit == "(deg/s)/(rad/s)"
+
+
+def test_turning_the_axes_of_the_frame_turns_the_coefficients():
+    """Relabelling x->y->z->x permutes biases and scales (misalignments follow another frame)."""
+    record, _ = recording(seed=4)
+    t, acc, gyro = arrays(record)
+    a = calibrate(record, SETTINGS).estimate
+    b = calibrate(record_of(t, np.roll(acc, 1, axis=1), np.roll(gyro, 1, axis=1)), SETTINGS).estimate
+    for here, there in zip("xyz", "yzx", strict=True):
+        assert abs(a[f"K0_{here}"].value - b[f"K0_{there}"].value) < 0.05 * a[f"K0_{here}"].u
+        assert abs(a[f"D_F_{here}"].value - b[f"D_F_{there}"].value) < 0.05 * a[f"D_F_{here}"].u
+
+
+def test_more_gravity_uncertainty_reaches_the_scales_only():
+    record, _ = recording(seed=5)
+    sure = calibrate(record, SETTINGS).estimate
+    unsure = calibrate(
+        record, ImuSettings(Site(9.81, (GravityInput("gravity", 0.01, "m/s^2", 1.0),), 0.8))
+    ).estimate
+    assert unsure["K1_x"].u == pytest.approx(
+        np.hypot(sure["K1_x"].u, sure["K1_x"].value * 0.01 / 9.81), rel=1e-3
+    )
+    assert unsure["K0_x"].u == pytest.approx(sure["K0_x"].u, rel=1e-9)
+    assert unsure["S_x"].u == pytest.approx(sure["S_x"].u, rel=1e-9)
+    item = next(item for item in unsure.budget if item.source == "gravity")
+    assert item.type == "B"
+    assert item.share["K1_x"] > 0.9
+    correlated = unsure.correlation[unsure.names.index("K1_x"), unsure.names.index("K1_y")]
+    assert correlated > 0.9
+
+
+def test_the_clock_reaches_the_gyro_scales_only():
+    record, _ = recording(seed=6)
+    sure = calibrate(record, SETTINGS).estimate
+    unsure = calibrate(record, replace(SETTINGS, time_base_u=1e-3)).estimate
+    assert unsure["S_y"].u == pytest.approx(np.hypot(sure["S_y"].u, sure["S_y"].value * 1e-3), rel=1e-3)
+    assert unsure["T_xy"].u == pytest.approx(sure["T_xy"].u, rel=1e-9)
+
+
+def test_a_slow_clock_changes_the_gyro_scale_in_proportion():
+    record, _ = recording(seed=7)
+    t, acc, gyro = arrays(record)
+    a = calibrate(record, SETTINGS).estimate
+    b = calibrate(record_of(1.01 * t, acc, gyro), SETTINGS).estimate
+    assert b["S_x"].value / a["S_x"].value == pytest.approx(1.01, rel=2e-4)
+    assert b["K1_x"].value == pytest.approx(a["K1_x"].value, rel=1e-4)
+
+
+def test_accelerometers_alone():
+    record, truth = recording(seed=8)
+    t, acc, _ = arrays(record)
+    estimate = calibrate(record_of(t, acc), SETTINGS).estimate
+    assert estimate.status is Status.OK
+    assert estimate.names[-1] == "M_yz"
+    assert [finding.code for finding in estimate.findings] == ["gyro_missing"]
+    assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
+
+
+def test_a_gyro_on_its_own_clock():
+    """Gyro at twice the rate, stamps of its own: the same answer within the noise of the extra samples."""
+    rng = np.random.default_rng(9)
+    truth = draw_truth(rng)
+    record, truth = simulate(truth, hand_poses(rng, 20), 9.81, 0.8, rng, rate=100.0)
+    t, acc, gyro = arrays(record)
+    mixed = record_of(t[::2], acc[::2], gyro, gyro_t=t)
+    estimate = calibrate(mixed, SETTINGS).estimate
+    assert estimate.status is Status.OK
+    assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
+
+
+def test_too_few_poses_say_how_many_were_found_and_what_to_do():
+    record, _ = recording(seed=10, poses=6)
+    estimate = calibrate(record, SETTINGS).estimate
+    assert estimate.status is Status.TOO_FEW_INTERVALS
+    assert estimate.message.startswith("found 6 static intervals")
+    assert "threshold" in estimate.message
+    assert not estimate.names
+
+
+def test_ten_poses_of_a_real_recording_are_ill_conditioned_and_name_the_misalignment():
+    record, settings = shipped("mpu6050")
+    estimate = calibrate(record, settings).estimate
+    assert estimate.status is Status.ILL_CONDITIONED
+    assert "M_xy" in estimate.message
+    assert "+x +y" in estimate.message
+    found = estimate["M_xy"]
+    # an independent fit of the same data: 0.066 +- 0.025 rad
+    assert abs(found.value - 0.066) < np.hypot(found.u, 0.025) * 2.0
+    assert 0.01 < found.u < 0.1
+    with pytest.raises(Exception, match="M_xy"):
+        estimate.raise_for_status()
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "words"),
+    [
+        (lambda g: g * [1, -1, 1], "sign_suspect", "gyro_y seems to measure -y"),
+        (lambda g: g[:, [1, 0, 2]], "channel_swap", "gyro_x seems to measure +y, gyro_y seems to measure +x"),
+    ],
+)
+def test_a_wrong_map_of_the_gyro_is_named(change, code, words):
+    record, _ = recording(seed=11)
+    t, acc, gyro = arrays(record)
+    estimate = calibrate(record_of(t, acc, change(gyro)), SETTINGS).estimate
+    assert estimate.status is Status.INCONSISTENT
+    assert any(f.code == code and words in f.message for f in estimate.findings)
+
+
+def test_what_cannot_be_integrated_is_left_out_and_said():
+    record, truth = recording(seed=12, poses=24)
+    t, acc, gyro = arrays(record)
+    middle = np.searchsorted(t, 31.5)  # in the first turn
+    gyro[middle] = np.nan
+    limit = gyro[middle + 300 : middle + 310, 0].max() + 1e6
+    gyro[middle + 300 : middle + 310, 0] = limit  # flat at an extreme in the second turn
+    estimate = calibrate(record_of(t, acc, gyro), SETTINGS).estimate
+    said = [f for f in estimate.findings if f.code == "skipped_turn"]
+    assert len(said) == 2
+    assert {"samples are missing", "the gyro saturates"} == {f.message.split(": ")[1] for f in said}
+    assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
+
+
+def test_a_gap_in_a_hold_does_not_join_what_it_parts():
+    record, _ = recording(seed=13)
+    t, acc, gyro = arrays(record)
+    t = t + np.where(np.arange(len(t)) >= 600, 5.0, 0.0)  # five seconds lost in the first hold
+    found = calibrate(record_of(t, acc, gyro), SETTINGS)
+    assert all(not (d.start < 600 < d.stop) for d in found.poses.dwells)
+
+
+def test_a_drifting_gyro_is_named():
+    record, _ = recording(seed=14)
+    t, acc, gyro = arrays(record)
+    estimate = calibrate(record_of(t, acc, gyro + 0.5 * t[:, None]), SETTINGS).estimate
+    assert any(f.code == "bias_drift" for f in estimate.findings)
+    assert not any(f.code == "bias_drift" for f in calibrate(record, SETTINGS).estimate.findings)
+
+
+def test_g_sensitivity_is_named_where_it_is_not_estimated():
+    record, _ = recording(seed=15, g_sensitivity=1e-3)
+    codes = [f.code for f in calibrate(record, SETTINGS).estimate.findings]
+    assert "g_sensitivity" in codes
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda t, a, w: (t[:5], a[:5], w[:5]), "samples"),
+        (lambda t, a, w: (t, a * np.nan, w), "expected"),
+        (lambda t, a, w: (t, np.zeros_like(a), w), "no noise"),
+        (lambda t, a, w: (t[2000:], a[2000:], w[2000:]), "moves"),
+        (lambda t, a, w: (t * 0.0, a, w), "time"),
+    ],
+)
+def test_a_recording_that_cannot_be_used_gets_a_sentence(spoil, sentence):
+    record, _ = recording(seed=16)
+    with pytest.raises(InputError, match=sentence):
+        calibrate(record_of(*spoil(*arrays(record))), SETTINGS)
+
+
+@pytest.mark.parametrize("start", [2.0, 60.0, 1e6])
+def test_a_static_start_that_does_not_fit_gets_a_sentence(start):
+    record, _ = recording(seed=17)
+    with pytest.raises(InputError, match=r"imu\.static_start: found"):
+        calibrate(record, replace(SETTINGS, static_start=start))

@@ -1,0 +1,133 @@
+"""The paper's own recording against the two programs that were run on it, and what else the page claims.
+
+imu_tk (C++) and the authors' MATLAB (in Octave), both with g = 9.81744 m/s^2. They write the correction
+T K (raw - b); in our terms K1 = 1/K, M = T^-1. Pass band: their own differences, or one standard uncertainty.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
+from recordings import shipped
+
+from inercal.estimate.status import Status
+from inercal.imu.poses import choose, prepare, sweep
+from inercal.imu.task import calibrate
+
+IMU_TK = {
+    "scale": [414.4588739254017, 412.01046845347594, 414.6486622431341],
+    "T": [-0.00335929903323467, -0.00890639474323122, -0.0213341193851847],
+    "bias": [33124.1825645617, 33275.1794341807, 32364.4156494431],
+    "gyro": [4777.955828030662, 4764.206560263323, 4773.65741055623],
+}
+_MATLAB_B = [0.0020248099270609257, -0.0025551442308292213, 0.010940996039930493]  # [m/s^2], after the scale
+MATLAB = {
+    "scale": [414.4083315760565, 412.04229658558194, 414.6101427152438],
+    "T": [-0.0033507088267299184, -0.00900869750234246, -0.02136509927856986],
+    "gyro": [4778.654075477091, 4764.254374291513, 4773.98869178265],
+}
+
+
+@pytest.fixture(scope="module")
+def xsens():
+    return calibrate(*shipped("xsens")).estimate
+
+
+@pytest.fixture(scope="module")
+def with_g():
+    return calibrate(*shipped("xsens", "imu.g_sensitivity=true")).estimate
+
+
+def correction(estimate):
+    """T of the correction T K (raw - b): the inverse of M; its upper part with standard uncertainties."""
+    xy, xz, yz = (estimate[f"M_{ij}"].value for ij in ("xy", "xz", "yz"))
+    T = np.linalg.inv(np.array([[1, xy, xz], [0, 1, yz], [0, 0, 1]]))
+    u = [estimate["M_xy"].u, np.hypot(estimate["M_xz"].u, abs(xy) * estimate["M_yz"].u), estimate["M_yz"].u]
+    return T[[0, 0, 1], [1, 2, 2]], u
+
+
+def test_it_is_sound(xsens):
+    assert xsens.status is Status.OK
+    assert xsens.statistics["intervals"] == 38
+    assert xsens.statistics["turns"] == 37
+
+
+@pytest.mark.parametrize("peer", [IMU_TK, MATLAB])
+def test_accelerometer_scales_and_misalignments_agree_with_both_programs(xsens, peer):
+    for axis, theirs in zip("xyz", peer["scale"], strict=True):
+        ours = xsens[f"K1_{axis}"]
+        assert abs(ours.value - theirs) <= max(1.5e-4 * theirs, ours.u)
+    for ours, u, theirs in zip(*correction(xsens), peer["T"], strict=True):
+        assert abs(ours - theirs) <= max(1.1e-4, u)
+
+
+def test_accelerometer_biases_agree_with_imu_tk(xsens):
+    for axis, theirs in zip("xyz", IMU_TK["bias"], strict=True):
+        ours = xsens[f"K0_{axis}"]
+        assert abs(ours.value - theirs) <= max(0.002 * xsens[f"K1_{axis}"].value, ours.u)
+
+
+@pytest.mark.parametrize("peer", [IMU_TK, MATLAB])
+def test_gyro_scales_agree_with_both_programs_within_U(xsens, peer):
+    for axis, theirs in zip("xyz", peer["gyro"], strict=True):
+        assert abs(xsens[f"S_{axis}"].value - theirs) <= xsens[f"S_{axis}"].U
+
+
+def test_the_data_fix_one_misalignment_four_times_worse_than_the_others(xsens):
+    assert xsens["M_xz"].u == pytest.approx(4.7e-4, rel=0.1)
+    assert xsens["M_xz"].u > 3 * xsens["M_xy"].u
+
+
+def test_the_poses_scatter_more_than_white_noise_and_more_than_all_noise_at_rest(xsens):
+    scatter = xsens.statistics["scatter"]
+    assert scatter == pytest.approx(1.1e-3, rel=0.05)
+    acc = shipped("xsens")[0].triad("acc").values[:5000]
+    samples = np.median([row["samples"] for row in xsens.result["intervals"]])
+    white = np.mean(np.std(np.diff(acc, axis=0), axis=0)) / np.sqrt(2) / 414.0 / np.sqrt(samples)
+    assert white == pytest.approx(2.9e-4, rel=0.1)
+    assert scatter / xsens.statistics["scatter_over_noise"] == pytest.approx(7e-4, rel=0.1)
+    assert any(finding.code == "excess_scatter" for finding in xsens.findings)
+
+
+def test_the_gyro_is_g_sensitive_and_modelling_it_shrinks_the_scatter_of_the_turns(xsens, with_g):
+    assert any(finding.code == "g_sensitivity" for finding in xsens.findings)
+
+    def turns(estimate):
+        return next(item.u for item in estimate.budget if item.source == "turn scatter")
+
+    assert turns(xsens) == pytest.approx(2.8e-3, rel=0.05)
+    assert turns(with_g) == pytest.approx(0.8e-3, rel=0.05)
+    size = max(np.hypot.reduce([with_g[f"G_{i}{j}"].value for j in "xyz"]) for i in "xyz") * 9.81744
+    assert 14 < size < 17
+    # significant: the sum of squares over the covariance is far beyond the chi-square of nine
+    rows = [with_g.names.index(f"G_{i}{j}") for i in "xyz" for j in "xyz"]
+    g = with_g.values[rows]
+    assert g @ np.linalg.solve(with_g.covariance[np.ix_(rows, rows)], g) > 200
+
+
+def test_the_scales_with_and_without_g_sensitivity_agree_within_the_larger_u(xsens, with_g):
+    for axis in "xyz":
+        assert abs(xsens[f"S_{axis}"].value - with_g[f"S_{axis}"].value) < xsens[f"S_{axis}"].u
+        assert with_g[f"S_{axis}"].u < 0.35 * xsens[f"S_{axis}"].u
+
+
+def test_against_the_factory(xsens):
+    for axis, sheet in zip("xyz", (415, 413, 415), strict=True):
+        assert 0.0008 < 1 - xsens[f"K1_{axis}"].value / sheet < 0.0024
+
+
+def test_the_threshold_hardly_matters():
+    record, settings = shipped("xsens")
+    recording = prepare(record, settings.static_start)
+    candidates = list(sweep(recording, settings.site.gravity))
+    best = choose(candidates)
+    s2 = best.accelerometer.fit.chi2 / best.accelerometer.fit.dof
+    u = np.sqrt(np.diag(best.accelerometer.fit.unit_covariance) * s2)
+    for other in candidates:
+        if len(other.dwells) >= 38 and other.multiple >= 4:
+            shift = np.abs(other.accelerometer.fit.x - best.accelerometer.fit.x)
+            assert np.all(shift < 0.5 * u)
+    assert {poses.with_gyro for poses in candidates} == {True, False}
