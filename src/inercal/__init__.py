@@ -1,3 +1,75 @@
-"""inercal."""
+"""inercal: calibrate inertial instruments, and say how sure one can be of every number.
+
+This page defines the words. Nothing here computes.
+
+Frames, signs, units
+    SI and radians inside. Another unit is written into a name (``bias_deg_per_h``) or beside a number at the
+    edge (files, command line, reports). The unit g is 9.80665 m/s^2; local gravity belongs to a site.
+    ``C_ab`` and ``q_ab`` take components in b to components in a; adjacent letters match: ``C_ab @ v_b``.
+    Quaternions are scalar first, Hamilton; q and -q are one attitude. Frames: i inertial, n of the site (with
+    z up where nothing else is said), b of the instrument (x along accelerometer x, y in the plane of
+    accelerometers x and y). Accelerometers read specific force: +g up at rest. Batch axes lead.
+
+Instruments, forward: truth to indication
+    triad          y = S M x + b: S scale factors, M unit-diagonal misalignment, b the output at zero input
+    accelerometers K1_i, M_ij, K0_i; gyro S_i, T_ij, D_F_i and g-sensitive drift G_ij
+
+Records: labelled columns (`inercal.records.record.Record`)
+    IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
+    turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's
+    selfcal        t, wc_x.. or gyro_x.., th_x.., acc_x..
+    aoa            t, a1 .. an, gyro, gyro_roll, gyro_yaw, point, trigger, theta_ref
+
+Uncertainty
+    u standard, U = k u expanded for 95.45 % (k from Student's t), type A from scatter, type B from elsewhere;
+    an `inercal.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
+
+Map, lower floors first; each imports only from those above its own line
+    errors, units              what goes wrong; texts with units
+    geometry                   rotations, earth, site
+    instruments                terms, triad
+    records                    record, findings, maps, read, write, dwells
+    estimate                   result, status, budget, linear, nonlinear, runs, coverage, exchange
+    noise                      allan
+    imu                        multi-position calibration: poses, accelerometer, turns, gyro, simulate, task
+    convert                    calibrations applied
+    study, report, examples    files people write; pages people read; recordings that ship
+    cli                        one module per verb
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inercal.estimate.exchange import load as load
+    from inercal.estimate.result import Estimate as Estimate
+    from inercal.imu.task import calibrate as calibrate_imu
+    from inercal.records.read import read as read
+    from inercal.records.record import Record as Record
 
 __version__ = "0.1.0"
+
+#: public name -> (module, name there); resolved when first asked for (PEP 562), so that importing is quick
+_WHERE = {
+    "Estimate": ("inercal.estimate.result", "Estimate"),
+    "Record": ("inercal.records.record", "Record"),
+    "calibrate_imu": ("inercal.imu.task", "calibrate"),
+    "load": ("inercal.estimate.exchange", "load"),
+    "read": ("inercal.records.read", "read"),
+}
+
+__all__ = ["Estimate", "Record", "calibrate_imu", "load", "read"]
+
+
+def __getattr__(name: str) -> object:
+    """Resolve a public name."""
+    if name not in _WHERE:
+        raise AttributeError(f"module 'inercal' has no attribute {name!r}")
+    from importlib import import_module
+
+    module, attribute = _WHERE[name]
+    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return [*__all__, "__version__"]

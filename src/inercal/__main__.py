@@ -1,0 +1,5 @@
+"""``python -m inercal``."""
+
+from inercal.cli import main
+
+main()

@@ -1,0 +1,58 @@
+"""``inercal inspect``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from inercal.cli.options import Files, MapFile, Output, read_record
+
+
+def inspect(files: Files, /, *, map_file: MapFile = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+    """Look at a recording: channels, units, rates, and everything suspicious about it.
+
+    --report writes a page with pictures of every channel. Findings do not change the exit code.
+
+    Example: inercal inspect log.csv --report log.html
+    """
+    from inercal import __version__
+    from inercal.estimate.exchange import plain_objects
+    from inercal.report.inspection import inspection_pictures, render_inspection, sparkline, summary
+
+    output.check(".json")
+    record = read_record(files, map_file, output)
+    rows = summary(record)
+    findings = [{"code": f.code, "message": f.message, "where": f.where} for f in record.findings]
+    words = (
+        f"{len(findings)} finding{'' if len(findings) == 1 else 's'}" if findings else "nothing suspicious"
+    )
+    data: dict[str, Any] = plain_objects(
+        {
+            "inercal": __version__,
+            "command": "inspect",
+            "status": {"code": "ok", "message": words},
+            "findings": findings,
+            "inputs": [{"path": s.path, "sha256": s.sha256} for s in record.sources],
+            "result": {"channels": [vars(row) for row in rows]},
+        }
+    )
+    if output.out is not None:
+        import json
+
+        from inercal._files import write_text
+
+        write_text(output.out, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
+        output.say(f"findings: {output.out}")
+    if output.report is not None:
+        from inercal._files import write_text
+
+        write_text(output.report, render_inspection(record, rows, inspection_pictures(record)))
+        output.say(f"report: {output.report}")
+    lines = [
+        f"{row.name:11s} {sparkline(record[row.name].values):24s} {row.samples} samples at {row.rate:.5g} Hz, "
+        f"mean {row.mean:.6g}, sd {row.deviation:.3g}, {row.minimum:.6g} to {row.maximum:.6g} {row.unit}"
+        for row in rows
+    ]
+    lines += [f"{f.code}: {f.message}{f' ({f.where})' if f.where else ''}" for f in record.findings] or [
+        words
+    ]
+    output.emit(data, "\n".join(lines))

@@ -1,0 +1,49 @@
+"""``inercal new``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from inercal.cli.options import Output
+from inercal.errors import InputError
+
+
+def new_imu(
+    files: Annotated[list[Path] | None, Parameter(help="Recordings, to guess a column map from.")] = None,
+    /,
+    *,
+    output: Output = Output(),  # noqa: B008  (frozen)
+) -> None:
+    """Write a commented study for `inercal calibrate imu`, and a map guessed from the recording.
+
+    The study goes to --out (imu.toml if absent), the map beside it with -map before the suffix. Nothing that
+    exists is overwritten.
+
+    Example: inercal new imu log.csv --out imu.toml
+    """
+    from inercal._files import write_text
+    from inercal.records.guess import guess_map
+    from inercal.study.template import imu_template
+
+    output.check(".toml")
+    study = output.out or Path("imu.toml")
+    map_file = study.with_name(f"{study.stem}-map{study.suffix}")
+    text = guess_map(files) if files else None
+    for path in (study, map_file) if text is not None else (study,):
+        if path.exists():
+            raise InputError(path, "exists already, expected a new file name (--out)")
+    written = [study]
+    write_text(study, imu_template(files or ()))
+    if text is not None:
+        write_text(map_file, text)
+        written.append(map_file)
+    output.emit(
+        {
+            "command": "new",
+            "result": {"study": str(study), "map": str(map_file) if text is not None else None},
+        },
+        "\n".join(f"{path}: look it over and correct it" for path in written),
+    )

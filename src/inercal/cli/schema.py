@@ -1,0 +1,24 @@
+"""``inercal schema``."""
+
+from __future__ import annotations
+
+from inercal.cli.options import Output
+
+
+def schema(*, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+    """Print one JSON Schema that covers every kind of study file, for editors and checkers.
+
+    Example: inercal schema --out inercal.schema.json
+    """
+    import json
+
+    from inercal._files import write_text
+    from inercal.study.schema import json_schema
+
+    output.check(".json")
+    found = json_schema()
+    if output.out is not None:
+        write_text(output.out, json.dumps(found, indent=1) + "\n")
+        output.say(f"schema: {output.out}")
+    else:
+        print(json.dumps(found, indent=1))
