@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.result import Estimate
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.poses import Poses, dwells_at
 from inercal.imu.verdict import WORST_CONDITION, curing_pose, pose_words
 from inercal.records.places import counted
+from inercal.report.figures import budget, correlation
 from inercal.report.html import Picture
 from inercal.report.style import (
     ALARM,
@@ -57,7 +57,7 @@ def pictures(calibration: Calibration) -> list[Picture]:
         durations = np.array([turn["duration_s"] for turn in estimate.result["turns"]])
         drawn.append(_misses(gyro, durations, estimate.statistics["scatter"]))
     if estimate.names:
-        drawn += [_correlation(estimate), _budget(estimate)]
+        drawn += [correlation(estimate), budget(estimate)]
     return drawn
 
 
@@ -256,70 +256,3 @@ def _whole_numbers(axes: Axes, label: str) -> None:
     axes.set_xlabel(label)
     axes.margins(x=0.02)
     axes.grid(axis="y")
-
-
-def _correlation(estimate: Estimate) -> Picture:
-    """Correlation matrix, below its diagonal."""
-    names, r = estimate.names, estimate.correlation
-    below = np.tri(len(names), k=-1, dtype=bool)
-    with figure(WIDTH, 0.7 + 0.185 * len(names)) as page:
-        axes = page.subplots()
-        mesh = axes.pcolormesh(np.where(below, r, np.nan), cmap=DIVERGING, vmin=-1.0, vmax=1.0)
-        for row, column in np.argwhere(below & (np.abs(r) >= 0.3)):
-            strong = abs(r[row, column]) > 0.6
-            axes.text(
-                column + 0.5,
-                row + 0.5,
-                f"{100 * r[row, column]:.0f}",
-                fontsize=5,
-                ha="center",
-                va="center_baseline",
-                color="white" if strong else INK,
-            )
-        places = np.arange(len(names)) + 0.5
-        axes.set_xticks(places[:-1], names[:-1], rotation=90, fontsize=6.5)
-        axes.set_yticks(places[1:], names[1:], fontsize=6.5)
-        axes.tick_params(length=0)
-        axes.set_ylim(len(names), 1)
-        axes.set_xlim(0, len(names) - 1)
-        axes.set_aspect("equal")
-        for spine in axes.spines.values():
-            spine.set_visible(False)
-        page.colorbar(mesh, ax=axes, shrink=0.6, label="correlation coefficient")
-        drawn = svg(page)
-    return Picture(
-        "Correlation of the coefficients",
-        "Correlation coefficients of the estimates; those of 0.3 and more are written in hundredths.",
-        drawn,
-    )
-
-
-def _budget(estimate: Estimate) -> Picture:
-    """Shares of the sources in the variance of each coefficient."""
-    names = estimate.names
-    left = np.zeros(len(names))
-    with figure(WIDTH, 0.9 + 0.155 * len(names)) as page:
-        axes = page.subplots()
-        for k, item in enumerate(estimate.budget):
-            share = 100.0 * np.array([item.share.get(name, 0.0) for name in names])
-            axes.barh(
-                names,
-                share,
-                left=left,
-                height=0.75,
-                color=COLOURS[k % len(COLOURS)],
-                label=f"{item.source} ({item.type})",
-            )
-            left += share
-        axes.set_ylim(len(names) - 0.4, -0.6)
-        axes.set_xlim(0.0, 100.0)
-        axes.set_xlabel("share of the variance [%]")
-        axes.tick_params(axis="y", length=0, labelsize=7)
-        page.legend(loc="outside upper center", ncols=3)
-        drawn = svg(page)
-    return Picture(
-        "Where the uncertainty comes from",
-        "Share of each source in the variance u² of each coefficient; in brackets whether it was evaluated from the "
-        "scatter of the data (type A) or is known from elsewhere (type B).",
-        drawn,
-    )

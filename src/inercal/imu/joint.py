@@ -87,8 +87,8 @@ def join(accelerometer: AccelerometerFit, gyro: GyroFit | None, durations: Array
     )
 
 
-def type_a(joint: Joint, scatter: Scatter) -> list[TypeA]:
-    """What the scatter in the data does to the parameters."""
+def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
+    """What the scatter in the data does to the parameters; ``gyro_unit`` is that of the gyro's output."""
     sources = [
         TypeA(
             "pose scatter", scatter.s, "m/s^2", scatter.s**2 * joint.by_force @ joint.by_force.T, scatter.dof
@@ -104,7 +104,7 @@ def type_a(joint: Joint, scatter: Scatter) -> list[TypeA]:
     output = np.tile(gyro.static.scatter**2, joint.by_output.shape[1] // 3)
     size = float(np.sqrt(np.mean(gyro.static.scatter**2)))
     covariance = (joint.by_output * output) @ joint.by_output.T
-    sources.append(TypeA("gyro output at rest", size, "output", covariance, gyro.static.dof))
+    sources.append(TypeA("gyro output at rest", size, gyro_unit, covariance, gyro.static.dof))
     return sources
 
 

@@ -14,9 +14,10 @@ from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.poses import FEWEST, MULTIPLES, Poses, Recording, distinct, dwells_at
 from inercal.imu.settings import ImuSettings
-from inercal.imu.verdict import rms_miss, verdict
+from inercal.imu.verdict import rms_miss, spread_words, verdict
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
+from inercal.records.places import counted
 from inercal.records.record import Record, Triad
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ def assemble(
     findings: list[Finding],
 ) -> Estimate:
     """Put the estimate together."""
-    from_scatter = type_a(joint, scatter)
+    from_scatter = type_a(joint, scatter, "" if recording.gyro is None else recording.gyro.unit.symbol)
     covariance, dof, budget = combine(
         joint.names, [*from_scatter, *type_b(joint, settings.site, settings.time_base_u)]
     )
@@ -177,16 +178,26 @@ def _turn_table(joint: Joint) -> list[Mapping[str, Any]]:
     ]
 
 
-def too_few(record: Record, recording: Recording, settings: ImuSettings) -> Estimate:
-    """The estimate of a recording without enough poses: no parameters, and what to do."""
-    y = recording.accelerometer.values
-    counts = {m: len(distinct(dwells_at(recording, m, False), y, recording.window)) for m in MULTIPLES}
-    best = max(counts, key=lambda multiple: counts[multiple])
-    message = (
-        f"found {counts[best]} static intervals of at least {recording.window / recording.accelerometer.rate:.1f} s "
-        f"at a threshold of {best:g} times the variance at rest, expected at least {FEWEST}: hold the instrument "
-        "still for 2 s and more in 12 to 40 different poses, each side up and the edges between"
-    )
+def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> Estimate:
+    """The estimate of a recording whose poses fix nothing: no parameters, but why, and what to do."""
+    y, window = recording.accelerometer.values, recording.window
+    found = {m: distinct(dwells_at(recording, m, False), y, window) for m in MULTIPLES}
+    best = max(found, key=lambda m: len(found[m]))
+    dwells = found[best]
+    if len(dwells) < FEWEST:
+        status = Status.TOO_FEW_INTERVALS
+        message = (
+            f"found {counted(len(dwells), 'static interval')} of at least {window / recording.accelerometer.rate:.1f} "
+            f"s at a threshold of {best:g} times the variance at rest, expected at least {FEWEST}: hold the "
+            "instrument still for 2 s and more in 12 to 40 different poses, each side up and the edges between"
+        )
+    else:
+        status = Status.UNOBSERVABLE
+        message = (
+            f"the {len(dwells)} poses do not fix the nine coefficients of the accelerometers (the specific force lies "
+            f"{spread_words(np.array([dwell.of(y).mean(axis=0) for dwell in dwells]))}): hold each side up, and the "
+            "edges between"
+        )
     return Estimate(
         command=COMMAND,
         names=(),
@@ -195,10 +206,10 @@ def too_few(record: Record, recording: Recording, settings: ImuSettings) -> Esti
         covariance=np.zeros((0, 0)),
         dof=np.zeros(0),
         k=np.zeros(0),
-        status=Status.TOO_FEW_INTERVALS,
+        status=status,
         message=message,
         findings=record.findings,
-        statistics={"intervals": float(counts[best]), "threshold": best},
+        statistics={"intervals": float(len(dwells)), "threshold": best},
         model=MODEL,
         traceability=settings.traceability,
         inputs=record.sources,

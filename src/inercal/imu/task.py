@@ -13,7 +13,7 @@ from inercal.estimate.result import Estimate
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.gyro import GyroFit, first_guess, fit_gyro, without_earth
 from inercal.imu.joint import Scatter, force_error, join
-from inercal.imu.outcome import assemble, too_few
+from inercal.imu.outcome import assemble, without_fit
 from inercal.imu.poses import Poses, Recording, choose, prepare, sweep
 from inercal.imu.settings import ImuSettings
 from inercal.imu.turns import Turns, cut_turns
@@ -77,7 +77,7 @@ def calibrate(
     gravity = settings.site.gravity
     candidates = list(sweep(recording, gravity))
     if not candidates:
-        return Calibration(_timed(too_few(record, recording, settings), clock), recording)
+        return Calibration(_timed(without_fit(record, recording, settings), clock), recording)
     poses = choose(candidates)
     scatter = _scatter(poses)
     findings = [*scatter_findings(poses, scatter)]

@@ -16,6 +16,7 @@ from inercal.imu.joint import Scatter
 from inercal.imu.poses import Poses
 from inercal.imu.turns import Turns
 from inercal.records.findings import Finding
+from inercal.records.places import counted
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,14 @@ def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
     # residual |f| - g changes with the parameters as f does along its own direction
     told = np.einsum("ni,nip,p->n", grid, there.force_sensitivity(), weak)
     return np.asarray(grid[np.argmax(np.abs(told))])
+
+
+def spread_words(means: Array) -> str:
+    """How the mean outputs of the poses are spread, in words, where they do not fill a sphere."""
+    s = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)
+    if s[1] < 0.05 * s[0]:
+        return "along one line"
+    return "in one plane" if s[2] < 0.05 * s[0] else "too unevenly"
 
 
 def rms_miss(gyro: GyroFit) -> float:
@@ -107,8 +116,8 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
     if dof < 5:
         yield Finding(
             "few_degrees_of_freedom",
-            f"{len(poses.dwells)} poses leave {dof} degrees of freedom for nine parameters: the uncertainties "
-            "themselves are uncertain, record more poses",
+            f"{len(poses.dwells)} poses leave {counted(dof, 'degree')} of freedom for nine parameters: the "
+            "uncertainties themselves are uncertain, record more poses",
         )
     if scatter.excess:
         yield Finding(

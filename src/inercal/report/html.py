@@ -1,0 +1,232 @@
+"""An estimate as one self-contained HTML page, in the order a metrologist reads it."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from inercal.estimate.budget import BudgetItem
+from inercal.estimate.exchange import plain_objects
+from inercal.estimate.result import Estimate, Parameter, rounded
+from inercal.estimate.status import Status
+from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD, TERMS
+from inercal.report.style import plain_unit
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a page: its ``title``, what it shows in words, and the drawing itself."""
+
+    title: str
+    caption: str
+    svg: str
+
+    @property
+    def uri(self) -> str:
+        """The drawing as a ``data:`` address, so that the names inside it never meet those of another."""
+        return "data:image/svg+xml;base64," + base64.b64encode(self.svg.encode()).decode()
+
+
+_GROUPS = {
+    "Accelerometers": frozenset(ACCELEROMETER_TRIAD),
+    "Gyro": frozenset(GYRO_TRIAD + GYRO_G_SENSITIVITY),
+}
+
+#: key -> plain name and unit, where the key alone does not say them
+_LABELS = {
+    "dof": ("degrees of freedom", ""),
+    "condition": ("condition number of the scaled Jacobian", ""),
+    "residual_rms": ("root-mean-square residual |f| − g", "m/s²"),
+    "residual_m_s2": ("residual |f| − g", "m/s²"),
+    "scatter": ("standard deviation of |f| in a pose about the fit", "m/s²"),
+    "scatter_over_noise": ("that deviation over what the noise at rest explains", ""),
+    "threshold": ("threshold of rest, in variances of the initial static period", ""),
+    "intervals": ("static poses", ""),
+    "turns": ("turns", ""),
+    "gyro_dof": ("degrees of freedom of the turns", ""),
+    "gyro_condition": ("condition number of the scaled Jacobian, gyro", ""),
+    "gyro_residual_rms_rad": ("root-mean-square miss of the turns", "rad"),
+    "miss_rad": ("miss", "rad"),
+    "direction": ("direction of the specific force", ""),
+}
+_UNITS = {"_m_s2": "m/s²", "_rad": "rad", "_hz": "Hz", "_s": "s"}
+
+
+def render(estimate: Estimate, pictures: Sequence[Picture], title: str) -> str:
+    """The report of an estimate.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        Of any command and any status, with or without parameters.
+    pictures : sequence of Picture
+        In the order they are to be shown.
+    title : str
+        Heading of the page.
+
+    Returns
+    -------
+    str
+        HTML that needs nothing but itself: no script, no network, no font.
+    """
+    result = plain_objects(estimate.result)
+    return page(
+        "estimate.html",
+        title=title,
+        estimate=estimate,
+        heading=_heading(estimate),
+        mood={Status.OK: "good", Status.ILL_CONDITIONED: "doubtful"}.get(estimate.status, "bad"),
+        groups=_groups(estimate),
+        conditions=[
+            (*_labelled(keys), text)
+            for keys, text in _leaves(plain_objects(estimate.conditions))
+            if keys != ("date",)
+        ],
+        pictures=pictures,
+        sources=estimate.budget,
+        tables=[_table(key, value) for key, value in result.items() if _is_table(value)],
+        statistics=[(*_labelled((key,)), _short(value)) for key, value in estimate.statistics.items()],
+        provenance=[
+            ("command", estimate.command),
+            *((key, value) for key, value in result.items() if isinstance(value, str)),
+            *((".".join(keys), text) for keys, text in _leaves(plain_objects(estimate.provenance))),
+        ],
+    )
+
+
+def page(template: str, **content: Any) -> str:
+    """A page of this package made from one of its templates; whatever is put in is escaped."""
+    import jinja2
+
+    from inercal import __version__
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("inercal.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"unit": plain_unit, "percent": _percent, "text": _text}
+    environment.globals["version"] = __version__
+    return environment.get_template(template).render(**content)
+
+
+def _heading(estimate: Estimate) -> list[tuple[str, str]]:
+    """Who calibrated what, when, against which reference: the four that must be there, and any others."""
+    given = estimate.traceability
+    first = ("instrument", "date", "operator", "reference")
+    return [(key, given.get(key, "")) for key in first] + [
+        (key, text) for key, text in given.items() if key not in first
+    ]
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A coefficient as it is printed."""
+
+    parameter: Parameter
+    name: str
+    value: str
+    u: str
+    U: str
+    dof: str
+    shares: tuple[float | None, ...]
+
+
+def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
+    """The coefficients by instrument, each with its printed numbers and its shares of the budget."""
+    groups: dict[str, list[_Row]] = {}
+    for p in estimate.parameters.values():
+        group = next((name for name, symbols in _GROUPS.items() if p.name in symbols), "Coefficients")
+        groups.setdefault(group, []).append(_row(p, estimate.budget))
+    return list(groups.items())
+
+
+def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _Row:
+    """One coefficient, rounded as in `Estimate.table`."""
+    value, u, U = rounded(p.value, p.u, p.U)
+    name = TERMS[p.name].name if p.name in TERMS else ""
+    dof = "∞" if math.isinf(p.dof) else f"{p.dof:.{0 if p.dof >= 100 else 1}f}"
+    return _Row(p, name, value, u, U, dof, tuple(item.share.get(p.name) for item in budget))
+
+
+def _percent(share: float) -> str:
+    """A share in percent; what is tiny says so."""
+    percent = 100.0 * share
+    return "< 0.1" if percent < 0.1 else f"{percent:.1f}" if percent < 10 else f"{percent:.0f}"
+
+
+def _leaves(value: Any, keys: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is in nested tables, each leaf with the keys that lead to it; empty ones are left out."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, (*keys, key))
+    elif value not in (None, "", []):
+        interval = "ranges" in keys and isinstance(value, list) and len(value) == 2
+        yield keys, " to ".join(map(_text, value)) if interval else _text(value)
+
+
+def _text(value: Any) -> str:
+    """A leaf as text."""
+    match value:
+        case None:
+            return "–"
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.7g}" if math.isfinite(value) else "–"
+        case list():
+            return "(" + ", ".join(map(_text, value)) + ")"
+        case _:
+            return str(value)
+
+
+def _labelled(keys: tuple[str, ...]) -> tuple[str, str]:
+    """Keys as words, and the unit that the last one ends with."""
+    *path, last = ("recorded" if key == "ranges" else key for key in keys)
+    plain = ((last.removesuffix(end), unit) for end, unit in _UNITS.items() if last.endswith(end))
+    words, unit = _LABELS.get(last) or next(plain, (last, ""))
+    return " ".join([*path, words]).replace("_", " "), unit
+
+
+def _is_table(value: Any) -> bool:
+    """True for rows with the same keys."""
+    return (
+        bool(value)
+        and isinstance(value, list)
+        and all(isinstance(row, dict) and row.keys() == value[0].keys() for row in value)
+    )
+
+
+def _table(key: str, rows: Sequence[Mapping[str, Any]]) -> tuple[str, list[tuple[str, str]], list[list[str]]]:
+    """Title, columns (name and unit) and cells of rows of the result."""
+    title, _ = _labelled((key,))
+    heads = [_labelled((name,)) for name in rows[0]]
+    columns = [_column([row[name] for row in rows]) for name in rows[0]]
+    return title, heads, [list(cells) for cells in zip(*columns, strict=True)]
+
+
+def _column(values: Sequence[Any]) -> list[str]:
+    """Cells of a column; numbers with as many decimals as give the largest four digits."""
+    numbers = [x for x in values if isinstance(x, float) and math.isfinite(x)]
+    largest = max(map(abs, numbers), default=0.0)
+    if len(numbers) < len(values) or not 1e-6 < largest < 1e9:
+        return [_short(value) for value in values]
+    places = max(0, 3 - math.floor(math.log10(largest)))
+    return [f"{x:.{places}f}" for x in numbers]
+
+
+def _short(value: Any) -> str:
+    """A leaf as text, to four digits; vectors to three decimals."""
+    match value:
+        case float() if math.isfinite(value):
+            return f"{value:.4g}"
+        case list():
+            items = (f"{round(x, 3) + 0.0:.3f}" if isinstance(x, float) else _text(x) for x in value)
+            return f"({', '.join(items)})"
+        case _:
+            return _text(value)

@@ -1,0 +1,159 @@
+"""What ``inercal inspect`` shows of a recording: numbers, a line of blocks, figures, and a page of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.records.findings import Finding
+from inercal.records.record import Column, Record
+from inercal.report.html import Picture, page
+from inercal.report.style import ALARM, COLOURS, WIDTH, envelope, figure, plain_unit, svg
+
+Array = NDArray[np.float64]
+
+_BLOCKS = "▁▂▃▄▅▆▇█"
+_ROWS = re.compile(r"(?:.*, )?rows? ((?:\d+(?:-\d+)?(?:, )?)+)")
+
+
+@dataclass(frozen=True)
+class ChannelSummary:
+    """A channel in numbers.
+
+    ``samples`` counts all rows and ``missing`` those that hold no finite number; ``rate`` [Hz] is the median
+    one; ``mean``, ``deviation`` (standard deviation), ``minimum`` and ``maximum`` are in ``unit``. What cannot
+    be said is NaN.
+    """
+
+    name: str
+    unit: str
+    samples: int
+    missing: int
+    rate: float
+    mean: float
+    deviation: float
+    minimum: float
+    maximum: float
+
+
+def summary(record: Record) -> tuple[ChannelSummary, ...]:
+    """The channels of a record in numbers, in the order they were read."""
+    clocks = {id(column.t): column.t for column in record.columns.values()}
+    rates = {key: _rate(t) for key, t in clocks.items()}
+    return tuple(_summary(column, rates[id(column.t)]) for column in record.columns.values())
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _summary(column: Column, rate: float) -> ChannelSummary:
+    """One channel in numbers."""
+    known = column.values[np.isfinite(column.values)]
+    numbers = (
+        known.mean() if known.size else np.nan,
+        known.std(ddof=1) if known.size > 1 else np.nan,
+        known.min() if known.size else np.nan,
+        known.max() if known.size else np.nan,
+    )
+    total = len(column.values)
+    return ChannelSummary(
+        column.name, column.unit.symbol, total, total - known.size, rate, *(float(x) for x in numbers)
+    )
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _rate(t: Array) -> float:
+    """Median sample rate [Hz] of the stamps that go forward; NaN if none does."""
+    steps = np.diff(t)
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    return float(1.0 / np.median(steps)) if steps.size else float("nan")
+
+
+def sparkline(values: Array, width: int = 24) -> str:
+    """A signal as a line of at most ``width`` blocks, each the mean of a piece of it.
+
+    A piece without a number is a space; a signal that never changes runs at half height.
+
+    Examples
+    --------
+    >>> sparkline(np.array([0.0, 1.0, 2.0, np.nan, 7.0]))
+    '▁▂▃ █'
+    """
+    known = np.isfinite(values)
+    size = float(np.max(np.abs(values), initial=0.0, where=known))
+    if not known.any():
+        return " " * min(width, len(values))
+    edges = np.linspace(0, len(values), min(width, len(values)), endpoint=False).astype(np.int64)
+    sums = np.add.reduceat(np.where(known, values, 0.0) / (size or 1.0), edges)
+    counts = np.add.reduceat(known.astype(float), edges)
+    means = np.divide(sums, counts, out=np.full(len(edges), np.nan), where=counts > 0)
+    low, high = np.nanmin(means), np.nanmax(means)
+    height = (means - low) / (high - low) if high > low else np.where(counts > 0, 0.5, np.nan)
+    return "".join(
+        " " if np.isnan(h) else _BLOCKS[min(int(h * len(_BLOCKS)), len(_BLOCKS) - 1)] for h in height
+    )
+
+
+def inspection_pictures(record: Record) -> list[Picture]:
+    """One picture for each sensor of a record: its channels over time, with the findings that have a place."""
+    sensors: dict[str, list[Column]] = {}
+    for column in record.columns.values():
+        sensors.setdefault(column.sensor, []).append(column)
+    return [_picture(sensor, columns, record.findings) for sensor, columns in sensors.items()]
+
+
+def _picture(sensor: str, columns: Sequence[Column], findings: Sequence[Finding]) -> Picture:
+    """The channels of one sensor above each other."""
+    with figure(WIDTH, 0.5 + 1.15 * len(columns)) as page:
+        panels = page.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
+        for k, (axes, column) in enumerate(zip(panels, columns, strict=True)):
+            axes.plot(*envelope(column.t, column.values), color=COLOURS[k % len(COLOURS)], lw=0.6)
+            axes.set_ylabel(f"{column.name}\n[{plain_unit(column.unit.symbol)}]")
+            axes.margins(x=0.005)
+            for number, (begin, end) in _marks(column, findings):
+                axes.axvspan(begin, end, color=ALARM, alpha=0.25, lw=0.8)
+                axes.annotate(
+                    f"{number}", (begin, 1.0), xycoords=axes.get_xaxis_transform(), color=ALARM, fontsize=6.5,
+                    ha="center", va="bottom",
+                )  # fmt: skip
+        panels[-1].set_xlabel("time [s]")
+        drawn = svg(page)
+    return Picture(
+        sensor,
+        "Channels as they were read; where there are more samples than fit, the least and greatest values of "
+        "pieces of the recording. Red: findings, by their number.",
+        drawn,
+    )
+
+
+def _marks(column: Column, findings: Sequence[Finding]) -> list[tuple[int, tuple[float, float]]]:
+    """Number and time span of the findings about a column, for each place they name."""
+    subjects = (column.name, "t", f"t of {Path(column.source.path).name}")
+    marks = []
+    for number, finding in enumerate(findings, 1):
+        rows = _ROWS.match(finding.where)
+        if rows is None or finding.message.partition(":")[0] not in subjects:
+            continue
+        for first, last in re.findall(r"(\d+)(?:-(\d+))?", rows[1]):
+            stamps = column.t[int(first) - 1 : int(last or first)]
+            stamps = stamps[np.isfinite(stamps)]
+            if stamps.size:
+                marks.append((number, (float(stamps.min()), float(stamps.max()))))
+    return marks
+
+
+def render_inspection(record: Record, rows: Sequence[ChannelSummary], pictures: Sequence[Picture]) -> str:
+    """The page of a recording: its channels in numbers (see `summary`), findings and pictures.
+
+    Returns
+    -------
+    str
+        HTML that needs nothing but itself.
+    """
+    files = ", ".join(Path(source.path).name for source in record.sources)
+    return page(
+        "inspection.html", title=f"Recording {files}".strip(), record=record, rows=rows, pictures=pictures
+    )

@@ -1,0 +1,134 @@
+"""The figures' common style: colours, sizes, and how a long signal is drawn.
+
+Figures are made without pyplot. Text becomes outlines, so that it looks the same wherever the page is read;
+names and units are taken literally, never as formulas.
+"""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+WIDTH = 7.1
+"""Width of a figure [inch]: the text width of an A4 page."""
+
+COLOURS = ("#4477AA", "#EE8866", "#44AA99", "#CCBB44", "#AA4499", "#77AADD", "#999933", "#BBBBBB")
+"""Colours of data, told apart by colour-blind readers too (after P. Tol's schemes)."""
+
+INK, QUIET, ALARM = "#22303C", "#8A949E", "#C03A2B"
+"""Colours of text, of what stands back, and of what matters."""
+
+DIVERGING = "RdBu_r"
+"""Colour map of numbers with a sign."""
+
+_STYLE: Any = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": QUIET,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 8.5,
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "grid.color": "#E3E7EB",
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 0.8,
+    "lines.markersize": 4.0,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "inercal",
+    "text.color": INK,
+    "text.parse_math": False,
+    "xtick.color": INK,
+    "xtick.labelsize": 7.5,
+    "xtick.major.width": 0.6,
+    "ytick.color": INK,
+    "ytick.labelsize": 7.5,
+    "ytick.major.width": 0.6,
+}
+
+_LOCK = threading.RLock()
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    """Matplotlib's settings for the time being ours, in one thread at a time."""
+    import matplotlib
+
+    with _LOCK, matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_STYLE)
+        yield
+
+
+@contextmanager
+def figure(width: float, height: float) -> Iterator[Figure]:
+    """An empty figure of ``width`` and ``height`` [inch], to be drawn on and made SVG within the block."""
+    from matplotlib.figure import Figure
+
+    with _style():
+        yield Figure(figsize=(width, height), layout="compressed")
+
+
+def svg(figure: Figure) -> str:
+    """The figure as an ``<svg>`` element; the same figure gives the same text."""
+    buffer = io.StringIO()
+    with _style():
+        figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def envelope(t: Array, values: Array, pieces: int = 800) -> tuple[Array, Array]:
+    """A long signal as the line through the least and the greatest value of each piece of it.
+
+    Parameters
+    ----------
+    t, values : (n,)
+        Times and values; what is not finite, or beyond 1e100, leaves a gap.
+    pieces : int
+        Number of pieces; a signal of at most twice as many samples is returned as it is.
+
+    Returns
+    -------
+    t, values : (m,), m <= 2 pieces
+    """
+    t, shown = (np.where(np.abs(x) < 1e100, x, np.nan) for x in (t, values))
+    if len(shown) <= 2 * pieces:
+        return t, shown
+    starts = np.linspace(0, len(shown), pieces, endpoint=False).astype(np.int64)
+    low, high = np.fmin.reduceat(shown, starts), np.fmax.reduceat(shown, starts)
+    middle = 0.5 * (np.fmin.reduceat(t, starts) + np.fmax.reduceat(t, starts))
+    return np.repeat(middle, 2), np.column_stack([low, high]).ravel()
+
+
+def powers_of_ten(axis: Axis) -> None:
+    """Label a logarithmic axis with plain powers of ten."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    def text(value: float, _: int | None) -> str:
+        power = round(np.log10(value))
+        return f"{value:g}" if 0 <= power <= 3 else f"10{str(power).translate(_SUPERSCRIPTS)}"
+
+    axis.set_major_formatter(FuncFormatter(text))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def plain_unit(unit: str) -> str:
+    """A unit with its powers raised: ``m/s²`` for ``m/s^2``."""
+    return unit.replace("^2", "²").replace("^3", "³")

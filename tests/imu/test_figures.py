@@ -1,0 +1,133 @@
+"""The figures of an IMU calibration, for sound, weak and failed ones."""
+
+from dataclasses import replace
+from importlib.resources import files
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from inercal.estimate.status import Status
+from inercal.geometry.rotations import conjugate, exp
+from inercal.geometry.site import GravityInput, Site
+from inercal.imu.figures import _flat, pictures
+from inercal.imu.settings import ImuSettings
+from inercal.imu.simulate import draw_truth, simulate
+from inercal.imu.task import calibrate
+from inercal.records.record import Column, Record, Source
+from inercal.report.html import render
+from inercal.units import parse_unit
+
+ALL = [
+    "Static intervals",
+    "Poses",
+    "Residual of each pose",
+    "Miss of each turn",
+    "Correlation of the coefficients",
+    "Where the uncertainty comes from",
+]
+
+
+@pytest.fixture(scope="module")
+def xsens():
+    columns = {}
+    for sensor, name, array in (
+        ("acc", "xsens_acc.mat", "IMU0x2Dalpha"),
+        ("gyro", "xsens_gyro.mat", "IMU0x2Domega"),
+    ):
+        data = loadmat(str(files("inercal") / "examples" / name))[array]
+        t = columns["acc_x"].t if columns else np.ascontiguousarray(data[:, 0])
+        for i, axis in enumerate("xyz", 1):
+            channel = f"{sensor}_{axis}"
+            columns[channel] = Column(
+                channel, sensor, axis, parse_unit("count"), data[:, i].astype(float), t, Source(name, "")
+            )
+    return Record(columns)
+
+
+SETTINGS = ImuSettings(Site(9.81744, (GravityInput("gravity", 2e-5, "m/s^2", 1.0),)), 50.0, time_base_u=2e-5)
+
+
+@pytest.mark.parametrize("g_sensitivity", [False, True])
+def test_a_sound_calibration(xsens, g_sensitivity):
+    calibration = calibrate(xsens, replace(SETTINGS, g_sensitivity=g_sensitivity))
+    assert calibration.estimate.status is Status.OK
+    drawn = pictures(calibration)
+    assert [picture.title for picture in drawn] == ALL
+    assert all(len(picture.svg) < 300_000 for picture in drawn)
+    assert "Stars" not in drawn[1].caption
+    assert len(render(calibration.estimate, drawn, "Xsens")) < 1_500_000
+
+
+def test_accelerometers_alone(xsens):
+    alone = Record({name: xsens[name] for name in ("acc_x", "acc_y", "acc_z")})
+    calibration = calibrate(alone, SETTINGS)
+    drawn = pictures(calibration)
+    assert [picture.title for picture in drawn] == [title for title in ALL if "turn" not in title]
+    page = render(calibration.estimate, drawn, "Accelerometers")
+    assert page == render(calibration.estimate, pictures(calibration), "Accelerometers")
+
+
+def test_too_few_poses_show_the_intervals_there_are(xsens):
+    calibration = calibrate(cut(xsens, 9000), SETTINGS)
+    assert calibration.estimate.status is Status.TOO_FEW_INTERVALS
+    (drawn,) = pictures(calibration)
+    found = calibration.estimate.statistics["intervals"]
+    assert f"the {found:.0f} static intervals found below the threshold of" in drawn.caption
+    render(calibration.estimate, [drawn], "Too few")
+
+
+def cut(record, rows):
+    t = record["acc_x"].t[:rows]
+    return Record({name: replace(c, values=c.values[:rows], t=t) for name, c in record.columns.items()})
+
+
+def attitudes(up):
+    """Attitudes q_nb in which those body directions are vertical."""
+    across = np.cross([0.0, 0.0, 1.0], up)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return conjugate(exp(across * np.arccos(up[:, 2:])))
+
+
+def test_the_pose_that_would_cure_an_ill_conditioned_fit_is_marked():
+    rng = np.random.default_rng(2)
+    up = np.array(
+        [(0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0),
+         (1, 0, 1), (-1, 0, 1), (0, 1, 1), (0, -1, 1)], dtype=float,
+    )  # fmt: skip
+    up += rng.normal(0.0, 1e-4, up.shape)
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    record, _ = simulate(draw_truth(rng), attitudes(up), 9.81, 0.7, rng)
+    calibration = calibrate(record, ImuSettings(Site(9.81)))
+    assert calibration.estimate.status in (Status.ILL_CONDITIONED, Status.UNOBSERVABLE)
+    caption = next(picture.caption for picture in pictures(calibration) if picture.title == "Poses")
+    words = calibration.estimate.message.partition("force along ")[2].removesuffix(" and its opposite")
+    assert f"Stars: the pose {words} and its opposite" in caption
+
+
+def test_equal_areas_on_the_sphere_are_equal_on_the_disc():
+    height = np.linspace(0.0, 1.0, 11)
+    up = np.stack([np.sqrt(1.0 - height**2), np.zeros(11), height], axis=-1)
+    radius2 = _flat(up)[0] ** 2
+    assert radius2[0] == 1.0
+    assert all(a - b == pytest.approx(0.1) for a, b in pairwise(radius2))
+    assert np.array_equal(_flat(up)[0], _flat(-up)[0] * -1.0)
+
+
+def test_a_million_rows_stay_small():
+    rng = np.random.default_rng(5)
+    t = np.arange(1_000_000) / 1000.0
+    count = parse_unit("count")
+    record = Record(
+        {
+            name: Column(
+                name, *name.split("_"), count, rng.normal(0.0, 10.0, len(t)) + offset, t, Source("long", "")
+            )
+            for name, offset in (("acc_x", 0.0), ("acc_y", 0.0), ("acc_z", 4000.0))
+        }
+    )
+    calibration = calibrate(record, ImuSettings(Site(9.81)))
+    drawn = pictures(calibration)
+    assert all(len(picture.svg) < 300_000 for picture in drawn)
+    assert len(render(calibration.estimate, drawn, "Long")) < 1_000_000
