@@ -16,14 +16,22 @@ from inercal.errors import InputError
 def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
     """Open a temporary file beside ``path`` that takes its place only when the block ends without error.
 
+    A link stays a link, the file it points to is replaced; a device or a pipe is written to directly.
     Raises `InputError` where the folder is missing or cannot be written, or the disk is full.
     """
-    target = Path(path)
     encoding = None if "b" in mode else "utf-8"
+    if os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path):
+        try:
+            with open(path, mode, encoding=encoding) as file:
+                yield file
+        except OSError as error:
+            raise _refused(path, error) from error
+        return
     try:
+        target = Path(os.path.realpath(path))
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    except OSError as error:
-        raise InputError(path, f"cannot be written ({error.strerror})") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        raise _refused(path, error) from error
     try:
         with os.fdopen(handle, mode, encoding=encoding) as file:
             yield file
@@ -32,10 +40,16 @@ def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, target)
     except OSError as error:
-        raise InputError(path, f"cannot be written ({error.strerror})") from error
+        raise _refused(path, error) from error
     finally:
         with suppress(FileNotFoundError):
             os.unlink(name)
+
+
+def _refused(path: str | Path, error: Exception) -> InputError:
+    """One sentence for what the operating system said."""
+    shown = repr(str(path)) if "\0" in str(path) else path
+    return InputError(shown, f"cannot be written ({getattr(error, 'strerror', None) or error})")
 
 
 def _umask() -> int:

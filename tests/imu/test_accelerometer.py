@@ -123,7 +123,7 @@ def test_weak_poses_are_cured_by_the_pose_it_names():
     assert pose_words(cure) in ("+x +y", "-x -y", "+x -y", "-x +y")
     more = np.vstack([up, cure])
     cured = fit_accelerometer(model_from(theta(8)).indicate(G * more), G, theta(8))
-    assert cured.fit.identifiability.condition < 10
+    assert cured.fit.identifiability.condition < 50
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])

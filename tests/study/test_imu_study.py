@@ -54,7 +54,6 @@ def test_every_key(write):
     }  # fmt: skip
     assert study.temperature.value == pytest.approx(23.0)
     assert study.temperature.u == pytest.approx(0.5)
-    assert study.path == path
 
 
 def test_what_is_absent():

@@ -13,11 +13,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Singular value decomposition of a Jacobian (n, p) whose columns were scaled to unit length.
+    """Singular value decomposition of a Jacobian (n, p) with scaled columns.
 
     ``singular_values`` (p,) descending; ``directions`` (p, p), row i the combination of *scaled* parameters
     that belongs to value i; ``left`` (n, min(n, p)) the combinations of observations; ``scale`` (p,) the
-    column lengths. A combination v of scaled parameters is v / scale in the parameters' own units.
+    reciprocal typical sizes of the parameters, or the column lengths where none were given. A combination v of
+    scaled parameters is v / scale in the parameters' own units.
     """
 
     names: tuple[str, ...]
@@ -65,16 +66,27 @@ class Identifiability:
         return self.names[int(np.argmax(np.abs(self.directions[-1])))]
 
 
-def identify(J: Array, names: Sequence[str]) -> Identifiability:
-    """Decompose a whitened Jacobian ``J`` (n, p); ``names`` has length p.
+def identify(J: Array, names: Sequence[str], sizes: Array | None = None) -> Identifiability:
+    """Decompose a whitened Jacobian.
 
-    A column within rounding of the longest (cos 90 deg is 6e-17, not 0) counts as zero: scaled to unit
-    length, it would look as well known as any.
+    Parameters
+    ----------
+    J : (n, p)
+        Derivative of the whitened residuals.
+    names : sequence of str, length p
+    sizes : (p,), optional
+        Typical sizes of the parameters: a change by that much would be a large one. They make the condition
+        number independent of units, and show a column that is nearly zero as what it is. Without them columns
+        are scaled to unit length, which hides that; only a column within rounding of the longest (cos 90 deg
+        is 6e-17, not 0) then counts as zero.
     """
     n, p = J.shape
-    length = np.linalg.norm(J, axis=0)
-    longest = length.max(initial=0.0)
-    scale = np.where(length > longest * max(n, p) * np.finfo(float).eps, length, longest or 1.0)
+    if sizes is None:
+        length = np.linalg.norm(J, axis=0)
+        longest = length.max(initial=0.0)
+        scale = np.where(length > longest * max(n, p) * np.finfo(float).eps, length, longest or 1.0)
+    else:
+        scale = 1.0 / sizes
     u, s, vt = np.linalg.svd(J / scale, full_matrices=n < p)  # all p directions, but never an n by n matrix
     values = np.concatenate([s, np.zeros(p - len(s))])
     tolerance = values[0] * max(n, p) * np.finfo(float).eps if p else 0.0

@@ -70,7 +70,7 @@ def solve(
     names : sequence of str
         Terms, for the words about conditioning.
     scale : (p,)
-        Typical size of each parameter.
+        Typical size of each parameter, for the solver and for the condition number.
 
     Raises
     ------
@@ -91,9 +91,11 @@ def solve(
     except _NotFiniteError as error:
         r = np.asarray(residuals(start), dtype=float)
         J = np.zeros((len(r), len(start)))
-        return NonlinearFit(start, r, J, False, str(error), identify(J, names))
+        return NonlinearFit(start, r, J, False, str(error), identify(J, names, scale))
     J = np.asarray(found.jac, dtype=float)
-    return NonlinearFit(found.x, found.fun, J, found.status > 0, str(found.message), identify(J, names))
+    return NonlinearFit(
+        found.x, found.fun, J, found.status > 0, str(found.message), identify(J, names, scale)
+    )
 
 
 def _finite(function: Function) -> Function:

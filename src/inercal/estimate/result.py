@@ -54,7 +54,7 @@ def coverage_factor(dof: float, level: float = COVERAGE) -> float:
     return float(ndtri(p) if math.isinf(dof) else stdtrit(dof, p))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Everything a calibration says.
 
@@ -142,7 +142,8 @@ def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
     first = Decimal(f"{u:.1e}").adjusted()  # power of ten of the first digit; 0.0996 rounds to 0.10
     if first >= -4 and max(abs(value), u) < 1e7:
         places = max(0, 1 - first)
-        return tuple(f"{round(x, 1 - first):.{places}f}" for x in (value, u, *others))
+        # + 0.0 takes the sign off a zero
+        return tuple(f"{round(x, 1 - first) + 0.0:.{places}f}" for x in (value, u, *others))
     value = round(value, 1 - first)  # no digits below the last of u, also of a value smaller than u
-    digits = max(0, Decimal(value).adjusted() - first + 1) if value else 0
+    digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
     return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))

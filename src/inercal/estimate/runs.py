@@ -24,7 +24,6 @@ from concurrent.futures import Executor as Pool
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
-from importlib import metadata
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -32,6 +31,8 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inercal import __version__
+from inercal._files import write_bytes
 from inercal.errors import InercalError, InputError
 
 Task: TypeAlias = Callable[[np.random.Generator], Mapping[str, ArrayLike]]
@@ -283,10 +284,6 @@ def _manifest(task: Task, seed: int, runs: int, chunk: int) -> dict[str, str | i
         raise InputError(
             name, f"cannot be kept in a folder, expected a function of a module ({error})"
         ) from error
-    try:
-        version = metadata.version("inercal")
-    except metadata.PackageNotFoundError:
-        version = "not installed"
     return {
         "task": name,
         "content": content,
@@ -294,7 +291,7 @@ def _manifest(task: Task, seed: int, runs: int, chunk: int) -> dict[str, str | i
         "runs": runs,
         "chunk": chunk,
         "numpy": np.__version__,
-        "inercal": version,
+        "inercal": __version__,
     }
 
 
@@ -305,7 +302,7 @@ def _open(folder: Path, manifest: dict[str, str | int]) -> None:
     if not path.exists():
         if any(folder.glob("chunk-*.npz")):
             raise InputError(path, "is missing beside finished chunks, expected an empty folder")
-        _write(path, json.dumps(manifest, indent=2).encode())
+        write_bytes(path, json.dumps(manifest, indent=2).encode())
         return
     try:
         found = dict(json.loads(path.read_bytes()))
@@ -326,7 +323,7 @@ def _keep(folder: Path, chunk: range, sample: Sample) -> None:
     """Write a finished chunk."""
     data = io.BytesIO()
     np.savez(data, allow_pickle=False, **sample)
-    _write(_chunk_path(folder, chunk), data.getvalue())
+    write_bytes(_chunk_path(folder, chunk), data.getvalue())
 
 
 def _kept(folder: Path, chunk: range) -> Sample | None:
@@ -337,13 +334,3 @@ def _kept(folder: Path, chunk: range) -> Sample | None:
     except Exception:  # the ways in which a damaged zip archive fails to read are many
         return None
     return sample if all(len(a) == len(chunk) for a in sample.values()) else None
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file so that it is there in full or not at all."""
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)

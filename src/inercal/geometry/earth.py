@@ -15,9 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665
-"""The unit g [m/s²], by definition; not the gravity of any site."""
-
 EARTH_RATE = 7.292115e-5
 """Rotation rate of the Earth against inertial space [rad/s], TR8350.2 table 3.1."""
 

@@ -128,8 +128,10 @@ def fit_gyro(
     )
     if with_g_sensitivity:
         theta = np.concatenate([theta, static.coefficients[1:].T.ravel()])
-    typical = np.concatenate([np.full(3, 0.01 * np.max(start.scale)), start.scale, np.ones(6)])
-    typical = np.concatenate([typical, np.full(len(names) - 12, 1e-3 * np.max(start.scale))])
+    # a bias that turns the instrument by one radian in a turn, and a g-sensitivity that does so at 1 g
+    turning = np.max(start.scale) / float(np.median(turns.durations))
+    typical = np.concatenate([np.full(3, turning), start.scale, np.ones(6)])
+    typical = np.concatenate([typical, np.full(len(names) - 12, turning / float(np.mean(size)))])
 
     durations = np.repeat(turns.durations, 3)
     dof = 2.0 * len(turns) - 9.0

@@ -7,7 +7,7 @@ the multiple is the one whose poses the accelerometer model fits best per degree
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,7 @@ def prepare(record: Record, static_start: float | None) -> Recording:
     """
     accelerometer = record.triad("acc")
     gyro = record.triad("gyro") if any(f"gyro_{axis}" in record for axis in "xyz") else None
+    accelerometer, gyro = _stamped(accelerometer, gyro)
     t, where = accelerometer.t, accelerometer.source.path
     for triad in (accelerometer, gyro):
         if triad is not None and not np.isfinite(triad.rate):
@@ -114,6 +115,20 @@ def prepare(record: Record, static_start: float | None) -> Recording:
             restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
             noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
     return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise)
+
+
+def _stamped(accelerometer: Triad, gyro: Triad | None) -> tuple[Triad, Triad | None]:
+    """The triads without samples that have no time stamp (the gap then shows); one clock stays one."""
+    shared = gyro is not None and gyro.t is accelerometer.t
+    known = np.isfinite(accelerometer.t)
+    if not known.all():
+        accelerometer = replace(accelerometer, t=accelerometer.t[known], values=accelerometer.values[known])
+    if gyro is None:
+        return accelerometer, None
+    own = np.isfinite(gyro.t)
+    if not own.all():
+        gyro = replace(gyro, t=accelerometer.t if shared else gyro.t[own], values=gyro.values[own])
+    return accelerometer, gyro
 
 
 def _on_other_clock(values: Array, t: Array, other: Array) -> Array:
@@ -174,7 +189,7 @@ def _initial(
             f"found {static_start:g} s, expected {SHORTEST_START:g} s to the length of the record, "
             f"{t[-1] - t[0]:.1f} s",
         )
-    stated = int(np.searchsorted(t, t[0] + static_start, side="right"))
+    stated = int(np.argmax(t > t[0] + static_start)) or len(t)
     inside = variance[: max(stated - window // 2, 0)]
     inside = inside[np.isfinite(inside)]
     if stop < stated - window and (not len(inside) or np.max(inside) > MOVING * np.median(inside)):

@@ -164,7 +164,8 @@ def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns 
         else:
             spans.append((k, start, stop))
             continue
-        findings.append(Finding("skipped_turn", f"a turn is left out: {why}", f"rows {start + 1}-{stop + 1}"))
+        where = f"t {gyro.t[start]:.2f} to {gyro.t[stop]:.2f} s"
+        findings.append(Finding("skipped_turn", f"a turn is left out: {why}", where))
     if len(spans) < FEWEST_TURNS:
         findings.append(
             Finding(

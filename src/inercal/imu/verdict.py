@@ -20,9 +20,9 @@ from inercal.records.places import counted
 
 Array = NDArray[np.float64]
 
-WORST_CONDITION = 30.0
-"""Condition of the scaled Jacobian beyond which a fit is called ill-conditioned; good sets of poses have 3
-to 10."""
+WORST_CONDITION = 50.0
+"""Condition of the scaled Jacobian beyond which a fit is called ill-conditioned; good sets of poses have 2
+to 20."""
 
 WORST_MISS = 0.2
 """Root-mean-square angle [rad] between carried and measured verticals beyond which gyro and accelerometers

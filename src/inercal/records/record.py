@@ -27,7 +27,7 @@ class Source:
     sha256: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Column:
     """One channel.
 
@@ -54,7 +54,7 @@ class Column:
         return self.values * self.unit.factor + self.unit.zero
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Triad:
     """Three axes of one sensor: ``t`` (n,) [s], ``values`` (n, 3) in ``unit``, ``source`` as in `Column`."""
 
@@ -71,7 +71,7 @@ class Triad:
         return 1.0 / step if step > 0 else float("nan")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
     """Columns by name, in the order read, with what was found suspicious while reading.
 
