@@ -88,7 +88,7 @@ def solve(
             _finite(residuals), _finite(np.positive)(start), jac=_finite(jacobian), method="lm",
             x_scale=scale, xtol=1e-12, ftol=1e-12,
         )  # fmt: skip
-    except _NotFiniteError as error:
+    except (_NotFiniteError, np.linalg.LinAlgError) as error:
         r = np.asarray(residuals(start), dtype=float)
         J = np.zeros((len(r), len(start)))
         return NonlinearFit(start, r, J, False, str(error), identify(J, names, scale))

@@ -68,7 +68,8 @@ class GyroFit:
     ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain`` (p, 3 m +
     3 n) takes errors of the carried verticals (turn by turn, [rad]) and of the pose means (pose by pose,
     [output]) to errors of the parameters. ``miss`` (m, 3) is the carried minus the measured vertical [rad].
-    ``vertical_error`` (3 m, 3 n) takes errors of the specific force in the poses to errors of ``miss``.
+    ``vertical_error`` (3 m, 3 n) takes errors of the specific force in the poses to errors of ``miss``;
+    ``durations`` (m,) [s] of the turns.
     """
 
     names: tuple[str, ...]
@@ -81,6 +82,7 @@ class GyroFit:
     dof: float
     static: StaticRegression
     vertical_error: Array
+    durations: Array
 
 
 def fit_gyro(
@@ -163,7 +165,9 @@ def fit_gyro(
 
     gain = fit.gain()
     gain = np.hstack([gain[:, : len(weigh)] @ weigh, -gain[:, len(weigh) :] / spread])
-    return GyroFit(names, model, g, fit, gain, miss, float(np.sqrt(walk2)), dof, static, vertical_error)
+    return GyroFit(
+        names, model, g, fit, gain, miss, float(np.sqrt(walk2)), dof, static, vertical_error, turns.durations
+    )
 
 
 def unpack(theta: Array) -> tuple[TriadModel, Array]:
@@ -267,7 +271,7 @@ def first_guess(
     """
     coarse = thin(turns, max(1, len(turns.intervals) // 80))
     raw = coarse.outputs - coarse.intervals[..., None] * bias
-    swept = float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0)))
+    swept = max(float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0))), 1e-300)
     channels = np.eye(3) if axes is None else axes
     best = (1.0, np.inf)
     for scale in swept / np.geomspace(0.1, 12.0, 62):

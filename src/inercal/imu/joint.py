@@ -62,16 +62,15 @@ class Joint:
     by_output: Array
     accelerometer: AccelerometerFit
     gyro: GyroFit | None
-    durations: Array
 
 
-def join(accelerometer: AccelerometerFit, gyro: GyroFit | None, durations: Array) -> Joint:
-    """Stack the two fits; ``durations`` (m,) of the turns [s]."""
+def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> Joint:
+    """Stack the two fits."""
     by_force = accelerometer.fit.gain() @ radial(accelerometer)
     names, values = ACCELEROMETER_TRIAD, accelerometer.fit.x
     if gyro is None:
         empty = np.zeros((len(names), 0))
-        return Joint(names, values, by_force, empty, empty, accelerometer, None, durations)
+        return Joint(names, values, by_force, empty, empty, accelerometer, None)
     turns, poses = gyro.vertical_error.shape[0], by_force.shape[1]
     to_turn, to_output = gyro.gain[:, :turns], gyro.gain[:, turns:]
     pad = len(names)
@@ -83,7 +82,6 @@ def join(accelerometer: AccelerometerFit, gyro: GyroFit | None, durations: Array
         np.vstack([np.zeros((pad, poses)), to_output]),
         accelerometer,
         gyro,
-        durations,
     )
 
 
@@ -97,7 +95,7 @@ def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
     if joint.gyro is None:
         return sources
     gyro = joint.gyro
-    turn = np.repeat(joint.durations, 3) * gyro.walk**2
+    turn = np.repeat(gyro.durations, 3) * gyro.walk**2
     sources.append(
         TypeA("turn scatter", gyro.walk, "rad/sqrt(s)", (joint.by_turn * turn) @ joint.by_turn.T, gyro.dof)
     )
@@ -149,7 +147,7 @@ def noise_covariance(joint: Joint, pose: Array, walk: Array, output: Array) -> A
     covariance = (joint.by_force * pose) @ joint.by_force.T
     if joint.gyro is not None:
         # the frames of the turns differ, so the mean of the axes stands for each
-        turn = np.repeat(joint.durations, 3) * float(np.mean(walk))
+        turn = np.repeat(joint.gyro.durations, 3) * float(np.mean(walk))
         covariance = covariance + (joint.by_turn * turn) @ joint.by_turn.T
         covariance = covariance + (joint.by_output * output) @ joint.by_output.T
     return np.asarray(covariance)

@@ -174,7 +174,8 @@ def _turn_table(joint: Joint) -> list[Mapping[str, Any]]:
         return []
     misses = np.linalg.norm(joint.gyro.miss, axis=1)
     return [
-        {"duration_s": float(d), "miss_rad": float(m)} for d, m in zip(joint.durations, misses, strict=True)
+        {"duration_s": float(d), "miss_rad": float(m)}
+        for d, m in zip(joint.gyro.durations, misses, strict=True)
     ]
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.result import Estimate
-from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.gyro import GyroFit, first_guess, fit_gyro, without_earth
 from inercal.imu.joint import Scatter, force_error, join
 from inercal.imu.outcome import assemble, without_fit
@@ -80,36 +79,10 @@ def calibrate(
         return Calibration(_timed(without_fit(record, recording, settings), clock), recording)
     poses = choose(candidates)
     scatter = _scatter(poses)
-    findings = [*scatter_findings(poses, scatter)]
-    gyro, turns, static_means = None, None, np.zeros((0, 3))
-    if recording.gyro is None:
-        findings.append(
-            Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated")
-        )
-    else:
-        if not poses.with_gyro:
-            findings.append(
-                Finding(
-                    "gyro_restless",
-                    "the gyro is so restless in most holds that the poses were found by the accelerometers alone",
-                )
-            )
-        progress("fitting the gyro to the turns")
-        turns, skipped = _turns(recording, poses, settings.g_sensitivity)
-        findings += skipped
-        static_means = _gyro_means(recording, poses)
-        if turns is not None:
-            acc = poses.accelerometer
-            vertical_rate = settings.site.vertical_rate
-            gyro = _fit_gyro(turns, static_means, acc, scatter, settings.g_sensitivity, vertical_rate)
-            middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
-            drift = without_earth(static_means, acc.directions, gyro.model, vertical_rate)
-            findings += gyro_findings(middles, drift, acc.f, gyro, recording.gyro.unit.symbol)
-            if rms_miss(gyro) > WORST_MISS:
-                findings += axis_findings(turns, poses.accelerometer.directions, static_means[0])
-    joint = join(
-        poses.accelerometer, gyro, turns.durations if turns is not None and gyro is not None else np.zeros(0)
-    )
+    progress("fitting the gyro to the turns")
+    gyro, of_gyro = _calibrate_gyro(recording, poses, scatter, settings)
+    findings = [*scatter_findings(poses, scatter), *of_gyro]
+    joint = join(poses.accelerometer, gyro)
     estimate = assemble(record, recording, poses, scatter, joint, settings, findings)
     return Calibration(_timed(estimate, clock), recording, poses, gyro)
 
@@ -141,10 +114,12 @@ def _gyro_index(recording: Recording, sample: int) -> int:
 
 
 def _gyro_means(recording: Recording, poses: Poses) -> Array:
-    """Mean gyro output (n, 3) in each pose."""
+    """Mean gyro output (n, 3) in each pose; NaN where it has no numbers."""
     assert recording.gyro is not None
     spans = [(_gyro_index(recording, d.start), _gyro_index(recording, d.stop - 1) + 1) for d in poses.dwells]
-    return np.array([np.nanmean(recording.gyro.values[a:b], axis=0) for a, b in spans])
+    parts = [recording.gyro.values[a:b] for a, b in spans]
+    parts = [part[np.isfinite(part).all(axis=1)] for part in parts]
+    return np.array([part.mean(axis=0) if len(part) else np.full(3, np.nan) for part in parts])
 
 
 def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns | None, list[Finding]]:
@@ -189,16 +164,33 @@ def _flat_at(part: Array, limit: Array) -> bool:
     return bool(np.any(at[2:] & at[1:-1] & at[:-2]))
 
 
-def _fit_gyro(
-    turns: Turns,
-    means: Array,
-    acc: AccelerometerFit,
-    scatter: Scatter,
-    with_g_sensitivity: bool,
-    vertical_rate: float,
-) -> GyroFit:
-    """Guess the scale, then fit."""
+def _calibrate_gyro(
+    recording: Recording, poses: Poses, scatter: Scatter, settings: ImuSettings
+) -> tuple[GyroFit | None, list[Finding]]:
+    """The gyro's fit, if it can be made, and what is to be said of it."""
+    if recording.gyro is None:
+        said = "the record has no gyro: only the accelerometers are calibrated"
+        return None, [Finding("gyro_missing", said)]
+    findings = []
+    if not poses.with_gyro:
+        said = "the gyro is so restless in most holds that the poses were found by the accelerometers alone"
+        findings.append(Finding("gyro_restless", said))
+    turns, skipped = _turns(recording, poses, settings.g_sensitivity)
+    findings += skipped
+    if turns is None:
+        return None, findings
+    acc, means = poses.accelerometer, _gyro_means(recording, poses)
+    if not np.isfinite(means).all():
+        said = "the gyro has no numbers in some poses: it is not calibrated"
+        return None, [*findings, Finding("gyro_missing", said)]
     scale, _ = first_guess(turns, acc.directions, means[0])
     start = TriadModel(np.full(3, scale), np.eye(3), means[0])
+    vertical_rate = settings.site.vertical_rate
     error = force_error(acc)
-    return fit_gyro(turns, means, acc.f, error, scatter.s, start, with_g_sensitivity, vertical_rate)
+    gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, vertical_rate)
+    middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
+    at_rest = without_earth(means, acc.directions, gyro.model, vertical_rate)
+    findings += gyro_findings(middles, at_rest, acc.f, gyro, recording.gyro.unit.symbol)
+    if not gyro.fit.converged or rms_miss(gyro) > WORST_MISS:
+        findings += axis_findings(turns, acc.directions, means[0])
+    return gyro, findings
