@@ -6,6 +6,7 @@ InercalError
  │    ├── MapError         a column map that does not fit its file
  │    ├── StudyError       a study file that does not validate
  │    └── QuantityError    a text that is not a quantity of the expected kind
+ ├── UsageError            a command line that is wrong in itself
  ├── MissingExtraError     an optional package is not installed
  ├── RunError              a run of a Monte Carlo that failed (`inercal.estimate.runs`)
  └── CalibrationError      an estimate whose status is not ``ok`` (``raise_for_status``)
@@ -53,6 +54,10 @@ class StudyError(InputError):
 
 class QuantityError(InputError):
     """A text that is not a quantity, or one of another dimension."""
+
+
+class UsageError(InercalError):
+    """A command line that is wrong in itself: an unknown command or option, a missing argument."""
 
 
 class MissingExtraError(InercalError):

@@ -1,5 +1,7 @@
 """Column maps: what they may say, what is said of wrong ones, and how files and parts find each other."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -175,7 +177,10 @@ def test_named_files_keep_their_clocks(tmp_path):
         record = read(files, record_map)
         np.testing.assert_array_equal(record["acc_x"].t, [0.0, 0.1, 0.2])
         np.testing.assert_array_equal(record["gyro_x"].t, [0.0, 0.2])
-        assert len(record.sources) == 2
+        assert [Path(source.path).suffix for source in record.sources[-1:]] == [
+            ".toml"
+        ]  # the map is an input too
+        assert len(record.sources) == 3
     with pytest.raises(
         RecordError, match=r"other.csv: not named by .*map.toml, expected fast.csv or slow.csv"
     ):

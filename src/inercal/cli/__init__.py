@@ -8,94 +8,16 @@ import sys
 import time
 import warnings
 
+from inercal.errors import InercalError
+
 # The matrices here are small: threads of the linear algebra library cost more than they bring.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-from cyclopts import App, CycloptsError, Parameter
-
-from inercal import __version__
-from inercal.errors import InercalError
 
 _STARTED = time.perf_counter()
 
 EXIT_BAD_VERDICT = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
-
-
-#: verb, kind -> where it is, what it does, an example that runs
-_COMMANDS = {
-    ("new", "imu"): (
-        "inercal.cli.new:new_imu",
-        "Write a commented study for `inercal calibrate imu`.\n\nGiven a recording, also a column map guessed from "
-        "it. The study goes to --out (imu.toml if absent), the map beside it (imu-map.toml). Nothing that exists "
-        "is overwritten.",
-        "inercal new imu log.csv --out imu.toml",
-    ),
-    ("inspect", ""): (
-        "inercal.cli.inspect:inspect",
-        "Look at a recording before it is used.\n\nChannels, units, rates, and everything suspicious about it; "
-        "--report writes a page with pictures. Findings do not change the exit code.",
-        "inercal inspect log.csv --report log.html",
-    ),
-    ("calibrate", "imu"): (
-        "inercal.cli.calibrate:calibrate_imu",
-        "Calibrate an IMU that was held still in many poses by hand.\n\nGives bias, scale factor and misalignment "
-        "of the accelerometers, and of the gyro if there is one, with uncertainties. --out saves them (.json or "
-        ".toml), --report writes a page to hand over. Exit code 1: done, but the verdict is not ok.",
-        "inercal calibrate imu log.csv --study imu.toml --report cal.html",
-    ),
-    ("apply", ""): (
-        "inercal.cli.apply:apply",
-        "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv). "
-        "With --invert the recording holds true values and the outputs of the instrument are written.",
-        "inercal apply cal.json log.csv --out corrected.csv",
-    ),
-    ("schema", ""): (
-        "inercal.cli.schema:schema",
-        "Print one JSON Schema that covers every kind of study file, for editors and checkers.",
-        "inercal schema --out inercal.schema.json",
-    ),
-    ("examples", ""): (
-        "inercal.cli.examples:examples",
-        "List the recordings that ship with inercal, or copy one.\n\nA copy comes with its study and map, in the "
-        "folder --out (named after the example if absent).",
-        "inercal examples xsens --out xsens",
-    ),
-}
-
-_GROUPS = {
-    "new": "Write a commented study, and a map guessed from a recording.",
-    "calibrate": "Calibrate an instrument from a recording.",
-}
-
-
-def _app() -> App:
-    """The tree of commands; the module of each is loaded only when it is asked for."""
-    app = App(
-        name="inercal",
-        help="Calibrate inertial instruments, and say how sure one can be of every number.",
-        help_epilogue="Example: inercal examples xsens",
-        version=__version__,
-        default_parameter=Parameter(negative=(), show_default=False),
-        help_format="plaintext",
-        help_formatter="plain",
-        exit_on_error=False,
-        print_error=False,
-        result_action="return_value",
-        suppress_keyboard_interrupt=False,
-    )
-    groups: dict[str, App] = {}
-    for (verb, kind), (where, text, example) in _COMMANDS.items():
-        epilogue = f"Example: {example}"
-        if not kind:
-            app.command(where, name=verb, help=text, help_epilogue=epilogue)
-            continue
-        if verb not in groups:
-            groups[verb] = App(name=verb, help=_GROUPS[verb], help_epilogue=epilogue)
-            app.command(groups[verb])
-        groups[verb].command(where, name=kind, help=text, help_epilogue=epilogue)
-    return app
 
 
 def process_age() -> float:
@@ -118,7 +40,9 @@ def run(arguments: list[str] | None = None) -> int:
     if "PYTHONWARNINGS" not in os.environ and not sys.warnoptions:
         warnings.simplefilter("ignore")
     try:
-        code = _app()(sys.argv[1:] if arguments is None else arguments)
+        from inercal.cli.tree import call  # here, so that an interrupt during loading is caught too
+
+        code = call(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
         return int(code or 0)
     except KeyboardInterrupt:
@@ -126,7 +50,7 @@ def run(arguments: list[str] | None = None) -> int:
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         problem = "standard output was closed before everything was written, expected a reader to the end"
-    except (InercalError, CycloptsError) as error:
+    except InercalError as error:
         problem = str(error)
     except MemoryError:
         problem = "not enough memory for this recording"

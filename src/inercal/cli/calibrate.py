@@ -28,6 +28,7 @@ def calibrate_imu(
     from inercal.estimate.exchange import save, to_json
     from inercal.estimate.status import Status
     from inercal.imu.task import calibrate
+    from inercal.records.read import source_of
     from inercal.study.load import load_imu_study
 
     output.check(".json", ".toml")
@@ -39,7 +40,7 @@ def calibrate_imu(
         calibration = calibrate(record, settings, progress)
     estimate = calibration.estimate
     timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
-    estimate = replace(estimate, timing=timing)
+    estimate = replace(estimate, timing=timing, inputs=(*estimate.inputs, source_of(study)))
     for finding in estimate.findings:
         where = f" ({finding.where})" if finding.where else ""
         output.say(f"{finding.code}: {finding.message}{where}")

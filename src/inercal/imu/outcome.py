@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import combine
@@ -30,6 +32,8 @@ MODEL = (
     "D_F, and + G f where g-sensitivity is estimated. Frame: x along accelerometer x, y in the plane of "
     "accelerometers x and y."
 )
+
+FRAME = "b, of the instrument: x along accelerometer x, y in the plane of accelerometers x and y"
 
 REFERENCES = (
     "D. Tedaldi, A. Pretto, E. Menegatti, A robust and easy to implement method for IMU calibration without external "
@@ -93,7 +97,7 @@ def assemble(
         conditions=_conditions(recording, poses, settings),
         traceability=settings.traceability,
         inputs=record.sources,
-        provenance={"settings": settings.given},
+        provenance=_provenance(settings),
         result={
             "method": "multiposition",
             "intervals": _interval_table(recording, poses),
@@ -104,6 +108,12 @@ def assemble(
         },
         references=REFERENCES,
     )
+
+
+def _provenance(settings: ImuSettings) -> dict[str, Any]:
+    """What a repetition needs beside the inputs; nothing here is random."""
+    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+    return {"settings": settings.given, "seed": None, "versions": versions}
 
 
 def _triads(recording: Recording) -> list[Triad]:
@@ -146,6 +156,7 @@ def _conditions(recording: Recording, poses: Poses, settings: ImuSettings) -> di
         finite = recording.gyro.values[np.isfinite(recording.gyro.values).all(axis=1)]
         ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
     return {
+        "frame": FRAME,
         "temperature": None if temperature is None else temperature.text,
         "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
@@ -214,7 +225,7 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
         model=MODEL,
         traceability=settings.traceability,
         inputs=record.sources,
-        provenance={"settings": settings.given},
+        provenance=_provenance(settings),
         result={"method": "multiposition", "intervals": [], "turns": []},
         references=REFERENCES,
     )

@@ -95,11 +95,8 @@ def prepare(record: Record, static_start: float | None) -> Recording:
     accelerometer, gyro = _stamped(accelerometer, gyro)
     t, where = accelerometer.t, accelerometer.source.path
     for triad in (accelerometer, gyro):
-        if triad is not None and not np.isfinite(triad.rate):
-            raise RecordError(
-                triad.source.path,
-                f"found {len(triad.t)} samples of {triad.sensor} without increasing time stamps, expected a recording",
-            )
+        if triad is not None:
+            _plausible(triad)
     window = window_samples(accelerometer.rate)
     variances = {"acc": windowed_variance(accelerometer.values, window)}
     if gyro is not None:
@@ -115,6 +112,20 @@ def prepare(record: Record, static_start: float | None) -> Recording:
             restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
             noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
     return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise)
+
+
+def _plausible(triad: Triad) -> None:
+    """Raise where a triad has no time axis, or values that no sensor gives."""
+    if not np.isfinite(triad.rate):
+        raise RecordError(
+            triad.source.path,
+            f"found {len(triad.t)} samples of {triad.sensor} without increasing time stamps, expected a recording",
+        )
+    size = float(np.max(np.abs(triad.values), initial=0.0, where=np.isfinite(triad.values)))
+    if size > 0.0 and not 1e-100 < size < 1e100:
+        raise RecordError(
+            triad.source.path, f"{triad.sensor} has values up to {size:.3g}, expected the output of a sensor"
+        )
 
 
 def _stamped(accelerometer: Triad, gyro: Triad | None) -> tuple[Triad, Triad | None]:

@@ -95,7 +95,7 @@ def read(
     return Record(
         columns,
         (*findings, *check(columns)),
-        tuple(file.source for file in tables),
+        (*(file.source for file in tables), *(() if record_map is None else (source_of(record_map.path),))),
         next((file.table.labels for file in tables if file.table.labels), ()),
     )
 
@@ -127,15 +127,22 @@ def _without_time(part: Part) -> Part:
     return replace(part, channels=tuple(channel for channel in part.channels or () if channel.name != "t"))
 
 
+def source_of(path: str | Path) -> Source:
+    """A file and the SHA-256 of its bytes; raises `RecordError` where it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            return Source(str(path), hashlib.file_digest(file, "sha256").hexdigest())
+    except OSError as error:
+        raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
+
+
 def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], None]) -> FileTable:
     """The wanted columns of one file, and the hash of its bytes."""
     try:
         table = form.read(path, part.options, part.channels, progress)
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
-    return FileTable(path, Source(str(path), digest), part, table)
+    return FileTable(path, source_of(path), part, table)
 
 
 def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:

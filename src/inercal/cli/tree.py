@@ -1,0 +1,91 @@
+"""The tree of commands: what each does, an example, and the module that is loaded when it is asked for."""
+
+from __future__ import annotations
+
+from cyclopts import App, CycloptsError, Parameter
+
+from inercal import __version__
+from inercal.errors import UsageError
+
+#: verb, kind -> where it is, what it does, an example that runs
+COMMANDS = {
+    ("new", "imu"): (
+        "inercal.cli.new:new_imu",
+        "Write a commented study for `inercal calibrate imu`.\n\nGiven a recording, also a column map guessed from "
+        "it. The study goes to --out (imu.toml if absent), the map beside it (imu-map.toml). Nothing that exists "
+        "is overwritten.",
+        "inercal new imu log.csv --out imu.toml",
+    ),
+    ("inspect", ""): (
+        "inercal.cli.inspect:inspect",
+        "Look at a recording before it is used.\n\nChannels, units, rates, and everything suspicious about it; "
+        "--report writes a page with pictures. Findings do not change the exit code.",
+        "inercal inspect log.csv --report log.html",
+    ),
+    ("calibrate", "imu"): (
+        "inercal.cli.calibrate:calibrate_imu",
+        "Calibrate an IMU that was held still in many poses by hand.\n\nGives bias, scale factor and misalignment "
+        "of the accelerometers, and of the gyro if there is one, with uncertainties. --out saves them (.json or "
+        ".toml), --report writes a page to hand over. Exit code 1: done, but the verdict is not ok.",
+        "inercal calibrate imu log.csv --study imu.toml --report cal.html",
+    ),
+    ("apply", ""): (
+        "inercal.cli.apply:apply",
+        "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv). "
+        "With --invert the recording holds true values and the outputs of the instrument are written.",
+        "inercal apply cal.json log.csv --out corrected.csv",
+    ),
+    ("schema", ""): (
+        "inercal.cli.schema:schema",
+        "Print one JSON Schema that covers every kind of study file, for editors and checkers.",
+        "inercal schema --out inercal.schema.json",
+    ),
+    ("examples", ""): (
+        "inercal.cli.examples:examples",
+        "List the recordings that ship with inercal, or copy one.\n\nA copy comes with its study and map, in the "
+        "folder --out (named after the example if absent).",
+        "inercal examples xsens --out xsens",
+    ),
+}
+
+_GROUPS = {
+    "new": "Write a commented study, and a map guessed from a recording.",
+    "calibrate": "Calibrate an instrument from a recording.",
+}
+
+
+def app() -> App:
+    """The tree of commands; the module of each is loaded only when it is asked for."""
+    root = App(
+        name="inercal",
+        help="Calibrate inertial instruments, and say how sure one can be of every number.",
+        help_epilogue="Example: inercal examples xsens",
+        version=__version__,
+        default_parameter=Parameter(negative=(), show_default=False),
+        help_format="plaintext",
+        help_formatter="plain",
+        exit_on_error=False,
+        print_error=False,
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+    )
+    groups: dict[str, App] = {}
+    for (verb, kind), (where, text, example) in COMMANDS.items():
+        epilogue = f"Example: {example}"
+        if not kind:
+            root.command(where, name=verb, help=text, help_epilogue=epilogue)
+            continue
+        if verb not in groups:
+            groups[verb] = App(name=verb, help=_GROUPS[verb], help_epilogue=epilogue)
+            root.command(groups[verb])
+        groups[verb].command(where, name=kind, help=text, help_epilogue=epilogue)
+    return root
+
+
+def call(arguments: list[str]) -> int | None:
+    """Run a command line; raises `UsageError` where the line itself is wrong."""
+    try:
+        code: int | None = app()(arguments)
+    except CycloptsError as error:
+        raise UsageError(str(error)) from error
+    return code
