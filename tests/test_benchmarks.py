@@ -1,0 +1,28 @@
+"""The benchmarks run: a smoke test, no timing is judged here."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        (["imu_calibration.py", "--smoke"], "inercal, solve"),
+        (["imu_coverage.py", "--runs", "2"], "all together"),
+    ],
+)
+def test_a_small_run(command, says, tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(FOLDER / command[0]), *command[1:]],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert says in done.stdout
