@@ -31,7 +31,8 @@ class TypeB:
     """A source known from elsewhere: gravity, table angle, latitude, fixture, time base.
 
     ``u`` [``unit``] its standard uncertainty, ``sensitivity`` (p,) the derivative of each parameter with
-    respect to it; one value for the whole test, so that it is common to all observations.
+    respect to it; one value for the whole test, so that it is common to all observations. (p, q) stands for q
+    independent components of equal u.
     """
 
     source: str
@@ -42,8 +43,8 @@ class TypeB:
     @property
     def covariance(self) -> Array:
         """(p, p) what it does to the parameters."""
-        shift = self.sensitivity * self.u
-        return np.outer(shift, shift)
+        shift = self.sensitivity.reshape(len(self.sensitivity), -1) * self.u
+        return np.asarray(shift @ shift.T)
 
 
 @dataclass(frozen=True)

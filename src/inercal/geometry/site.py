@@ -48,3 +48,13 @@ class Site:
         if self.latitude is None:
             return EARTH_RATE / math.sqrt(3.0)
         return EARTH_RATE * min(math.cos(self.latitude) * self.latitude_u, 1.0 / math.sqrt(3.0))
+
+    @property
+    def horizontal_rate_u(self) -> float:
+        """Standard deviation of either horizontal component of earth rate [rad/s] at an unknown heading.
+
+        The square of the cosine of the latitude is 2/3 on average over the sphere.
+        """
+        if self.latitude is None:
+            return EARTH_RATE / math.sqrt(3.0)
+        return EARTH_RATE * math.cos(self.latitude) / math.sqrt(2.0)

@@ -2,8 +2,7 @@
 
 Two kinds of data, fitted together: in every turn the vertical of one pose, carried through the gyro's
 output, must meet the vertical of the next (Tedaldi, Pretto, Menegatti, ICRA 2014, eqs. (13) to (16)); in
-every pose the mean output is the bias, plus what the vertical part of earth rate and, if asked for, the
-g-sensitive drift make. (The horizontal part of earth rate has an unknown azimuth and stays in the scatter.)
+every pose the mean output is the bias, plus what earth rate and, if asked for, the g-sensitive drift make.
 All scatter is estimated from the data: that of the pose means about their own regression, that of the turns
 as a variance that grows with the duration of the turn, on top of what the accelerometers' scatter makes of
 the verticals.
@@ -16,8 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.estimate.identifiability import Identifiability, identify
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.imu.earth_rate import EarthRate, UnknownRates, unknown_rates, vertical_output
 from inercal.imu.turns import Turns, carried, carried_with_derivatives, thin
 from inercal.instruments.terms import GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel
@@ -65,9 +66,12 @@ def regress_static(means: Array, regressors: Array) -> StaticRegression:
 class GyroFit:
     """The triad ``model``, ``g_sensitivity`` (3, 3) [output/(m/s^2)], and how they came about.
 
-    ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain`` (p, 3 m +
-    3 n) takes errors of the carried verticals (turn by turn, [rad]) and of the pose means (pose by pose,
-    [output]) to errors of the parameters. ``miss`` (m, 3) is the carried minus the measured vertical [rad].
+    ``x`` (p,) are the parameters ``names``; ``geometry`` tells what turns and poses can tell of them, whatever
+    the noise. ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain``
+    (p, 3 m + 3 n) takes errors of the carried verticals (turn by turn, [rad]) and of the pose means (pose by
+    pose, [output]) to errors of the parameters, ``rate_gain`` (p, q) the unknown parts of earth rate, each in
+    units of its standard deviation. ``miss`` (m, 3) is the carried minus the measured vertical [rad], and
+    ``by_earth`` (n, 3) the output in the poses that is put down to earth rate [output].
     ``vertical_error`` (3 m, 3 n) takes errors of the specific force in the poses to errors of ``miss``;
     ``durations`` (m,) [s] of the turns.
     """
@@ -75,9 +79,14 @@ class GyroFit:
     names: tuple[str, ...]
     model: TriadModel
     g_sensitivity: Array
-    fit: NonlinearFit
+    x: Array
+    converged: bool
+    message: str
+    geometry: Identifiability
     gain: Array
+    rate_gain: Array
     miss: Array
+    by_earth: Array
     walk: float
     dof: float
     static: StaticRegression
@@ -93,7 +102,7 @@ def fit_gyro(
     scatter: float,
     start: TriadModel,
     with_g_sensitivity: bool,
-    vertical_rate: float = 0.0,
+    earth: EarthRate,
 ) -> GyroFit:
     """Fit bias, scale, misalignment and, if asked for, g-sensitivity.
 
@@ -114,16 +123,18 @@ def fit_gyro(
         First guess (see `first_guess`).
     with_g_sensitivity : bool
         Fit the nine g-sensitive drift coefficients too.
-    vertical_rate : float
-        Upward part of earth rate at the site [rad/s].
+    earth : EarthRate
+        What is known of earth rate at the site.
     """
     names = GYRO_TRIAD + (GYRO_G_SENSITIVITY if with_g_sensitivity else ())
+    p = len(names)
     size = np.linalg.norm(f, axis=1, keepdims=True)
     verticals = f / size
     regressors = f if with_g_sensitivity else np.empty((len(f), 0))
-    static = regress_static(without_earth(means, verticals, start, vertical_rate), regressors)
-    design = _static_design(f, len(names))
-    spread = np.repeat(np.maximum(static.scatter, 1e-12 * np.max(start.scale))[None], len(f), axis=0).ravel()
+    by_earth = vertical_output(verticals, start, earth)
+    static = regress_static(means - by_earth, regressors)
+    design = _static_design(f, p)
+    finest = 1e-12 * np.max(start.scale)
 
     theta = np.concatenate(
         [static.coefficients[0], start.scale, [start.misalignment[i, j] for i, j in _OFF_DIAGONAL]]
@@ -133,41 +144,119 @@ def fit_gyro(
     # a bias that turns the instrument by one radian in a turn, and a g-sensitivity that does so at 1 g
     turning = np.max(start.scale) / float(np.median(turns.durations))
     typical = np.concatenate([np.full(3, turning), start.scale, np.ones(6)])
-    typical = np.concatenate([typical, np.full(len(names) - 12, turning / float(np.mean(size)))])
+    typical = np.concatenate([typical, np.full(p - 12, turning / float(np.mean(size)))])
 
     durations = np.repeat(turns.durations, 3)
     dof = 2.0 * len(turns) - 9.0
     walk2 = 0.01**2 / float(np.median(turns.durations))
+    x = theta
     # Coarse rounds come near cheaply; the last one starts at the minimum with the variance settled.
     coarse = thin(turns, COARSE)
     for part in (coarse, coarse, turns, turns):
+        theta = x[:p]
+        spread = np.tile(np.maximum(static.scatter, finest), len(f))
         vertical_error = _vertical_errors(part, verticals, size, theta) @ force_error
         known = scatter**2 * vertical_error @ vertical_error.T
-        factor = np.linalg.cholesky(known + walk2 * np.diag(durations))
-        weigh = np.linalg.inv(factor)
+        weigh = np.linalg.inv(np.linalg.cholesky(known + walk2 * np.diag(durations)))
+        unknown = unknown_rates(part, verticals, *unpack(theta), earth)
+        x = np.concatenate([theta, np.zeros(len(unknown.sizes))])
 
-        def residuals(x: Array, part: Turns = part, weigh: Array = weigh) -> Array:
-            miss = carried(part, verticals, *unpack(x)) - verticals[part.last]
-            rest = design @ x - without_earth(means, verticals, unpack(x)[0], vertical_rate).ravel()
-            return np.concatenate([weigh @ miss.ravel(), rest / spread])
-
-        def jacobian(x: Array, part: Turns = part, weigh: Array = weigh) -> Array:
-            by_parameter = carried_with_derivatives(part, verticals, *unpack(x))[1][..., : len(x)]
-            rest = design + _earth_sensitivity(verticals, unpack(x)[0], vertical_rate, len(x))
-            return np.concatenate([weigh @ by_parameter.reshape(-1, len(x)), rest / spread[:, None]])
-
-        fit = solve(residuals, jacobian, theta, names, typical)
-        theta = fit.x
-        model, g = unpack(theta)
-        miss = carried(part, verticals, model, g) - verticals[part.last]
+        problem = _Problem(part, verticals, means, design, weigh, spread, unknown)
+        sizes = np.concatenate([typical, unknown.sizes])
+        fit = solve(problem.residuals, problem.jacobian, x, (*names, *unknown.names), sizes)
+        x = fit.x
+        model, g = unpack(x[:p])
+        left = problem.miss(x)
+        by_earth = unknown.output(model, x[p:])
+        static = regress_static(means - by_earth, regressors)
         dof = max(1.0, 2.0 * len(turns) - _absorbed(fit, len(weigh)))
-        walk2 = _excess(miss.ravel(), known, durations, dof)
+        walk2 = _excess(left, known, durations, dof)
 
-    gain = fit.gain()
-    gain = np.hstack([gain[:, : len(weigh)] @ weigh, -gain[:, len(weigh) :] / spread])
+    gain = fit.gain()[:p]
+    m, n = len(weigh), len(spread)
+    by_miss, by_output, by_rate = gain[:, :m] @ weigh, -gain[:, m : m + n] / spread, gain[:, m + n :]
     return GyroFit(
-        names, model, g, fit, gain, miss, float(np.sqrt(walk2)), dof, static, vertical_error, turns.durations
+        names,
+        model,
+        g,
+        x[:p],
+        fit.converged,
+        fit.message,
+        _geometry(turns, verticals, model, g, design, typical, names),
+        np.hstack([by_miss, by_output]),
+        # a prior observation of each unknown rate, in units of its size, has an error of one
+        -by_rate,
+        left.reshape(-1, 3),
+        by_earth,
+        float(np.sqrt(walk2)),
+        dof,
+        static,
+        vertical_error,
+        turns.durations,
     )
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Whitened residuals of parameters and unknown rates: misses of the turns, pose means, prior rates."""
+
+    turns: Turns
+    verticals: Array
+    means: Array
+    design: Array
+    weigh: Array
+    spread: Array
+    unknown: UnknownRates
+
+    def _split(self, x: Array) -> tuple[TriadModel, Array, Array]:
+        """Triad, g-sensitivity and rates."""
+        p = self.design.shape[1]
+        return *unpack(x[:p]), x[p:]
+
+    def miss(self, x: Array) -> Array:
+        """(3 m,) carried minus measured verticals [rad]."""
+        model, g, rates = self._split(x)
+        miss = carried(self.turns, self.verticals, model, g) - self.verticals[self.turns.last]
+        return np.asarray(miss.ravel() + self.unknown.in_turns @ rates)
+
+    def residuals(self, x: Array) -> Array:
+        """(3 m + 3 n + q,)."""
+        model, _, rates = self._split(x)
+        rest = (
+            self.design @ x[: self.design.shape[1]] + (self.unknown.output(model, rates) - self.means).ravel()
+        )
+        return np.concatenate([self.weigh @ self.miss(x), rest / self.spread, rates / self.unknown.sizes])
+
+    def jacobian(self, x: Array) -> Array:
+        """(3 m + 3 n + q, p + q)."""
+        model, g, rates = self._split(x)
+        p, q = self.design.shape[1], len(rates)
+        turn = carried_with_derivatives(self.turns, self.verticals, model, g)[1][..., :p].reshape(-1, p)
+        rest = self.design + self.unknown.output_sensitivity(model, rates, p)
+        by_rate = np.einsum("ij,njk->nik", model.gain, self.unknown.at_rest).reshape(-1, q)
+        return np.block(
+            [
+                [self.weigh @ turn, self.weigh @ self.unknown.in_turns],
+                [rest / self.spread[:, None], by_rate / self.spread[:, None]],
+                [np.zeros((q, p)), np.diag(1.0 / self.unknown.sizes)],
+            ]
+        )
+
+
+def _geometry(
+    turns: Turns,
+    verticals: Array,
+    model: TriadModel,
+    g: Array,
+    design: Array,
+    typical: Array,
+    names: tuple[str, ...],
+) -> Identifiability:
+    """What the turns and poses can tell whatever the noise: misses in radians, rates at rest in radians a turn."""
+    by_parameter = carried_with_derivatives(turns, verticals, model, g)[1][..., : len(names)]
+    per_turn = float(np.median(turns.durations)) / np.tile(model.scale, len(verticals))
+    J = np.concatenate([by_parameter.reshape(-1, len(names)), design * per_turn[:, None]])
+    return identify(J, names, typical)
 
 
 def unpack(theta: Array) -> tuple[TriadModel, Array]:
@@ -187,21 +276,6 @@ def _static_design(f: Array, parameters: int) -> Array:
         for j in range(3):
             design[:, j, 12 + 3 * j : 15 + 3 * j] = f
     return design.reshape(-1, parameters)
-
-
-def without_earth(means: Array, verticals: Array, model: TriadModel, vertical_rate: float) -> Array:
-    """Pose means (n, 3) less the output that the vertical part of earth rate [rad/s] makes."""
-    return np.asarray(means - vertical_rate * verticals @ model.gain.T)
-
-
-def _earth_sensitivity(verticals: Array, model: TriadModel, vertical_rate: float, parameters: int) -> Array:
-    """(3 n, p): derivative of the output that the vertical part of earth rate makes."""
-    out = np.zeros((len(verticals), 3, parameters))
-    for i in range(3):
-        out[:, i, 3 + i] = verticals @ model.misalignment[i]
-    for k, (i, j) in enumerate(_OFF_DIAGONAL):
-        out[:, i, 6 + k] = model.scale[i] * verticals[:, j]
-    return vertical_rate * out.reshape(-1, parameters)
 
 
 def _vertical_errors(turns: Turns, verticals: Array, size: Array, theta: Array) -> Array:

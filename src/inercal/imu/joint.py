@@ -17,7 +17,7 @@ from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.gyro import GyroFit
-from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY
+from inercal.instruments.terms import ACCELEROMETER_TRIAD
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> Joint:
     pad = len(names)
     return Joint(
         names + gyro.names,
-        np.concatenate([values, gyro.fit.x]),
+        np.concatenate([values, gyro.x]),
         np.vstack([by_force, to_turn @ gyro.vertical_error]),
         np.vstack([np.zeros((pad, turns)), to_turn]),
         np.vstack([np.zeros((pad, poses)), to_output]),
@@ -107,11 +107,10 @@ def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
 
 
 def type_b(joint: Joint, site: Site, time_base_u: float) -> list[TypeB]:
-    """What gravity, the record's clock and an uncertain latitude do to the parameters.
+    """What gravity, the record's clock and earth rate do to the parameters.
 
     Gravity sets the scale of specific force: K1 and G go as 1/g. The clock sets the scale of rate: S goes as
-    the length of the record's second. The vertical part of earth rate acts as a g-sensitive drift S/g about
-    the vertical.
+    the length of the record's second. The parts of earth rate that are not known act through the fit.
     """
 
     def scaled(factor: float, *prefixes: str) -> Array:
@@ -124,11 +123,11 @@ def type_b(joint: Joint, site: Site, time_base_u: float) -> list[TypeB]:
         return sources
     if time_base_u > 0:
         sources.append(TypeB("time base", time_base_u, "1", scaled(1.0, "S_")))
-    if site.vertical_rate_u > 0 and "G_xx" in joint.names:
-        gain = joint.gyro.model.gain.ravel()
-        drift = dict(zip(GYRO_G_SENSITIVITY, -gain / site.gravity, strict=True))
-        by_rate = np.array([drift.get(name, 0.0) for name in joint.names])
-        sources.append(TypeB("vertical earth rate", site.vertical_rate_u, "rad/s", by_rate))
+    if site.horizontal_rate_u > 0 and joint.gyro.rate_gain.size:
+        padded = np.vstack(
+            [np.zeros((len(ACCELEROMETER_TRIAD), joint.gyro.rate_gain.shape[1])), joint.gyro.rate_gain]
+        )
+        sources.append(TypeB("earth rate", site.horizontal_rate_u, "rad/s", padded / site.horizontal_rate_u))
     return sources
 
 

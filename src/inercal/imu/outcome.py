@@ -76,7 +76,7 @@ def assemble(
     if gyro is not None:
         statistics |= {
             "gyro_dof": float(gyro.dof),
-            "gyro_condition": gyro.fit.identifiability.condition,
+            "gyro_condition": gyro.geometry.condition,
             "gyro_residual_rms_rad": rms_miss(gyro),
             "turns": float(len(gyro.miss)),
         }

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.result import Estimate
-from inercal.imu.gyro import GyroFit, first_guess, fit_gyro, without_earth
+from inercal.imu.earth_rate import earth_rate_at
+from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
 from inercal.imu.joint import Scatter, force_error, join
 from inercal.imu.outcome import assemble, without_fit
 from inercal.imu.poses import Poses, Recording, choose, prepare, sweep
@@ -185,12 +186,10 @@ def _calibrate_gyro(
         return None, [*findings, Finding("gyro_missing", said)]
     scale, _ = first_guess(turns, acc.directions, means[0])
     start = TriadModel(np.full(3, scale), np.eye(3), means[0])
-    vertical_rate = settings.site.vertical_rate
-    error = force_error(acc)
-    gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, vertical_rate)
+    error, earth = force_error(acc), earth_rate_at(settings.site)
+    gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, earth)
     middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
-    at_rest = without_earth(means, acc.directions, gyro.model, vertical_rate)
-    findings += gyro_findings(middles, at_rest, acc.f, gyro, recording.gyro.unit.symbol)
-    if not gyro.fit.converged or rms_miss(gyro) > WORST_MISS:
+    findings += gyro_findings(middles, means - gyro.by_earth, acc.f, gyro, recording.gyro.unit.symbol)
+    if not gyro.converged or rms_miss(gyro) > WORST_MISS:
         findings += axis_findings(turns, acc.directions, means[0])
     return gyro, findings

@@ -88,15 +88,15 @@ def verdict(poses: Poses, gyro: GyroFit | None, gravity: float, u: dict[str, flo
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
     miss = rms_miss(gyro)
-    if not gyro.fit.converged:
-        return Status.NOT_CONVERGED, f"the fit of the gyro ended early: {gyro.fit.message}"
+    if not gyro.converged:
+        return Status.NOT_CONVERGED, f"the fit of the gyro ended early: {gyro.message}"
     if miss > WORST_MISS:
         return (
             Status.INCONSISTENT,
             f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
             "carried through the turns): check the gyro's unit, signs and order of axes",
         )
-    known = gyro.fit.identifiability
+    known = gyro.geometry
     if known.condition > WORST_CONDITION:
         term = known.leading_term()
         return (
