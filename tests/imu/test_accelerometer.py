@@ -93,7 +93,7 @@ def test_the_order_of_the_poses_does_not_matter():
 
 
 def test_the_covariance_is_that_of_a_monte_carlo():
-    """Ratio of empirical to stated variance within its own chi-square limits (200 draws, 9 parameters)."""
+    """Ratio of empirical to stated variance within its own chi-square limits (400 draws, 9 parameters)."""
     rng = np.random.default_rng(7)
     true, up = theta(7), directions(7, 20)
     clean, sigma = model_from(true).indicate(G * up), 0.4

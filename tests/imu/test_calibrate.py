@@ -8,6 +8,7 @@ from recordings import arrays, record_of, shipped
 
 from inercal.errors import InputError
 from inercal.estimate.status import Status
+from inercal.geometry.rotations import conjugate, exp, rotate
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
@@ -32,7 +33,7 @@ def compare(estimate, truth):
 
 @pytest.mark.parametrize("g_sensitivity", [0.0, 2e-4])
 def test_without_noise_the_truth_comes_back(g_sensitivity):
-    """What is left is the horizontal part of earth rate, 5e-5 rad/s in turns of 3 s: 1.5e-4 rad."""
+    """The horizontal part of earth rate included, which this good a gyro measures itself."""
     record, truth = recording(quiet=True, g_sensitivity=g_sensitivity)
     estimate = calibrate(record, replace(SETTINGS, g_sensitivity=g_sensitivity > 0)).estimate
     assert estimate.status is Status.OK
@@ -40,7 +41,7 @@ def test_without_noise_the_truth_comes_back(g_sensitivity):
     for name, value in error.items():
         size = {"K0": 415.0, "K1": 415.0, "M": 1.0, "D_F": 4775.0, "S": 4775.0, "T": 1.0, "G": 478.0}
         relative = abs(value) / size[name.rpartition("_")[0]]
-        assert relative < (1e-5 if name[0] in "KM" else 3e-4), name
+        assert relative < (1e-5 if name[0] in "KM" else 2e-5), name
 
 
 def test_every_coefficient_within_five_standard_uncertainties():
@@ -74,6 +75,9 @@ def test_turning_the_axes_of_the_frame_turns_the_coefficients():
     for here, there in zip("xyz", "yzx", strict=True):
         assert abs(a[f"K0_{here}"].value - b[f"K0_{there}"].value) < 0.05 * a[f"K0_{here}"].u
         assert abs(a[f"D_F_{here}"].value - b[f"D_F_{there}"].value) < 0.05 * a[f"D_F_{here}"].u
+        # scale factors to second order in the misalignments, 0.02 rad each
+        assert a[f"K1_{here}"].value == pytest.approx(b[f"K1_{there}"].value, rel=3e-3)
+        assert a[f"S_{here}"].value == pytest.approx(b[f"S_{there}"].value, rel=3e-3)
 
 
 def test_more_gravity_uncertainty_reaches_the_scales_only():
@@ -193,6 +197,122 @@ def test_a_gap_in_a_hold_does_not_join_what_it_parts():
     assert all(not (d.start < 600 < d.stop) for d in found.poses.dwells)
 
 
+def heading_kept(rng, count):
+    """Poses reached without turning about the vertical: every one at nearly the same heading."""
+    q = hand_poses(rng, count)
+    up = rotate(conjugate(q), np.array([0.0, 0.0, 1.0]))
+    across = np.cross([0.0, 0.0, 1.0], up)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+    kept = conjugate(exp(across * np.arccos(np.clip(up[:, 2:], -1, 1))))
+    kept[0] = [1.0, 0.0, 0.0, 0.0]
+    return kept
+
+
+@pytest.mark.parametrize("white", [2e-6, 8.7e-5])
+@pytest.mark.parametrize("latitude_known", [True, False])
+def test_earth_rate_is_in_the_uncertainty_also_at_one_heading(white, latitude_known):
+    """48 calibrations whose heading never changes: error/u of the biases must not exceed what u says.
+
+    The sum of squares of error/u over 48 runs and 3 axes, correlated within a run, stays below 144 + 5 sigma
+    (sigma from 48 independent runs of three equal values: 3 sqrt(2 48)); left out, it was ten times that.
+    """
+    total = 0.0
+    for seed in range(48):
+        rng = np.random.default_rng(900 + seed)
+        truth = replace(draw_truth(rng), gyro_noise=Noise(white))
+        record, truth = simulate(truth, heading_kept(rng, 14), 9.81, 0.8, rng, rate=25.0, start=15.0)
+        site = Site(9.81, (), 0.8 if latitude_known else None)
+        estimate = calibrate(record, ImuSettings(site)).estimate
+        scaled = dict(zip(estimate.names, compare(estimate, truth) / estimate.u, strict=True))
+        total += sum(scaled[f"D_F_{axis}"] ** 2 for axis in "xyz")
+        assert not any(finding.code == "g_sensitivity" for finding in estimate.findings)
+    assert total < 144 + 5 * 3 * np.sqrt(2 * 48)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "words"),
+    [
+        (("count", "deg/s"), 80.0 * 57.29578, "gyro"),  # rad/s labelled deg/s
+        (("count", "rad/s"), 80.0, "gyro"),  # deg/s labelled rad/s
+    ],
+)
+def test_a_wrong_physical_unit_is_no_sound_calibration(unit, factor, words):
+    record, _ = recording(seed=18)
+    t, acc, gyro = arrays(record)
+    estimate = calibrate(record_of(t, acc, gyro / factor, *unit), SETTINGS).estimate
+    assert estimate.status is Status.INCONSISTENT
+    assert words in estimate.message
+    assert "check the unit" in estimate.message
+
+
+def test_specific_force_in_g_labelled_as_metres_per_second_squared():
+    record, _ = recording(seed=18)
+    t, acc, gyro = arrays(record)
+    estimate = calibrate(record_of(t, acc / 415.0 / 9.80665, gyro, "m/s^2"), SETTINGS).estimate
+    assert estimate.status is Status.INCONSISTENT
+    assert "acc are 0.1" in estimate.message
+
+
+def test_a_missing_accelerometer_sample_in_a_turn_does_no_harm_to_g_sensitivity():
+    record, truth = recording(seed=19, poses=24, g_sensitivity=2e-4)
+    t, acc, gyro = arrays(record)
+    acc[np.searchsorted(t, 31.5), 1] = np.nan
+    estimate = calibrate(record_of(t, acc, gyro), replace(SETTINGS, g_sensitivity=True)).estimate
+    assert estimate.status is Status.OK
+    assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
+
+
+def test_lost_samples_jitter_and_coarse_stamps_do_not_stop_a_calibration():
+    record, truth = recording(seed=20, poses=24, rate=100.0)
+    t, acc, gyro = arrays(record)
+    rng = np.random.default_rng(20)
+    kept = rng.random(len(t)) > 0.01
+    cases = {
+        "lost": (t[kept], acc[kept], gyro[kept]),
+        "jitter": (t + rng.uniform(-0.003, 0.003, len(t)), acc, gyro),
+        "coarse": (np.floor(t * 60.0) / 60.0, acc, gyro),
+    }
+    for name, (tt, a, w) in cases.items():
+        estimate = calibrate(record_of(tt, a, w), SETTINGS).estimate
+        assert estimate.status is Status.OK, name
+        assert estimate.statistics["intervals"] == 24, name
+        assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0, name
+
+
+def test_a_coarse_gyro_says_so_and_its_bias_is_no_better_than_a_step():
+    """Output in steps of 1/16.4 deg/s with less noise than half a step: u(D_F) is at least step/sqrt(12)."""
+    rng = np.random.default_rng(21)
+    truth = replace(draw_truth(rng), gyro_noise=Noise(2e-5))
+    record, truth = simulate(truth, hand_poses(rng, 20), 9.81, 0.8, rng, rate=50.0)
+    t, acc, gyro = arrays(record)
+    step = 4775.0 / 57.3 / 16.4
+    estimate = calibrate(record_of(t, acc, step * np.round(gyro / step)), SETTINGS).estimate
+    codes = [finding.code for finding in estimate.findings]
+    assert "resolution" in codes
+    assert "g_sensitivity" not in codes
+    assert all(estimate[f"D_F_{axis}"].u > 0.99 * step / np.sqrt(12) for axis in "xyz")
+    assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
+
+
+@pytest.mark.parametrize("sensor", ["acc", "gyro"])
+def test_a_dead_axis_is_named(sensor):
+    record, _ = recording(seed=22)
+    t, acc, gyro = arrays(record)
+    (acc if sensor == "acc" else gyro)[:, 1] = 32768.0
+    with pytest.raises(InputError, match=f"{sensor}_y never changes"):
+        calibrate(record_of(t, acc, gyro), SETTINGS)
+
+
+def test_a_gyro_that_could_not_be_calibrated_is_no_sound_calibration():
+    record, _ = recording(seed=23)
+    t, acc, gyro = arrays(record)
+    gyro[1600::40] = np.nan  # a hole in every turn
+    estimate = calibrate(record_of(t, acc, gyro), SETTINGS).estimate
+    assert estimate.status is not Status.OK
+    assert any(finding.code == "gyro_missing" for finding in estimate.findings)
+    assert "S_x" not in estimate.names
+
+
 def test_a_drifting_gyro_is_named():
     record, _ = recording(seed=14)
     t, acc, gyro = arrays(record)
@@ -212,7 +332,7 @@ def test_g_sensitivity_is_named_where_it_is_not_estimated():
     [
         (lambda t, a, w: (t[:5], a[:5], w[:5]), "samples"),
         (lambda t, a, w: (t, a * np.nan, w), "expected"),
-        (lambda t, a, w: (t, np.zeros_like(a) + 7, w), "no noise"),
+        (lambda t, a, w: (t, np.zeros_like(a) + 7, w), "never changes"),
         (lambda t, a, w: (t[2000:], a[2000:], w[2000:]), "moves"),
         (lambda t, a, w: (t * 0.0, a, w), "time"),
         (lambda t, a, w: (t, a * 1e250, w), "values up to"),

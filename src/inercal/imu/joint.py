@@ -8,6 +8,7 @@ give the covariance that the sensors' noise alone would cause.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,8 +107,11 @@ def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
     return sources
 
 
-def type_b(joint: Joint, site: Site, time_base_u: float) -> list[TypeB]:
-    """What gravity, the record's clock and earth rate do to the parameters.
+def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro_unit: str) -> list[TypeB]:
+    """What gravity, the record's clock, earth rate and the gyro's resolution do to the parameters.
+
+    ``resolution`` (3,) [``gyro_unit``] is the step of gyro outputs too coarse for their noise, else 0: then every
+    pose has the same rounding error, u = step/sqrt(12) (GUM F.2.2.1), where scatter shows nothing.
 
     Gravity sets the scale of specific force: K1 and G go as 1/g. The clock sets the scale of rate: S goes as
     the length of the record's second. The parts of earth rate that are not known act through the fit.
@@ -128,6 +132,12 @@ def type_b(joint: Joint, site: Site, time_base_u: float) -> list[TypeB]:
             [np.zeros((len(ACCELEROMETER_TRIAD), joint.gyro.rate_gain.shape[1])), joint.gyro.rate_gain]
         )
         sources.append(TypeB("earth rate", site.horizontal_rate_u, "rad/s", padded / site.horizontal_rate_u))
+    if np.any(resolution > 0):
+        largest = float(np.max(resolution))
+        own = np.zeros((len(joint.names), 3))
+        for i, axis in enumerate("xyz"):
+            own[joint.names.index(f"D_F_{axis}"), i] = resolution[i] / largest
+        sources.append(TypeB("gyro resolution", largest / math.sqrt(12.0), gyro_unit, own))
     return sources
 
 

@@ -55,13 +55,14 @@ def assemble(
     findings: list[Finding],
 ) -> Estimate:
     """Put the estimate together."""
-    from_scatter = type_a(joint, scatter, "" if recording.gyro is None else recording.gyro.unit.symbol)
-    covariance, dof, budget = combine(
-        joint.names, [*from_scatter, *type_b(joint, settings.site, settings.time_base_u)]
-    )
+    gyro_unit = "" if recording.gyro is None else recording.gyro.unit.symbol
+    from_scatter = type_a(joint, scatter, gyro_unit)
+    resolution = recording.resolution.get("gyro", np.zeros(3))
+    known = type_b(joint, settings.site, settings.time_base_u, resolution, gyro_unit)
+    covariance, dof, budget = combine(joint.names, [*from_scatter, *known])
     residual = np.sum([source.covariance for source in from_scatter], axis=0)
     u = dict(zip(joint.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    status, message = verdict(poses, joint.gyro, settings.site.gravity, u)
+    status, message = verdict(recording, poses, joint.gyro, settings.site.gravity, u)
     noise = noise_covariance(joint, *_noise(recording, poses, joint))
     acc, gyro = poses.accelerometer, joint.gyro
     statistics = {
@@ -147,8 +148,9 @@ def _conditions(recording: Recording, poses: Poses, settings: ImuSettings) -> di
     """Conditions and ranges over which the result is valid, as recorded."""
     t = recording.accelerometer.t
     temperature = settings.temperature
+    g = settings.site.gravity
     ranges: dict[str, Any] = {
-        "specific_force_m_s2": [0.0, settings.site.gravity],
+        "specific_force_along_an_axis_m_s2": [-g, g],
         "duration_s": float(t[-1] - t[0]),
         "rate_hz": recording.accelerometer.rate,
     }

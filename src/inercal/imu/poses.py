@@ -42,7 +42,9 @@ class Recording:
     """The triads of a record, and what its initial static period says about their noise.
 
     ``restlessness`` holds, for each triad, the windowed variance over that of the initial static period, on
-    the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it.
+    the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it,
+    ``resolution`` (3,) the step of those axes whose noise at rest is below half a step (0 for the others)
+    [output].
     """
 
     accelerometer: Triad
@@ -52,6 +54,7 @@ class Recording:
     cuts: NDArray[np.int64]
     restlessness: dict[str, Array]
     noise: dict[str, AllanFit]
+    resolution: dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -102,16 +105,18 @@ def prepare(record: Record, static_start: float | None) -> Recording:
     if gyro is not None:
         own = windowed_variance(gyro.values, window_samples(gyro.rate))
         variances["gyro"] = own if gyro.t is t else _on_other_clock(own, gyro.t, t)
-    cuts = breaks(t)
+    # a lost sample does no harm to the mean of a hold; half a window lost may hide a movement
+    cuts = breaks(t, 0.5 * window / accelerometer.rate)
     initial = _initial(t, variances["acc"], window, cuts, static_start, where)
-    noise, restlessness = {}, {}
+    noise, restlessness, resolution = {}, {}, {}
     for triad in (accelerometer, gyro):
         if triad is not None:
             rest = _at_rest(triad, t[initial.start], t[initial.stop - 1], static_start)
             size = float(np.linalg.norm(np.var(rest, axis=0, ddof=1)))
             restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
             noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
-    return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise)
+            resolution[triad.sensor] = _coarse_steps(triad.values, rest)
+    return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise, resolution)
 
 
 def _plausible(triad: Triad) -> None:
@@ -121,6 +126,13 @@ def _plausible(triad: Triad) -> None:
             triad.source.path,
             f"found {len(triad.t)} samples of {triad.sensor} without increasing time stamps, expected a recording",
         )
+    for axis, values in zip("xyz", triad.values.T, strict=True):
+        known = values[np.isfinite(values)]
+        if known.size and np.ptp(known) == 0.0:
+            raise RecordError(
+                triad.source.path,
+                f"{triad.sensor}_{axis} never changes ({known[0]:g}), expected a live sensor",
+            )
     size = float(np.max(np.abs(triad.values), initial=0.0, where=np.isfinite(triad.values)))
     if size > 0.0 and not 1e-100 < size < 1e100:
         raise RecordError(
@@ -164,6 +176,17 @@ def _at_rest(triad: Triad, begin: float, end: float, static_start: float | None)
     return rest
 
 
+def _coarse_steps(values: Array, rest: Array) -> Array:
+    """The output's step on axes (3,) whose standard deviation at ``rest`` is below half of it, else 0."""
+    steps = np.zeros(3)
+    for i in range(3):
+        moves = np.abs(np.diff(values[:, i]))
+        least = np.min(moves, initial=np.inf, where=np.isfinite(moves) & (moves > 0))
+        if np.std(rest[:, i]) < 0.5 * least < np.inf:
+            steps[i] = least
+    return steps
+
+
 def _initial(
     t: Array,
     variance: Array,
@@ -183,17 +206,22 @@ def _initial(
     # the calmest twentieth of the record tells what rest looks like before anything else is known
     calm = float(np.quantile(variance[known], 0.05))
     restless = np.flatnonzero(variance[first:] > MOVING * max(calm, 1e-300)) + first
-    ends = [*(restless[:1] - window // 2), *cuts[cuts > first][:1], len(t)]
-    stop = max(int(min(ends)), 0)
+    moves = int(restless[0] - window // 2) if len(restless) else len(t)
+    broken = int(next(iter(cuts[cuts > first]), len(t)))
+    stop = max(min(moves, broken), 0)
     still = float(t[max(stop - 1, 0)] - t[0])
+    event = "the instrument moves" if moves <= broken else "the time axis breaks"
     if static_start is None:
         if still < SHORTEST_START:
             raise RecordError(
                 where,
-                f"the instrument moves {still:.1f} s after the start, expected at least {SHORTEST_START:g} s "
-                "at rest (say how long with imu.static_start)",
+                f"{event} {still:.1f} s after the start, expected at least {SHORTEST_START:g} s at rest",
             )
         return Dwell(0, stop)
+    if t[-1] - t[0] < SHORTEST_START:
+        raise RecordError(
+            where, f"lasts {t[-1] - t[0]:.1f} s, expected at least {SHORTEST_START:g} s at rest and turns"
+        )
     if not SHORTEST_START <= static_start <= t[-1] - t[0]:
         raise StudyError(
             "imu.static_start",
@@ -206,7 +234,7 @@ def _initial(
     if stop < stated - window and (not len(inside) or np.max(inside) > MOVING * np.median(inside)):
         raise StudyError(
             "imu.static_start",
-            f"found {static_start:g} s, expected a still period: the instrument moves after {still:.1f} s",
+            f"found {static_start:g} s, expected a still period: {event} after {still:.1f} s",
         )
     return Dwell(0, stated)
 
@@ -253,7 +281,8 @@ def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
             seen.add(dwells)
             means = np.array([dwell.of(y).mean(axis=0) for dwell in dwells])
             found = fit_accelerometer(means, gravity, start)
-            if not found.fit.converged or np.any(found.model.scale <= 0):
+            full_rank = found.fit.identifiability.rank == PARAMETERS
+            if not found.fit.converged or not full_rank or np.any(found.model.scale <= 0):
                 continue
             start = found.fit.x
             lengths = np.array([dwell.samples for dwell in dwells]) / rate

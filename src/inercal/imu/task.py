@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -26,10 +27,14 @@ from inercal.imu.verdict import (
     scatter_findings,
 )
 from inercal.instruments.triad import TriadModel
+from inercal.records.checks import saturated
 from inercal.records.findings import Finding
-from inercal.records.record import Record
+from inercal.records.record import Record, Triad
 
 Array = NDArray[np.float64]
+
+LOST = 3.5
+"""Longest step of time in a turn, in sample intervals: two lost samples hardly matter to its integral."""
 
 FEWEST_TURNS = 7
 """Turns without which the gyro is not fitted: two equations each, for twelve parameters."""
@@ -127,42 +132,44 @@ def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns 
     """The turns between neighbouring poses that can be integrated, and what is said of the others."""
     gyro = recording.gyro
     assert gyro is not None
-    usual = np.median(np.diff(gyro.t))
-    limits = np.nanmin(gyro.values, axis=0), np.nanmax(gyro.values, axis=0)
-    spans, findings = [], []
-    for k, (here, there) in enumerate(zip(poses.dwells, poses.dwells[1:], strict=False)):
+    longest = LOST / gyro.rate
+    clipped = np.zeros(len(gyro.t), dtype=bool)
+    for values in gyro.values.T:
+        clipped[saturated(values)] = True
+    force = _force_on(gyro, recording.accelerometer, poses, with_force)
+    spans, left_out = [], []
+    for k, (here, there) in enumerate(itertools.pairwise(poses.dwells)):
         start, stop = _gyro_index(recording, here.stop - 1), _gyro_index(recording, there.start)
-        part, steps = gyro.values[start : stop + 1], np.diff(gyro.t[start : stop + 1])
-        if not np.isfinite(part).all() or not np.all((steps > 0) & (steps < 1.5 * usual)):
+        part = slice(start, stop + 1)
+        steps = np.diff(gyro.t[part])
+        if not (np.isfinite(gyro.values[part]).all() and np.isfinite(force[part]).all()):
             why = "samples are missing"
-        elif any(_flat_at(part, limit) for limit in limits):
+        elif len(steps) == 0 or not np.all((steps >= 0) & (steps <= longest)):
+            why = "the time axis breaks"
+        elif clipped[part].any():
             why = "the gyro saturates"
         else:
             spans.append((k, start, stop))
             continue
         where = f"t {gyro.t[start]:.2f} to {gyro.t[stop]:.2f} s"
-        findings.append(Finding("skipped_turn", f"a turn is left out: {why}", where))
+        left_out.append(Finding("skipped_turn", f"a turn is left out: {why}", where))
     if len(spans) < FEWEST_TURNS:
-        findings.append(
+        left_out.append(
             Finding(
                 "gyro_missing",
                 f"found {len(spans)} turns between poses, expected at least {FEWEST_TURNS}: the gyro is not calibrated",
             )
         )
-        return None, findings
-    force = np.zeros_like(gyro.values)
-    if with_force:
-        acc = recording.accelerometer
-        f = poses.accelerometer.model.correct(acc.values)
-        same = gyro.t is acc.t
-        force = f if same else np.column_stack([np.interp(gyro.t, acc.t, column) for column in f.T])
-    return cut_turns(gyro.t, gyro.values, force, spans), findings
+        return None, left_out
+    return cut_turns(gyro.t, gyro.values, force, spans), left_out
 
 
-def _flat_at(part: Array, limit: Array) -> bool:
-    """True if an axis stays at its limit for three samples or more."""
-    at = part == limit
-    return bool(np.any(at[2:] & at[1:-1] & at[:-2]))
+def _force_on(gyro: Triad, acc: Triad, poses: Poses, wanted: bool) -> Array:
+    """Specific force (n, 3) [m/s^2] at the gyro's samples; zeros where it is not wanted."""
+    if not wanted:
+        return np.zeros_like(gyro.values)
+    f = poses.accelerometer.model.correct(acc.values)
+    return f if gyro.t is acc.t else np.column_stack([np.interp(gyro.t, acc.t, column) for column in f.T])
 
 
 def _calibrate_gyro(
@@ -189,7 +196,9 @@ def _calibrate_gyro(
     error, earth = force_error(acc), earth_rate_at(settings.site)
     gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, earth)
     middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
-    findings += gyro_findings(middles, means - gyro.by_earth, acc.f, gyro, recording.gyro.unit.symbol)
+    findings += gyro_findings(
+        middles, means - gyro.by_earth, acc.f, gyro, recording.gyro.unit.symbol, recording.resolution["gyro"]
+    )
     if not gyro.converged or rms_miss(gyro) > WORST_MISS:
         findings += axis_findings(turns, acc.directions, means[0])
     return gyro, findings

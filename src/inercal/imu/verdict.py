@@ -13,10 +13,12 @@ from inercal.estimate.status import Status
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.gyro import GyroFit, first_guess, regress_static
 from inercal.imu.joint import Scatter
-from inercal.imu.poses import Poses
+from inercal.imu.poses import Poses, Recording
 from inercal.imu.turns import Turns
+from inercal.instruments.triad import TriadModel
 from inercal.records.findings import Finding
 from inercal.records.places import counted
+from inercal.records.record import Triad
 
 Array = NDArray[np.float64]
 
@@ -70,9 +72,30 @@ def rms_miss(gyro: GyroFit) -> float:
     return float(np.sqrt(np.mean(np.sum(gyro.miss**2, axis=1))))
 
 
-def verdict(poses: Poses, gyro: GyroFit | None, gravity: float, u: dict[str, float]) -> tuple[Status, str]:
+def _unit_words(triad: Triad, model: TriadModel) -> str:
+    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
+    if triad.unit.dimension in ("count", "voltage"):
+        return ""
+    nominal = 1.0 / triad.unit.factor
+    ratio = float(np.median(model.scale) / nominal)
+    if 0.5 < ratio < 2.0:
+        return ""
+    return (
+        f"the scale factors of {triad.sensor} are {ratio:.3g} times those of outputs in {triad.unit.symbol}: check "
+        f"the unit{' and the time stamps' if triad.sensor == 'gyro' else ''} in the map or header"
+    )
+
+
+def verdict(
+    recording: Recording, poses: Poses, gyro: GyroFit | None, gravity: float, u: dict[str, float]
+) -> tuple[Status, str]:
     """Status and message; ``u`` the standard uncertainties by name."""
     acc = poses.accelerometer
+    of_gyro = None if gyro is None else gyro.model
+    for triad, model in ((recording.accelerometer, acc.model), (recording.gyro, of_gyro)):
+        wrong = "" if triad is None or model is None else _unit_words(triad, model)
+        if wrong:
+            return Status.INCONSISTENT, wrong
     known = acc.fit.identifiability
     if known.condition > WORST_CONDITION:
         term = known.leading_term()
@@ -84,6 +107,12 @@ def verdict(poses: Poses, gyro: GyroFit | None, gravity: float, u: dict[str, flo
             f"the {len(poses.dwells)} poses {'do not fix' if lacking else 'hardly fix'} {term} ({number}; weak "
             f"combination {known.weakest()}, condition {known.condition:.0f}): add poses with the specific "
             f"force along {pose_words(curing_pose(acc, gravity))} and its opposite",
+        )
+    if gyro is None and recording.gyro is not None:
+        return (
+            Status.TOO_FEW_INTERVALS,
+            f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses; the gyro could not be "
+            "calibrated: see the findings",
         )
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
@@ -128,8 +157,23 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
         )
 
 
-def gyro_findings(times: Array, means: Array, f: Array, gyro: GyroFit, unit: str) -> Iterator[Finding]:
-    """Findings about the gyro's output at rest: drift with time, change with the pose."""
+def gyro_findings(
+    times: Array, means: Array, f: Array, gyro: GyroFit, unit: str, resolution: Array
+) -> Iterator[Finding]:
+    """Findings about the gyro's output at rest: its steps, drift with time, change with the pose.
+
+    ``resolution`` (3,) is the step of outputs too coarse for their noise, else 0.
+    """
+    if np.any(resolution > 0):
+        words = ", ".join(
+            f"{axis} {step:.3g}" for axis, step in zip("xyz", resolution, strict=True) if step > 0
+        )
+        yield Finding(
+            "resolution",
+            f"the noise of the gyro at rest is below half a step of its output ({words} {unit}), so that averaging "
+            "does not help: D_F is no better known than step/sqrt(12)",
+        )
+        return
     with_g = len(gyro.names) > 12
     base = f if with_g else np.empty((len(f), 0))
     span = times - times.mean()

@@ -128,23 +128,34 @@ def time_unit(t: Array, subject: str = "t") -> list[Finding]:
 
 
 def saturation(values: Array, name: str) -> list[Finding]:
-    """``saturation``: three or more equal samples at an extreme that motion has run into.
+    """``saturation``: three or more equal samples at an extreme that motion has run into."""
+    rows = saturated(values)
+    if rows.size == 0:
+        return []
+    at = " and ".join(f"{level:.6g}" for level in np.unique(values[rows]))
+    text = f"{name}: {counted(rows.size, 'sample')} in runs at {at}"
+    return [Finding("saturation", text, places("row", rows + 1))]
+
+
+def saturated(values: Array) -> NDArray[np.int64]:
+    """Rows of ``values`` (n,) in runs of three or more equal samples at an extreme that motion has run into.
 
     Quiet signals rest on the steps of their converter, and noise-free ones on any level. So a run counts
     only if the samples before and after are well off the extreme (by more than three of the smallest steps
     and by 2 % of a large one), and only if there are not as many such runs at other levels, nor most of the
     samples in them.
     """
+    none = np.zeros(0, dtype=np.int64)
     signal, rows = _known(values)
     if signal.size < 10:
-        return []
+        return none
     low, high = signal.min(), signal.max()
     if max(np.count_nonzero(signal == low), np.count_nonzero(signal == high)) < 3:
-        return []
+        return none
     step = np.diff(signal)
     size = np.abs(step[step != 0])
     if size.size == 0 or high - low < 20 * size.min():
-        return []
+        return none
     starts, ends = _plateaus(step)
     before = np.where(starts > 0, np.abs(step[starts - 1]), np.inf)
     after = np.where(ends < step.size, np.abs(step[np.minimum(ends, step.size - 1)]), np.inf)
@@ -153,11 +164,9 @@ def saturation(values: Array, name: str) -> list[Finding]:
     extreme = (signal[starts] == low) | (signal[starts] == high)
     samples = int((ends - starts + 1)[extreme].sum())
     if 2 * np.count_nonzero(extreme) <= extreme.size or 2 * samples > signal.size:
-        return []
+        return none
     runs = np.concatenate([np.arange(a, b + 1) for a, b in zip(starts[extreme], ends[extreme], strict=True)])
-    at = " and ".join(f"{level:.6g}" for level in np.unique(signal[starts[extreme]]))
-    text = f"{name}: {counted(samples, 'sample')} in runs at {at}"
-    return [Finding("saturation", text, places("row", rows[runs] + 1))]
+    return np.asarray(rows[runs], dtype=np.int64)
 
 
 def _plateaus(step: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -79,12 +79,14 @@ def _moving_sum(x: Array, window: int) -> Array:
     return np.asarray(sums[window:] - sums[:-window])
 
 
-def breaks(t: Array) -> NDArray[np.int64]:
-    """Indices i where the time axis breaks between samples i - 1 and i: gaps, repeated, backward, no stamps."""
+def breaks(t: Array, longest: float) -> NDArray[np.int64]:
+    """Indices i where the time axis breaks between samples i - 1 and i.
+
+    A break is a gap over ``longest`` [s], a stamp that runs backward, or one that is no number. Repeated and
+    jittered stamps are none: they do no harm to means and integrals.
+    """
     steps = np.diff(t)
-    known = steps[np.isfinite(steps)]
-    usual = np.median(known) if known.size else 0.0
-    return np.flatnonzero(~((steps > 0.0) & (steps < 1.5 * usual))) + 1
+    return np.flatnonzero(~((steps >= 0.0) & (steps <= longest))) + 1
 
 
 def static_intervals(still: NDArray[np.bool_], cuts: NDArray[np.int64], shortest: int) -> tuple[Dwell, ...]:

@@ -29,6 +29,7 @@ CODES: dict[str, str] = {
     "bias_drift": "a bias drifts over the recording",
     "excess_scatter": "the scatter of the residuals exceeds what the sensor noise explains",
     "few_degrees_of_freedom": "hardly more data than unknowns",
+    "resolution": "the output moves in steps that hide its noise",
     "skipped_turn": "a turn was left out of the fit",
 }
 

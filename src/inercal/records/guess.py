@@ -284,7 +284,7 @@ def _rate(leading: Iterable[str]) -> list[str]:
             "[time]",
             f'rate = "{match[1]} Hz"',
         ]
-    return ["", "# there is no time column: PUT THE SAMPLE RATE HERE", "[time]", 'rate = "100 Hz"']
+    return ["", "# there is no time column", "[time]", 'rate = "PUT THE SAMPLE RATE HERE, such as 100 Hz"']
 
 
 def _table_names(files: Sequence[_File]) -> list[str]:
@@ -298,5 +298,6 @@ def _table_names(files: Sequence[_File]) -> list[str]:
 
 
 def _quoted(value: object) -> str:
-    """A number, text or list as TOML writes it."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    """A number, text or list as TOML writes it; bytes in file names that no encoding knew as far as possible."""
+    text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
