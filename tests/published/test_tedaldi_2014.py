@@ -14,7 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
 from recordings import shipped
 
 from inercal.estimate.status import Status
-from inercal.imu.poses import choose, prepare, sweep
+from inercal.imu.poses import choose, sweep
+from inercal.imu.recording import prepare
 from inercal.imu.task import calibrate
 
 IMU_TK = {

@@ -14,7 +14,8 @@ from inercal.estimate.budget import combine
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
-from inercal.imu.poses import FEWEST, MULTIPLES, Poses, Recording, distinct, dwells_at
+from inercal.imu.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
+from inercal.imu.recording import Recording
 from inercal.imu.settings import ImuSettings
 from inercal.imu.verdict import rms_miss, spread_words, verdict
 from inercal.instruments.terms import TERMS

@@ -7,17 +7,14 @@ the multiple is the one whose poses the accelerometer model fits best per degree
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.errors import RecordError, StudyError
 from inercal.imu.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
-from inercal.noise.allan import AllanFit
-from inercal.noise.allan import fit as fit_allan
-from inercal.records.dwells import Dwell, breaks, static_intervals, window_samples, windowed_variance
-from inercal.records.record import Record, Triad
+from inercal.imu.recording import Recording
+from inercal.records.dwells import Dwell, static_intervals
 
 Array = NDArray[np.float64]
 
@@ -29,32 +26,6 @@ FEWEST = PARAMETERS + 1
 
 SAME_POSE = 5e-3
 """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
-
-MOVING = 30.0
-"""Variance over that at rest from which the instrument certainly moves."""
-
-SHORTEST_START = 5.0
-"""Shortest initial static period [s]."""
-
-
-@dataclass(frozen=True)
-class Recording:
-    """The triads of a record, and what its initial static period says about their noise.
-
-    ``restlessness`` holds, for each triad, the windowed variance over that of the initial static period, on
-    the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it,
-    ``resolution`` (3,) the step of those axes whose noise at rest is below half a step (0 for the others)
-    [output].
-    """
-
-    accelerometer: Triad
-    gyro: Triad | None
-    initial: Dwell
-    window: int
-    cuts: NDArray[np.int64]
-    restlessness: dict[str, Array]
-    noise: dict[str, AllanFit]
-    resolution: dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -81,162 +52,6 @@ class Poses:
         """
         fit, noise = self.accelerometer.fit, float(np.mean(self.noise_variance))
         return (fit.chi2 + self.noise_dof * noise) / (fit.dof + self.noise_dof)
-
-
-def prepare(record: Record, static_start: float | None) -> Recording:
-    """Look at the variance of a record, and at its noise at rest.
-
-    Raises
-    ------
-    RecordError
-        No accelerometer triad, hardly any samples, or no quiet start.
-    StudyError
-        ``static_start`` [s] does not fit the record, or the instrument moves in it.
-    """
-    accelerometer = record.triad("acc")
-    gyro = record.triad("gyro") if any(f"gyro_{axis}" in record for axis in "xyz") else None
-    accelerometer, gyro = _stamped(accelerometer, gyro)
-    t, where = accelerometer.t, accelerometer.source.path
-    for triad in (accelerometer, gyro):
-        if triad is not None:
-            _plausible(triad)
-    window = window_samples(accelerometer.rate)
-    variances = {"acc": windowed_variance(accelerometer.values, window)}
-    if gyro is not None:
-        own = windowed_variance(gyro.values, window_samples(gyro.rate))
-        variances["gyro"] = own if gyro.t is t else _on_other_clock(own, gyro.t, t)
-    # a lost sample does no harm to the mean of a hold; half a window lost may hide a movement
-    cuts = breaks(t, 0.5 * window / accelerometer.rate)
-    initial = _initial(t, variances["acc"], window, cuts, static_start, where)
-    noise, restlessness, resolution = {}, {}, {}
-    for triad in (accelerometer, gyro):
-        if triad is not None:
-            rest = _at_rest(triad, t[initial.start], t[initial.stop - 1], static_start)
-            size = float(np.linalg.norm(np.var(rest, axis=0, ddof=1)))
-            restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
-            noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
-            resolution[triad.sensor] = _coarse_steps(triad.values, rest)
-    return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise, resolution)
-
-
-def _plausible(triad: Triad) -> None:
-    """Raise where a triad has no time axis, or values that no sensor gives."""
-    if not np.isfinite(triad.rate):
-        raise RecordError(
-            triad.source.path,
-            f"found {len(triad.t)} samples of {triad.sensor} without increasing time stamps, expected a recording",
-        )
-    for axis, values in zip("xyz", triad.values.T, strict=True):
-        known = values[np.isfinite(values)]
-        if known.size and np.ptp(known) == 0.0:
-            raise RecordError(
-                triad.source.path,
-                f"{triad.sensor}_{axis} never changes ({known[0]:g}), expected a live sensor",
-            )
-    size = float(np.max(np.abs(triad.values), initial=0.0, where=np.isfinite(triad.values)))
-    if size > 0.0 and not 1e-100 < size < 1e100:
-        raise RecordError(
-            triad.source.path, f"{triad.sensor} has values up to {size:.3g}, expected the output of a sensor"
-        )
-
-
-def _stamped(accelerometer: Triad, gyro: Triad | None) -> tuple[Triad, Triad | None]:
-    """The triads without samples that have no time stamp (the gap then shows); one clock stays one."""
-    shared = gyro is not None and gyro.t is accelerometer.t
-    known = np.isfinite(accelerometer.t)
-    if not known.all():
-        accelerometer = replace(accelerometer, t=accelerometer.t[known], values=accelerometer.values[known])
-    if gyro is None:
-        return accelerometer, None
-    own = np.isfinite(gyro.t)
-    if not own.all():
-        gyro = replace(gyro, t=accelerometer.t if shared else gyro.t[own], values=gyro.values[own])
-    return accelerometer, gyro
-
-
-def _on_other_clock(values: Array, t: Array, other: Array) -> Array:
-    """Values at the nearest sample of another time axis; infinite outside."""
-    nearest = np.clip(np.searchsorted(t, other), 0, len(t) - 1)
-    out = values[nearest]
-    out[(other < t[0]) | (other > t[-1])] = np.inf
-    return out
-
-
-def _at_rest(triad: Triad, begin: float, end: float, static_start: float | None) -> Array:
-    """Finite samples of a triad in the initial static period; raises where nothing varies."""
-    rest = triad.values[(triad.t >= begin) & (triad.t <= end)]
-    rest = rest[np.isfinite(rest).all(axis=1)]
-    if len(rest) < 16 or not np.any(np.var(rest, axis=0) > 0):
-        length = "" if static_start is None else f" of {static_start:g} s"
-        raise RecordError(
-            triad.source.path,
-            f"{triad.sensor} has no noise in the initial static period{length} ({len(rest)} samples), "
-            "expected raw samples of an instrument at rest",
-        )
-    return rest
-
-
-def _coarse_steps(values: Array, rest: Array) -> Array:
-    """The output's step on axes (3,) whose standard deviation at ``rest`` is below half of it, else 0."""
-    steps = np.zeros(3)
-    for i in range(3):
-        moves = np.abs(np.diff(values[:, i]))
-        least = np.min(moves, initial=np.inf, where=np.isfinite(moves) & (moves > 0))
-        if np.std(rest[:, i]) < 0.5 * least < np.inf:
-            steps[i] = least
-    return steps
-
-
-def _initial(
-    t: Array,
-    variance: Array,
-    window: int,
-    cuts: NDArray[np.int64],
-    static_start: float | None,
-    where: str,
-) -> Dwell:
-    """The initial static period: as stated and then checked, or up to the first movement."""
-    known = np.isfinite(variance)
-    if np.count_nonzero(known) < 2 * window:
-        raise RecordError(
-            where,
-            f"found {len(t)} samples, expected a recording that starts with at least {SHORTEST_START:g} s at rest",
-        )
-    first = int(np.argmax(known))
-    # the calmest twentieth of the record tells what rest looks like before anything else is known
-    calm = float(np.quantile(variance[known], 0.05))
-    restless = np.flatnonzero(variance[first:] > MOVING * max(calm, 1e-300)) + first
-    moves = int(restless[0] - window // 2) if len(restless) else len(t)
-    broken = int(next(iter(cuts[cuts > first]), len(t)))
-    stop = max(min(moves, broken), 0)
-    still = float(t[max(stop - 1, 0)] - t[0])
-    event = "the instrument moves" if moves <= broken else "the time axis breaks"
-    if static_start is None:
-        if still < SHORTEST_START:
-            raise RecordError(
-                where,
-                f"{event} {still:.1f} s after the start, expected at least {SHORTEST_START:g} s at rest",
-            )
-        return Dwell(0, stop)
-    if t[-1] - t[0] < SHORTEST_START:
-        raise RecordError(
-            where, f"lasts {t[-1] - t[0]:.1f} s, expected at least {SHORTEST_START:g} s at rest and turns"
-        )
-    if not SHORTEST_START <= static_start <= t[-1] - t[0]:
-        raise StudyError(
-            "imu.static_start",
-            f"found {static_start:g} s, expected {SHORTEST_START:g} s to the length of the record, "
-            f"{t[-1] - t[0]:.1f} s",
-        )
-    stated = int(np.argmax(t > t[0] + static_start)) or len(t)
-    inside = variance[: max(stated - window // 2, 0)]
-    inside = inside[np.isfinite(inside)]
-    if stop < stated - window and (not len(inside) or np.max(inside) > MOVING * np.median(inside)):
-        raise StudyError(
-            "imu.static_start",
-            f"found {static_start:g} s, expected a still period: {event} after {still:.1f} s",
-        )
-    return Dwell(0, stated)
 
 
 def dwells_at(recording: Recording, multiple: float, with_gyro: bool) -> tuple[Dwell, ...]:

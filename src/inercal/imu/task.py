@@ -15,7 +15,8 @@ from inercal.imu.earth_rate import earth_rate_at
 from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
 from inercal.imu.joint import Scatter, force_error, join
 from inercal.imu.outcome import assemble, without_fit
-from inercal.imu.poses import Poses, Recording, choose, prepare, sweep
+from inercal.imu.poses import Poses, choose, sweep
+from inercal.imu.recording import Recording, prepare
 from inercal.imu.settings import ImuSettings
 from inercal.imu.turns import Turns, cut_turns
 from inercal.imu.verdict import (

@@ -13,7 +13,8 @@ from inercal.estimate.status import Status
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.gyro import GyroFit, first_guess, regress_static
 from inercal.imu.joint import Scatter
-from inercal.imu.poses import Poses, Recording
+from inercal.imu.poses import Poses
+from inercal.imu.recording import Recording
 from inercal.imu.turns import Turns
 from inercal.instruments.triad import TriadModel
 from inercal.records.findings import Finding
