@@ -172,7 +172,7 @@ _QUANTITY = re.compile(
     r"(?:\((?P<digits>[0-9]+(?:\.[0-9]+)?)\))?"
     r"(?P<power>[eE][+-]?[0-9]+)?"
     rf"(?:\s*(?:±|\+/-|\+-)\s*(?P<plusminus>{_NUMBER}(?:[eE][+-]?[0-9]+)?))?"
-    r"\s*(?P<unit>[^\d\s(.].*|1)?\s*$"
+    r"\s*(?P<unit>[^\d\s(.,].*|1)?\s*$"
 )
 
 
@@ -202,6 +202,8 @@ def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
         text = repr(text)
     match = _QUANTITY.match(text) if isinstance(text, str) else None
     if match is None or (match["digits"] and match["plusminus"]):
+        if isinstance(text, str) and re.search("[0-9],[0-9]", text):
+            expected += ", with a decimal point"
         raise QuantityError(where, f"found {shown(text)}, expected {expected}")
     assert isinstance(text, str)
     if match["unit"] is None and dimension != "number":

@@ -1,6 +1,7 @@
 """A guessed map says why, and reads the files it was guessed from."""
 
 import gzip
+import re
 from importlib.resources import files
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from inercal.errors import RecordError
+from inercal.errors import InputError, RecordError
 from inercal.records.guess import guess_map
 from inercal.records.maps import read_map
 from inercal.records.read import read
@@ -112,8 +113,11 @@ def test_a_rate_is_looked_for_in_the_lines_before_the_header(tmp_path):
 
 def test_without_time_or_rate_one_is_asked_for(tmp_path):
     path = table(tmp_path / "a.csv", "n,ax,ay,az", np.column_stack([np.arange(N), ACC]))
-    assert "PUT THE SAMPLE RATE HERE" in guess_map(path)
-    assert len(guessed(tmp_path, [path])[1]["acc_x"].values) == N
+    with pytest.raises(InputError, match=r"time\.rate: found 'PUT THE SAMPLE RATE HERE.* expected .*100 Hz"):
+        guessed(tmp_path, [path])
+    record_map = tmp_path / "guess.toml"
+    record_map.write_text(re.sub('rate = ".*"', 'rate = "100 Hz"', record_map.read_text()))
+    assert len(read(path, record_map)["acc_x"].values) == N
 
 
 def test_labels_and_temperatures_are_found(tmp_path):

@@ -98,6 +98,7 @@ def test_powers_of_ten_in_words():
 
 def test_units_with_powers():
     assert plain_unit("count/(m/s^2)") == "count/(m/s²)"
+    assert plain_unit("a walk of 3 rad/sqrt(s)") == "a walk of 3 rad/√s"
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2)])

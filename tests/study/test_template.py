@@ -62,6 +62,9 @@ def test_the_header_names_the_next_command():
     assert "# Next: inercal calibrate imu 'run 1.csv' b.csv --study" in imu_template(
         [Path("run 1.csv"), "b.csv"]
     )
+    assert "# Next: inercal calibrate imu a.csv --map my-map.toml --study my.toml\n" in imu_template(
+        ["a.csv"], "my.toml", "my-map.toml"
+    )
 
 
 @pytest.mark.parametrize("name", ["a\nb = 1", "a\x00b", "a\udcffb", "{records}", "a\u2028b"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 import time
@@ -40,6 +39,9 @@ def run(arguments: list[str] | None = None) -> int:
     if "PYTHONWARNINGS" not in os.environ and not sys.warnoptions:
         warnings.simplefilter("ignore")
     try:
+        _settle_streams()
+        if sys.stdout is None:
+            raise InercalError("standard output: found it closed, expected it open")
         from inercal.cli.tree import call  # here, so that an interrupt during loading is caught too
 
         code = call(sys.argv[1:] if arguments is None else arguments)
@@ -68,8 +70,22 @@ def run(arguments: list[str] | None = None) -> int:
     return EXIT_BAD_INPUT
 
 
+def _settle_streams() -> None:
+    """Let no text fail on its way out: what the terminal cannot spell is escaped, and nobody may be reading."""
+    import logging
+
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns where its cache cannot be written
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  (to the end)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def _say(text: str) -> None:
     """One line on standard error, if there is one."""
+    import contextlib
+
     with contextlib.suppress(OSError, ValueError):
         print(f"inercal: {text}", file=sys.stderr, flush=True)
 
@@ -77,6 +93,7 @@ def _say(text: str) -> None:
 def _abandon_output() -> None:
     """Drop what is left in standard output's buffer, so that nothing is raised again on the way out."""
     try:
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except (OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 
 from inercal.cli import EXIT_BAD_VERDICT, process_age
-from inercal.cli.options import Files, MapFile, Output, Overrides, StudyFile, read_record, working
+from inercal.cli.options import Files, MapFile, Overrides, ReportOutput, StudyFile, read_record, working
 
 
 def calibrate_imu(
@@ -16,7 +16,7 @@ def calibrate_imu(
     study: StudyFile,
     map_file: MapFile = None,
     overrides: Overrides = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU that was held still in many poses by hand: no turntable is needed.
 
@@ -31,7 +31,7 @@ def calibrate_imu(
     from inercal.records.read import source_of
     from inercal.study.load import load_imu_study
 
-    output.check(".json", ".toml")
+    output.check((".json", ".toml"), (*files, map_file, study))
     settings = load_imu_study(study, overrides or ())
     clock = time.perf_counter()
     record = read_record(files, map_file, output)
@@ -41,9 +41,7 @@ def calibrate_imu(
     estimate = calibration.estimate
     timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
     estimate = replace(estimate, timing=timing, inputs=(*estimate.inputs, source_of(study)))
-    for finding in estimate.findings:
-        where = f" ({finding.where})" if finding.where else ""
-        output.say(f"{finding.code}: {finding.message}{where}")
+    output.say_findings(estimate.findings)
     if output.out is not None:
         save(estimate, output.out)
         output.say(f"calibration: {output.out}")

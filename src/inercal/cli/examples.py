@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import Output
+from inercal.cli.options import FileOutput, envelope
 from inercal.errors import InputError
 
 
@@ -14,7 +14,7 @@ def examples(
     name: Annotated[str | None, Parameter(help="The example to copy; all are listed if absent.")] = None,
     /,
     *,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """List the recordings that ship with inercal, or copy one with its study and map to the folder --out.
 
@@ -26,11 +26,14 @@ def examples(
 
     from inercal._files import write_bytes
     from inercal.examples import EXAMPLES, FOLDER
+    from inercal.records.read import source_of
 
     if name is None:
+        if output.out is not None:
+            raise InputError("--out", "found no example to copy, expected its name before")
         rows = [{"name": e.name, "title": e.title, "files": list(e.files)} for e in EXAMPLES.values()]
         text = "\n".join(f"{e.name:10s} {e.title}" for e in EXAMPLES.values())
-        output.emit({"command": "examples", "result": {"examples": rows}}, text)
+        output.emit(envelope("examples", f"{len(rows)} examples", {"examples": rows}), text)
         return
     if name not in EXAMPLES:
         raise InputError(name, f"no such example, expected one of {', '.join(EXAMPLES)}")
@@ -45,7 +48,8 @@ def examples(
             raise InputError(target, "exists already, expected a new folder (--out)")
     for file in example.files:
         write_bytes(folder / Path(file).name, (FOLDER / file).read_bytes())
-    output.emit(
-        {"command": "examples", "result": {"folder": str(folder), "run": example.command(str(folder))}},
-        f"copied to {folder}; now run\n{example.command(str(folder))}",
+    result = {"folder": str(folder), "run": example.command(str(folder))}
+    data = envelope(
+        "examples", f"copied to {folder}", result, [source_of(FOLDER / file) for file in example.files]
     )
+    output.emit(data, f"copied to {folder}; now run\n{result['run']}")

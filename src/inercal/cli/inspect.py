@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from inercal.cli.options import Files, MapFile, Output, read_record
+from inercal.cli.options import Files, MapFile, ReportOutput, envelope, read_record
 
 
-def inspect(files: Files, /, *, map_file: MapFile = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+def inspect(
+    files: Files,
+    /,
+    *,
+    map_file: MapFile = None,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> None:
     """Look at a recording: channels, units, rates, and everything suspicious about it.
 
     --report writes a page with pictures of every channel. Findings do not change the exit code.
 
     Example: inercal inspect log.csv --report log.html
     """
-    from inercal import __version__
-    from inercal.estimate.exchange import plain_objects
     from inercal.report.inspection import inspection_pictures, render_inspection, sparkline, summary
 
-    output.check(".json")
+    output.check((".json",), (*files, map_file))
     record = read_record(files, map_file, output)
     rows = summary(record)
-    findings = [{"code": f.code, "message": f.message, "where": f.where} for f in record.findings]
-    words = (
-        f"{len(findings)} finding{'' if len(findings) == 1 else 's'}" if findings else "nothing suspicious"
-    )
-    data: dict[str, Any] = plain_objects(
-        {
-            "inercal": __version__,
-            "command": "inspect",
-            "status": {"code": "ok", "message": words},
-            "findings": findings,
-            "inputs": [{"path": s.path, "sha256": s.sha256} for s in record.sources],
-            "result": {"channels": [vars(row) for row in rows]},
-        }
-    )
+    count = len(record.findings)
+    words = f"{count} finding{'' if count == 1 else 's'}" if count else "nothing suspicious"
+    result = {"channels": [vars(row) for row in rows]}
+    data = envelope("inspect", words, result, record.sources, record.findings)
     if output.out is not None:
         import json
 

@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from inercal.cli import process_age
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.records.record import Record
+    from inercal.records.findings import Finding
+    from inercal.records.record import Record, Source
 
 Files = Annotated[
     list[Path], Parameter(help="Recordings; several files with distinct channels are one record.")
@@ -33,50 +36,119 @@ Overrides = Annotated[
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Output:
-    """Where results go."""
+    """The common options of every command."""
 
     json: Annotated[bool, Parameter(help="Print one JSON object, and nothing else, on standard output.")] = (
         False
     )
-    out: Annotated[Path | None, Parameter(help="Write the result to this file.")] = None
-    report: Annotated[Path | None, Parameter(help="Write a self-contained HTML report.")] = None
     quiet: Annotated[bool, Parameter(help="No messages and no progress on standard error.")] = False
-
-    def check(self, *suffixes: str) -> None:
-        """Fail before any work is done where a result could not be written; raises `InputError`."""
-        if self.out is not None and self.out.suffix.lower() not in suffixes:
-            raise InputError(
-                self.out, f"found the suffix {self.out.suffix!r} for --out, expected {' or '.join(suffixes)}"
-            )
-        if self.report is not None and self.report.suffix.lower() not in (".html", ".htm"):
-            raise InputError(
-                self.report, f"found the suffix {self.report.suffix!r} for --report, expected .html"
-            )
-        for path in (self.out, self.report):
-            if path is not None and (path.is_dir() or not path.parent.is_dir()):
-                raise InputError(path, "cannot be written, expected a file name in a folder that exists")
 
     def say(self, text: str) -> None:
         """A message for people, on standard error."""
         if not self.quiet:
             print(text, file=sys.stderr)
 
-    def emit(self, data: dict[str, Any], text: str) -> None:
+    def say_findings(self, findings: Iterable[Finding]) -> None:
+        """Findings for people, one a line."""
+        for finding in findings:
+            where = f" ({finding.where})" if finding.where else ""
+            self.say(f"{finding.code}: {finding.message}{where}")
+
+    def emit(self, data: Mapping[str, Any], text: str) -> None:
         """The result on standard output: the JSON object, or the text for people."""
         if self.json:
-            print(json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False))
+            print(json.dumps(data, indent=1, allow_nan=False))
         elif text:
             print(text)
 
 
-def read_record(files: Sequence[Path], map_file: Path | None, output: Output) -> Record:
+@Parameter(name="*")
+@dataclass(frozen=True)
+class FileOutput(Output):
+    """The options of a command that writes a file."""
+
+    out: Annotated[Path | None, Parameter(help="Write the result to this file.")] = None
+
+    @property
+    def targets(self) -> tuple[Path, ...]:
+        """The files to be written."""
+        return () if self.out is None else (self.out,)
+
+    def check(self, suffixes: Sequence[str], inputs: Iterable[str | Path | None] = ()) -> None:
+        """Fail before any work is done where a result could not be written; raises `InputError`."""
+        if self.out is not None and self.out.suffix.lower() not in suffixes:
+            raise InputError(
+                self.out, f"found the suffix {self.out.suffix!r} for --out, expected {' or '.join(suffixes)}"
+            )
+        for path in self.targets:
+            if path.is_dir() or not path.parent.is_dir():
+                raise InputError(path, "cannot be written, expected a file name in a folder that exists")
+        self.spare(inputs)
+
+    def spare(self, inputs: Iterable[str | Path | None]) -> None:
+        """Fail where a result would take the place of an input; raises `InputError`."""
+        resolved = {realpath(path) for path in inputs if path is not None}
+        for path in self.targets:
+            if realpath(path) in resolved:
+                raise InputError(path, "is an input, expected another file")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class ReportOutput(FileOutput):
+    """The options of a command that writes a file and a report."""
+
+    report: Annotated[Path | None, Parameter(help="Write a self-contained HTML report.")] = None
+
+    @property
+    def targets(self) -> tuple[Path, ...]:
+        """The files to be written."""
+        return super().targets if self.report is None else (*super().targets, self.report)
+
+    def check(self, suffixes: Sequence[str], inputs: Iterable[str | Path | None] = ()) -> None:
+        """Fail before any work is done where a result could not be written; raises `InputError`."""
+        if self.report is not None and self.report.suffix.lower() not in (".html", ".htm"):
+            raise InputError(
+                self.report, f"found the suffix {self.report.suffix!r} for --report, expected .html"
+            )
+        super().check(suffixes, inputs)
+
+
+def envelope(
+    command: str,
+    message: str,
+    result: Mapping[str, Any],
+    inputs: Iterable[Source] = (),
+    findings: Iterable[Finding] = (),
+) -> dict[str, Any]:
+    """The JSON object of a command that ended well, with the keys that all have in common."""
+    from inercal import __version__
+    from inercal.estimate.exchange import plain_objects
+
+    whole: dict[str, Any] = plain_objects(
+        {
+            "inercal": __version__,
+            "command": command,
+            "status": {"code": "ok", "message": message},
+            "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in findings],
+            "inputs": [{"path": s.path, "sha256": s.sha256} for s in inputs],
+            "timing_s": {"total": process_age()},
+            "result": result,
+        }
+    )
+    return whole
+
+
+def read_record(files: Sequence[Path], map_file: Path | None, output: FileOutput) -> Record:
     """Read recordings, with a progress bar where it takes long."""
     from inercal.records.maps import read_map
     from inercal.records.read import read
 
     record_map = None if map_file is None else read_map(map_file)
     with reading(output) as progress:
-        return read(files, record_map, progress)
+        record = read(files, record_map, progress)
+    output.spare(source.path for source in record.sources)  # a map may have named others
+    return record
 
 
 @contextmanager

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from inercal.cli.options import Output
+from inercal.cli.options import FileOutput
 
 
-def schema(*, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen)
     """Print one JSON Schema that covers every kind of study file, for editors and checkers.
 
     Example: inercal schema --out inercal.schema.json
@@ -15,10 +15,10 @@ def schema(*, output: Output = Output()) -> None:  # noqa: B008  (frozen)
     from inercal._files import write_text
     from inercal.study.schema import json_schema
 
-    output.check(".json")
+    output.check((".json",))
     found = json_schema()
     if output.out is not None:
         write_text(output.out, json.dumps(found, indent=1) + "\n")
         output.say(f"schema: {output.out}")
-    else:
+    if output.json or output.out is None:
         print(json.dumps(found, indent=1))

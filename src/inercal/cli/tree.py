@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from itertools import pairwise
+
 from cyclopts import App, CycloptsError, Parameter
 
 from inercal import __version__
@@ -84,6 +87,13 @@ def app() -> App:
 
 def call(arguments: list[str]) -> int | None:
     """Run a command line; raises `UsageError` where the line itself is wrong."""
+    for before, argument in pairwise(("inercal", *arguments)):
+        if argument == "" or re.fullmatch("--[a-z]+=", argument):
+            option = argument.rstrip("=") or before
+            raise UsageError(f"the text after {option} is empty, expected a name or a value")
+    kinds = [kind for verb, kind in COMMANDS if kind and verb == (arguments or [""])[0]]
+    if kinds and all(word.startswith("-") and word not in ("-h", "--help") for word in arguments[1:]):
+        raise UsageError(f"{arguments[0]}: found no kind, expected {' or '.join(kinds)} after it")
     try:
         code: int | None = app()(arguments)
     except CycloptsError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,28 +35,51 @@ class ImuModel:
         f = self.accelerometer.correct(acc)
         if gyro is None or self.gyro is None:
             return f, None
-        return f, self.gyro.correct(gyro - f @ self.g_sensitivity.T)
+        return f, self.gyro.correct(gyro - self._drift(f))
 
     def indicate(self, f: Array, omega: Array | None) -> tuple[Array, Array | None]:
         """Outputs from specific force [m/s^2] and rate [rad/s]: the inverse of `correct`."""
         acc = self.accelerometer.indicate(f)
         if omega is None or self.gyro is None:
             return acc, None
-        return acc, self.gyro.indicate(omega) + f @ self.g_sensitivity.T
+        return acc, self.gyro.indicate(omega) + self._drift(f)
+
+    def _drift(self, f: Array) -> Array | float:
+        """g-sensitive drift [gyro output]; where there is none, a missing specific force takes no part."""
+        return f @ self.g_sensitivity.T if self.g_sensitivity.any() else 0.0
 
 
-def imu_model(estimate: Estimate) -> ImuModel:
-    """The instrument of an estimate of `calibrate imu`; raises `InputError` for any other."""
+def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
+    """The instrument of an estimate of `calibrate imu`; raises `InputError`, naming ``where``, for any other."""
     values = {name: p.value for name, p in estimate.parameters.items()}
-    if "K1_x" not in values or not np.all(np.isfinite(estimate.values)):
+    units = estimate.result.get("unit", {})
+    axes = [f"{scale}_{axis}" for scale in ("K1", "S") if f"{scale}_x" in values for axis in "xyz"]
+    complete = "K1_x" in values and values.keys() >= set(axes) and isinstance(units, Mapping)
+    if not complete or not np.all(np.isfinite(estimate.values)):
         found = ", ".join(estimate.names) or "no coefficients"
-        raise InputError("calibration", f"found {found}, expected the coefficients of an IMU")
+        raise InputError(where, f"found {found}, expected the coefficients of an IMU")
+    accelerometer = triad_from_terms(values, "K1", "M", "K0")
+    gyro = triad_from_terms(values, "S", "T", "D_F") if "S_x" in values else None
+    for name, triad in (("accelerometers", accelerometer), ("gyro", gyro)):
+        if triad is not None and not _invertible(triad):
+            raise InputError(
+                where, f"the scale factors of the {name} cannot be inverted, expected three independent axes"
+            )
+    for unit in units.values():
+        parse_unit(str(unit), where)
     g = [[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"]
-    return ImuModel(
-        triad_from_terms(values, "K1", "M", "K0"),
-        triad_from_terms(values, "S", "T", "D_F") if "S_x" in values else None,
-        np.array(g),
-        {str(sensor): str(unit) for sensor, unit in estimate.result.get("unit", {}).items()},
+    symbols = {str(sensor): str(unit) for sensor, unit in units.items()}
+    return ImuModel(accelerometer, gyro, np.array(g), symbols)
+
+
+@np.errstate(all="ignore")
+def _invertible(triad: TriadModel) -> bool:
+    """True if outputs can be taken back to finite inputs."""
+    gain = triad.gain
+    return bool(
+        np.isfinite(gain).all()
+        and np.linalg.matrix_rank(gain) == 3
+        and np.isfinite(np.linalg.inv(gain)).all()
     )
 
 

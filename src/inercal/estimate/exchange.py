@@ -96,12 +96,12 @@ def from_json(data: Mapping[str, Any]) -> Estimate:
             for b in data.get("budget", ())
         ),
         model=data.get("model", ""),
-        conditions=data.get("conditions", {}),
-        traceability=data.get("traceability", {}),
+        conditions=dict(data.get("conditions", {})),
+        traceability=dict(data.get("traceability", {})),
         inputs=tuple(Source(s["path"], s["sha256"]) for s in data.get("inputs", ())),
-        provenance=data.get("provenance", {}),
-        timing=data.get("timing_s", {}),
-        result=data.get("result", {}),
+        provenance=dict(data.get("provenance", {})),
+        timing=dict(data.get("timing_s", {})),
+        result=dict(data.get("result", {})),
         references=tuple(data.get("references", ())),
     )
 

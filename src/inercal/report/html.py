@@ -98,7 +98,10 @@ def render(estimate: Estimate, pictures: Sequence[Picture], title: str) -> str:
 
 
 def page(template: str, **content: Any) -> str:
-    """A page of this package made from one of its templates; whatever is put in is escaped."""
+    """A page of this package made from one of its templates; whatever is put in is escaped.
+
+    Bytes in file names that no encoding knew are read as UTF-8, and what that does not know is replaced.
+    """
     import jinja2
 
     from inercal import __version__
@@ -112,7 +115,8 @@ def page(template: str, **content: Any) -> str:
     )
     environment.filters |= {"unit": plain_unit, "percent": _percent, "text": _text}
     environment.globals["version"] = __version__
-    return environment.get_template(template).render(**content)
+    text = environment.get_template(template).render(**content)
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def _heading(estimate: Estimate) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ names and units are taken literally, never as formulas.
 from __future__ import annotations
 
 import io
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -130,5 +131,5 @@ def powers_of_ten(axis: Axis) -> None:
 
 
 def plain_unit(unit: str) -> str:
-    """A unit with its powers raised: ``m/s²`` for ``m/s^2``."""
-    return unit.replace("^2", "²").replace("^3", "³")
+    """Units with signs for powers and roots, also in the midst of text: ``m/s²`` for ``m/s^2``."""
+    return re.sub(r"sqrt\((\w+)\)", r"√\1", unit.replace("^2", "²").replace("^3", "³"))

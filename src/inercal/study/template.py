@@ -10,7 +10,7 @@ _IMU = """\
 # Study for `inercal calibrate imu`. Replace what is not so; take the "# " from keys that you know.
 # Quantities are texts with a unit; "9.81744(2) m/s^2" is 9.81744 with a standard uncertainty of 0.00002.
 #
-# Next: inercal calibrate imu {records} --study STUDY.toml
+# Next: inercal calibrate imu {files}
 
 schema = 1                          # version of this format
 
@@ -36,7 +36,11 @@ method = "multiposition"            # many poses held still by hand, no turntabl
 """
 
 
-def imu_template(record_paths: Iterable[str | Path] = ()) -> str:
+def imu_template(
+    record_paths: Iterable[str | Path] = (),
+    study_path: str | Path = "STUDY.toml",
+    map_path: str | Path | None = None,
+) -> str:
     """A study for ``inercal calibrate imu`` with every key in it, each explained.
 
     It loads as it is; its latitude and height then stand for anywhere on Earth, with the uncertainty of
@@ -46,7 +50,11 @@ def imu_template(record_paths: Iterable[str | Path] = ()) -> str:
     ----------
     record_paths : iterable of str or Path
         The recordings that the next command in the header names.
+    study_path, map_path : str or Path
+        The study and, if there is one, the column map that it names.
     """
-    records = shlex.join(str(path) for path in record_paths) or "RECORD.csv"
-    printable = "".join(character if character.isprintable() else "?" for character in records)
-    return _IMU.replace("{records}", printable)
+    records = [str(path) for path in record_paths] or ["RECORD.csv"]
+    column_map = [] if map_path is None else ["--map", str(map_path)]
+    files = shlex.join([*records, *column_map, "--study", str(study_path)])
+    files = files.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    return _IMU.replace("{files}", "".join(c if c.isprintable() else "?" for c in files))
