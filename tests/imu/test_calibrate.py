@@ -173,6 +173,9 @@ def test_a_wrong_map_of_the_gyro_is_named(change, code, words):
     estimate = calibrate(record_of(t, acc, change(gyro)), SETTINGS).estimate
     assert estimate.status is Status.INCONSISTENT
     assert any(f.code == code and words in f.message for f in estimate.findings)
+    assert "contradict" in estimate.message
+    # no absurd numbers: what can be trusted is the accelerometers
+    assert estimate.names[-1] == "M_yz"
 
 
 def test_what_cannot_be_integrated_is_left_out_and_said():

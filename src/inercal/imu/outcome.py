@@ -63,7 +63,7 @@ def assemble(
     covariance, dof, budget = combine(joint.names, [*from_scatter, *known])
     residual = np.sum([source.covariance for source in from_scatter], axis=0)
     u = dict(zip(joint.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    status, message = verdict(recording, poses, joint.gyro, settings.site.gravity, u)
+    status, message = verdict(recording, poses, joint.gyro, settings.site.gravity, u, findings)
     noise = noise_covariance(joint, *_noise(recording, poses, joint))
     acc, gyro = poses.accelerometer, joint.gyro
     statistics = {

@@ -34,6 +34,9 @@ from inercal.records.record import Record, Triad
 
 Array = NDArray[np.float64]
 
+WORST_START = 0.5
+"""Miss [rad] of the first guess beyond which no fit is tried: large misalignments leave 0.3."""
+
 LOST = 3.5
 """Longest step of time in a turn, in sample intervals: two lost samples hardly matter to its integral."""
 
@@ -192,14 +195,22 @@ def _calibrate_gyro(
     if not np.isfinite(means).all():
         said = "the gyro has no numbers in some poses: it is not calibrated"
         return None, [*findings, Finding("gyro_missing", said)]
-    scale, _ = first_guess(turns, acc.directions, means[0])
+    scale, miss = first_guess(turns, acc.directions, means[0])
     start = TriadModel(np.full(3, scale), np.eye(3), means[0])
     error, earth = force_error(acc), earth_rate_at(settings.site)
-    gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, earth)
+    gyro = None
+    if miss < WORST_START:
+        gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, earth)
+        miss = rms_miss(gyro)
+    if gyro is None or not gyro.converged or miss > WORST_MISS:
+        said = (
+            f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
+            "carried through the turns): check the gyro's signs and order of axes; it is not calibrated"
+        )
+        axes = axis_findings(turns, acc.directions, means[0])
+        return None, [*findings, Finding("contradiction", said), *axes]
     middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
     findings += gyro_findings(
         middles, means - gyro.by_earth, acc.f, gyro, recording.gyro.unit.symbol, recording.resolution["gyro"]
     )
-    if not gyro.converged or rms_miss(gyro) > WORST_MISS:
-        findings += axis_findings(turns, acc.directions, means[0])
     return gyro, findings

@@ -88,9 +88,14 @@ def _unit_words(triad: Triad, model: TriadModel) -> str:
 
 
 def verdict(
-    recording: Recording, poses: Poses, gyro: GyroFit | None, gravity: float, u: dict[str, float]
+    recording: Recording,
+    poses: Poses,
+    gyro: GyroFit | None,
+    gravity: float,
+    u: dict[str, float],
+    findings: list[Finding],
 ) -> tuple[Status, str]:
-    """Status and message; ``u`` the standard uncertainties by name."""
+    """Status and message; ``u`` the standard uncertainties by name, ``findings`` what was said already."""
     acc = poses.accelerometer
     of_gyro = None if gyro is None else gyro.model
     for triad, model in ((recording.accelerometer, acc.model), (recording.gyro, of_gyro)):
@@ -110,6 +115,9 @@ def verdict(
             f"force along {pose_words(curing_pose(acc, gravity))} and its opposite",
         )
     if gyro is None and recording.gyro is not None:
+        said = [finding.message for finding in findings if finding.code == "contradiction"]
+        if said:
+            return Status.INCONSISTENT, said[0]
         return (
             Status.TOO_FEW_INTERVALS,
             f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses; the gyro could not be "
@@ -117,15 +125,6 @@ def verdict(
         )
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
-    miss = rms_miss(gyro)
-    if not gyro.converged:
-        return Status.NOT_CONVERGED, f"the fit of the gyro ended early: {gyro.message}"
-    if miss > WORST_MISS:
-        return (
-            Status.INCONSISTENT,
-            f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
-            "carried through the turns): check the gyro's unit, signs and order of axes",
-        )
     known = gyro.geometry
     if known.condition > WORST_CONDITION:
         term = known.leading_term()
