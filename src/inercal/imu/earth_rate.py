@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.turns import Turns, attitudes, increments
 from inercal.instruments.triad import TriadModel
@@ -108,8 +109,8 @@ def unknown_rates(
         at_rest[there, :, columns] = axes
     sizes = np.concatenate([[earth.vertical_u], np.full(q - 1, earth.horizontal_u)])
     names = np.array(["vertical earth rate", *(f"horizontal earth rate {i}" for i in range(1, q))])
-    kept = sizes > 0
-    turned = in_turns.reshape(-1, q)[:, kept]
+    kept = sizes > 1e-6 * EARTH_RATE  # at the pole nothing is left of the horizontal part
+    turned = in_turns.reshape(3 * len(turns), q)[:, kept]
     return UnknownRates(
         tuple(map(str, names[kept])), verticals, earth.vertical, turned, at_rest[:, :, kept], sizes[kept]
     )

@@ -109,7 +109,7 @@ def fit_gyro(
     Parameters
     ----------
     turns : Turns
-        At least five turns.
+        At least seven turns.
     means : (n, 3)
         Mean gyro output in each pose.
     f : (n, 3)
@@ -147,7 +147,6 @@ def fit_gyro(
     typical = np.concatenate([typical, np.full(p - 12, turning / float(np.mean(size)))])
 
     durations = np.repeat(turns.durations, 3)
-    dof = 2.0 * len(turns) - 9.0
     walk2 = 0.01**2 / float(np.median(turns.durations))
     x = theta
     # Coarse rounds come near cheaply; the last one starts at the minimum with the variance settled.
@@ -233,7 +232,7 @@ class _Problem:
         p, q = self.design.shape[1], len(rates)
         turn = carried_with_derivatives(self.turns, self.verticals, model, g)[1][..., :p].reshape(-1, p)
         rest = self.design + self.unknown.output_sensitivity(model, rates, p)
-        by_rate = np.einsum("ij,njk->nik", model.gain, self.unknown.at_rest).reshape(-1, q)
+        by_rate = np.einsum("ij,njk->nik", model.gain, self.unknown.at_rest).reshape(len(self.spread), q)
         return np.block(
             [
                 [self.weigh @ turn, self.weigh @ self.unknown.in_turns],
