@@ -39,7 +39,28 @@ def timed(work, runs: int) -> tuple[list[float], object]:
 
 def row(name: str, seconds: list[float], beside: float) -> str:
     median = statistics.median(seconds)
-    return f"{name:34s} {median:8.3f} s ({min(seconds):.3f} to {max(seconds):.3f})   ratio {median / beside:7.1f}"
+    return f"{name:34s} {median:9.4f} s ({min(seconds):.4f} to {max(seconds):.4f})   ratio {median / beside:8.3f}"
+
+
+def passes(calibration) -> dict:
+    """One pass over all turns: in NumPy, with derivatives, and a compiled integration of as many intervals."""
+    from inercal.geometry import kernels
+    from inercal.imu.task import _turns
+    from inercal.imu.turns import carried, carried_with_derivatives
+
+    turns, _ = _turns(calibration.recording, calibration.poses, False)
+    gyro, up = calibration.gyro, calibration.poses.accelerometer.directions
+    intervals = turns.intervals[turns.intervals > 0]
+    omega = np.full((len(intervals), 3), 0.5)
+    start, out = np.array([1.0, 0.0, 0.0, 0.0]), np.empty((len(intervals) + 1, 4))
+    kernels.integrate(start, omega, intervals, out)  # compiles or loads
+    return {
+        "one pass of the turns": lambda: carried(turns, up, gyro.model, gyro.g_sensitivity),
+        "the same with derivatives": lambda: carried_with_derivatives(
+            turns, up, gyro.model, gyro.g_sensitivity
+        ),
+        "as many intervals, compiled": lambda: kernels.integrate(start, omega, intervals, out),
+    }
 
 
 def process_seconds(runs: int) -> list[float]:
@@ -79,6 +100,8 @@ def main() -> None:
     print(row("plain SciPy, values alone", plain, median))
     print(row("inercal, whole process", process_seconds(runs), median))
     fit = calibration.estimate
+    for words, work in passes(calibration).items():
+        print(row(words, timed(work, 20)[0], median))
     scales = np.array([fit[f"K1_{axis}"].value for axis in "xyz"])
     rates = np.array([fit[f"S_{axis}"].value for axis in "xyz"])
     print(f"largest difference in scale: accelerometers {np.max(np.abs(p[:3] / scales - 1)):.1e}, "

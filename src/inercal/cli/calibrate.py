@@ -18,13 +18,7 @@ def calibrate_imu(
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
-    """Calibrate an IMU that was held still in many poses by hand: no turntable is needed.
-
-    Gives bias, scale factor and misalignment of the accelerometers, and of the gyro if there is one, with
-    uncertainties; --out saves them as .json or .toml, --report writes a page to hand over.
-
-    Example: inercal calibrate imu log.csv --study imu.toml --out cal.json --report cal.html
-    """
+    """Calibrate an IMU that was held still in many poses by hand."""
     from inercal.estimate.exchange import save, to_json
     from inercal.estimate.status import Status
     from inercal.imu.task import calibrate

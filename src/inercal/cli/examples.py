@@ -16,12 +16,7 @@ def examples(
     *,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
-    """List the recordings that ship with inercal, or copy one with its study and map to the folder --out.
-
-    The folder is named after the example if --out is absent.
-
-    Example: inercal examples xsens --out xsens
-    """
+    """List the recordings that ship with inercal, or copy one."""
     from pathlib import Path
 
     from inercal._files import write_bytes

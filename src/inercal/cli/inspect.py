@@ -12,19 +12,14 @@ def inspect(
     map_file: MapFile = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> None:
-    """Look at a recording: channels, units, rates, and everything suspicious about it.
-
-    --report writes a page with pictures of every channel. Findings do not change the exit code.
-
-    Example: inercal inspect log.csv --report log.html
-    """
+    """Look at a recording before it is used."""
+    from inercal.records.places import counted
     from inercal.report.inspection import inspection_pictures, render_inspection, sparkline, summary
 
     output.check((".json",), (*files, map_file))
     record = read_record(files, map_file, output)
     rows = summary(record)
-    count = len(record.findings)
-    words = f"{count} finding{'' if count == 1 else 's'}" if count else "nothing suspicious"
+    words = counted(len(record.findings), "finding") if record.findings else "nothing suspicious"
     result = {"channels": [vars(row) for row in rows]}
     data = envelope("inspect", words, result, record.sources, record.findings)
     if output.out is not None:

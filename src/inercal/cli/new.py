@@ -17,13 +17,7 @@ def new_imu(
     *,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
-    """Write a commented study for `inercal calibrate imu`, and a map guessed from the recording.
-
-    The study goes to --out (imu.toml if absent), the map beside it with -map before the suffix. Nothing that
-    exists is overwritten.
-
-    Example: inercal new imu log.csv --out imu.toml
-    """
+    """Write a study, and a map guessed from the recordings."""
     from inercal._files import write_text
     from inercal.records.guess import guess_map
     from inercal.records.read import source_of

@@ -6,10 +6,7 @@ from inercal.cli.options import FileOutput
 
 
 def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen)
-    """Print one JSON Schema that covers every kind of study file, for editors and checkers.
-
-    Example: inercal schema --out inercal.schema.json
-    """
+    """Print the JSON Schema of study files."""
     import json
 
     from inercal._files import write_text

@@ -30,6 +30,7 @@ from inercal.imu.verdict import (
 from inercal.instruments.triad import TriadModel
 from inercal.records.checks import saturated
 from inercal.records.findings import Finding
+from inercal.records.places import counted
 from inercal.records.record import Record, Triad
 
 Array = NDArray[np.float64]
@@ -161,7 +162,8 @@ def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns 
         left_out.append(
             Finding(
                 "gyro_missing",
-                f"found {len(spans)} turns between poses, expected at least {FEWEST_TURNS}: the gyro is not calibrated",
+                f"found {counted(len(spans), 'turn')} between poses, expected at least {FEWEST_TURNS}: "
+                "the gyro is not calibrated",
             )
         )
         return None, left_out

@@ -107,10 +107,10 @@ def verdict(
         term = known.leading_term()
         value = float(acc.fit.x[known.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
-        lacking = known.rank < len(known.names)
+        # poses that leave a null space never come so far: see `sweep`
         return (
-            Status.UNOBSERVABLE if lacking else Status.ILL_CONDITIONED,
-            f"the {len(poses.dwells)} poses {'do not fix' if lacking else 'hardly fix'} {term} ({number}; weak "
+            Status.ILL_CONDITIONED,
+            f"the {len(poses.dwells)} poses hardly fix {term} ({number}; weak "
             f"combination {known.weakest()}, condition {known.condition:.0f}): add poses with the specific "
             f"force along {pose_words(curing_pose(acc, gravity))} and its opposite",
         )
