@@ -1,0 +1,1 @@
+"""Which positions tell most: criteria and exchange."""

@@ -1,0 +1,260 @@
+"""A measuring rig as a kinematic chain, as data: fixed transforms, commanded joints, elementary errors.
+
+From the base n (north, west, up) to the instrument b, each element turns (or shifts) the next frame::
+
+    C_nb = M_1 M_2 ... M_m ,   columns of C_nb = axes of b in n,   row vectors multiply from the left
+
+so that a reference u_n (gravity, earth rate) reads ``u_n C_nb`` on the instrument's axes. Rotations are the
+elementary ones about x, y, z of the frame reached so far (`inercal.geometry.rotations.elementary`).
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inercal.geometry.rotations import Axis, elementary, skew
+from inercal.rigs.distribution import Distribution
+
+Array = NDArray[np.float64]
+
+
+class Scope(enum.Enum):
+    """How long an error keeps its value: until it is drawn anew."""
+
+    SAMPLE = "sample"
+    POSITION = "position"
+    RUN = "run"
+    RIG = "rig"
+
+    @property
+    def constant(self) -> bool:
+        """True if the error keeps one value throughout a test."""
+        return self in (Scope.RUN, Scope.RIG)
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """A known transform: ``rotation`` (3, 3), then ``offset`` (3,) [m] in the frame before it."""
+
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    offset: Array = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A commanded rotation about ``axis`` of the frame reached so far."""
+
+    name: str
+    axis: Axis
+
+
+@dataclass(frozen=True)
+class Error:
+    """An elementary error: a small random rotation about ``axis``, or a shift along it.
+
+    ``distribution`` [rad; m if ``is_offset``], ``scope`` how long a value lasts, ``what`` in words.
+    """
+
+    name: str
+    axis: Axis
+    distribution: Distribution
+    scope: Scope
+    what: str = ""
+    is_offset: bool = False
+
+
+Element: TypeAlias = Fixed | Joint | Error
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """An ordered list of elements, base first.
+
+    Raises
+    ------
+    ValueError
+        A joint or an error that occurs twice: one variable at two places is not covered.
+    """
+
+    elements: tuple[Element, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse names that occur twice."""
+        names = [element.name for element in self.elements if not isinstance(element, Fixed)]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise ValueError(f"found {', '.join(sorted(twice))} twice, expected each name once in a chain")
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the commanded angles, base first: the order of ``angles``."""
+        return tuple(element.name for element in self.elements if isinstance(element, Joint))
+
+    @cached_property
+    def errors(self) -> tuple[Error, ...]:
+        """The elementary errors, base first."""
+        return tuple(element for element in self.elements if isinstance(element, Error))
+
+    @cached_property
+    def factors(self) -> tuple[str, ...]:
+        """Names of the errors: the order of ``errors`` in every call and of every result."""
+        return tuple(error.name for error in self.errors)
+
+    @cached_property
+    def std(self) -> Array:
+        """Standard deviations (k,) of the errors [rad or m]."""
+        return np.array([error.distribution.std for error in self.errors])
+
+    def with_errors(self, *changed: Error) -> Chain:
+        """The chain with errors of these names replaced; raises KeyError for a name it has not."""
+        new = {error.name: error for error in changed}
+        missing = sorted(new.keys() - set(self.factors))
+        if missing:
+            raise KeyError(missing[0])
+        return Chain(tuple(new.get(e.name, e) if isinstance(e, Error) else e for e in self.elements))
+
+    def with_scope(self, scope: Scope) -> Chain:
+        """The chain with all errors of one scope."""
+        return self.with_errors(*(replace(error, scope=scope) for error in self.errors))
+
+    def draw(self, rng: np.random.Generator, positions: int, runs: int | None = None) -> Array:
+        """Errors for the positions of a test, drawn by scope.
+
+        Returns
+        -------
+        (positions, k), or (runs, positions, k) where ``runs`` is given
+            Errors [rad or m]; those of scope ``run`` and ``rig`` are the same at all positions of a run.
+            One of scope ``sample`` is drawn once a position too: averaging it is the simulation's work.
+        """
+        shape = (positions,) if runs is None else (runs, positions)
+        drawn = np.empty((*shape, len(self.errors)))
+        for k, error in enumerate(self.errors):
+            once = (*shape[:-1], 1) if error.scope.constant else shape
+            drawn[..., k] = error.distribution.sample(rng, once)
+        return drawn
+
+    def pose(self, angles: ArrayLike, errors: ArrayLike | None = None) -> Array:
+        """Homogeneous transforms from b to n.
+
+        Parameters
+        ----------
+        angles : (*batch, joints) rad
+        errors : (*batch, k) rad or m, optional; the ideal rig if absent
+
+        Returns
+        -------
+        (*batch, 4, 4) attitude C_nb and, in the last column, the place of b's origin in n [m]
+        """
+        angles, errors = self._checked(angles, errors)
+        batch = np.broadcast_shapes(angles.shape[:-1], errors.shape[:-1])
+        pose = np.broadcast_to(np.eye(4), (*batch, 4, 4))
+        for element, value in self._values(angles, errors):
+            pose = pose @ _transform(element, value)
+        return pose
+
+    def attitude(self, angles: ArrayLike, errors: ArrayLike | None = None) -> Array:
+        """Attitudes C_nb (*batch, 3, 3); arguments as in `pose`."""
+        angles, errors = self._checked(angles, errors)
+        batch = np.broadcast_shapes(angles.shape[:-1], errors.shape[:-1])
+        C_nb = np.broadcast_to(np.eye(3), (*batch, 3, 3))
+        for element, value in self._values(angles, errors):
+            if not (isinstance(element, Error) and element.is_offset):
+                C_nb = C_nb @ _rotation(element, value)
+        return C_nb
+
+    def slopes(self, angles: ArrayLike) -> Array:
+        """Derivatives of the attitude with respect to the errors, at the ideal rig.
+
+        Returns
+        -------
+        (*batch, k, 3, 3) dC_nb/derror_k [1/rad]; zero for offsets
+        """
+        angles, none = self._checked(angles, None)
+        before = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
+        found = []
+        for element, value in self._values(angles, none):
+            if isinstance(element, Error):
+                turn = np.zeros((3, 3)) if element.is_offset else skew(_UNIT[element.axis])
+                # before K after, with C = before after
+                found.append((before @ turn, before))
+            else:
+                before = before @ _rotation(element, value)
+        if not found:
+            return np.zeros((*angles.shape[:-1], 0, 3, 3))
+        whole = before
+        return np.stack([turned @ np.swapaxes(first, -1, -2) @ whole for turned, first in found], axis=-3)
+
+    def _values(self, angles: Array, errors: Array) -> Iterable[tuple[Element, Array]]:
+        """Each element with its values (*batch)."""
+        joint, error = 0, 0
+        for element in self.elements:
+            if isinstance(element, Joint):
+                yield element, angles[..., joint]
+                joint += 1
+            elif isinstance(element, Error):
+                yield element, errors[..., error]
+                error += 1
+            else:
+                yield element, np.zeros(())
+
+    def _checked(self, angles: ArrayLike, errors: ArrayLike | None) -> tuple[Array, Array]:
+        """Arrays of the right last axis."""
+        given = np.asarray(angles, dtype=float)
+        drawn = np.zeros(len(self.errors)) if errors is None else np.asarray(errors, dtype=float)
+        for array, names, what in ((given, self.joints, "angles"), (drawn, self.factors, "errors")):
+            if array.ndim == 0 or array.shape[-1] != len(names):
+                raise ValueError(
+                    f"found {what} of shape {array.shape}, expected {len(names)} in the last axis"
+                )
+        return given, drawn
+
+
+_UNIT: dict[str, Array] = dict(zip("xyz", np.eye(3), strict=True))
+
+
+def about(axis: ArrayLike, element: Joint | Error) -> tuple[Element, ...]:
+    """An element about any ``axis`` (3,) instead of its own: between two fixed rotations.
+
+    Raises
+    ------
+    ValueError
+        An axis of no length.
+    """
+    to = np.asarray(axis, dtype=float)
+    length = np.linalg.norm(to)
+    if not length > 0.0:
+        raise ValueError(f"found the axis {to}, expected one with a length")
+    own = _UNIT[element.axis]
+    across = np.linalg.svd((to / length)[None, :])[2][1:]  # completes the axis to an orthonormal triad
+    turn = np.empty((3, 3))
+    k = int(np.argmax(own))
+    turn[:, k], turn[:, (k + 1) % 3], turn[:, (k + 2) % 3] = to / length, *across
+    if np.linalg.det(turn) < 0.0:
+        turn[:, (k + 2) % 3] *= -1.0
+    return (Fixed(turn), element, Fixed(turn.T))
+
+
+def _rotation(element: Element, value: Array) -> Array:
+    """Rotation (*batch, 3, 3) of an element that is no offset."""
+    return element.rotation if isinstance(element, Fixed) else elementary(element.axis, value)
+
+
+def _transform(element: Element, value: Array) -> Array:
+    """Homogeneous transform (*batch, 4, 4) of an element."""
+    matrix = np.zeros((*value.shape, 4, 4))
+    matrix[..., 3, 3] = 1.0
+    if isinstance(element, Error) and element.is_offset:
+        matrix[..., :3, :3] = np.eye(3)
+        matrix[..., :3, 3] = value[..., None] * _UNIT[element.axis]
+    else:
+        matrix[..., :3, :3] = _rotation(element, value)
+        if isinstance(element, Fixed):
+            matrix[..., :3, 3] = element.offset
+    return matrix

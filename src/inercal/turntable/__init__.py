@@ -1,0 +1,1 @@
+"""Turntable calibration: sensitivity of the rig, test design, drift coefficients with uncertainties."""
