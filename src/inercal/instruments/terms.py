@@ -53,8 +53,50 @@ _GYRO = (
     ),
 )
 
+_ACCELEROMETER_BY_ANGLE = (
+    *(
+        Term(f"M_{i}{j}", f"misalignment: response of accelerometer {i} to specific force along {j}", "rad")
+        for i, j in ("yx", "zx", "zy")
+    ),
+    *(
+        Term(f"{symbol}_{i}", f"accelerometer {i} {name}", unit)
+        for i in _AXES
+        for symbol, name, unit in (
+            ("K2", "second-order coefficient, of the square of the input", "1/(m/s^2)"),
+            ("K3", "third-order coefficient, of the cube of the input", "1/(m/s^2)^2"),
+            ("Koq", "odd quadratic coefficient, of the input times its magnitude", "1/(m/s^2)"),
+            ("Kip", "cross-coupling of input and pendulous axis", "1/(m/s^2)"),
+            ("Kio", "cross-coupling of input and output axis", "1/(m/s^2)"),
+            ("Kpo", "cross-coupling of pendulous and output axis", "1/(m/s^2)"),
+            ("Kpp", "cross-axis coefficient, of the square along the pendulous axis", "1/(m/s^2)"),
+            ("Koo", "cross-axis coefficient, of the square along the output axis", "1/(m/s^2)"),
+        )
+    ),
+)
+
+# a is the gravity reference in units of the site's gravity, a = [0 0 -1] C_nb: an accelerometer reads -a
+_DRIFT = tuple(
+    Term(symbol, name, unit)
+    for axis, k in (("X", "k"), ("Y", "kY"))
+    for symbol, name, unit in (
+        *((f"{k}_{i}", f"axis {axis}: output per rate about {i}", "output/(rad/s)") for i in _AXES),
+        (f"D{axis}_F", f"axis {axis}: fixed drift", "output"),
+        *((f"D{axis}_{i}", f"axis {axis}: drift per gravity along {i}", "output") for i in "XYZ"),
+        *(
+            (f"D{axis}_{i}{i}", f"axis {axis}: drift per square of gravity along {i}", "output")
+            for i in "XYZ"
+        ),
+        *(
+            (f"D{axis}_{i}{j}", f"axis {axis}: drift per product of gravity along {i} and {j}", "output")
+            for i, j in ("XY", "XZ", "YZ")
+        ),
+    )
+)
+
 #: every term, in the order results list them
-TERMS: dict[str, Term] = {term.symbol: term for term in (*_ACCELEROMETER, *_GYRO)}
+TERMS: dict[str, Term] = {
+    term.symbol: term for term in (*_ACCELEROMETER, *_GYRO, *_ACCELEROMETER_BY_ANGLE, *_DRIFT)
+}
 
 ACCELEROMETER_TRIAD = tuple(term.symbol for term in _ACCELEROMETER)
 """K0, K1 and the upper-triangular M of an accelerometer triad that defines the frame."""

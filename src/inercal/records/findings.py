@@ -32,6 +32,8 @@ CODES: dict[str, str] = {
     "few_degrees_of_freedom": "hardly more data than unknowns",
     "resolution": "the output moves in steps that hide its noise",
     "skipped_turn": "a turn was left out of the fit",
+    "stated_earth_rate": "earth rate is subtracted and its terms are not fitted",
+    "weak_term": "a term is hardly known",
 }
 
 

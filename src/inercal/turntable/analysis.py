@@ -1,0 +1,213 @@
+"""The sensitivity of a table: which error of the rig matters for what the instrument should read."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import StudyError
+from inercal.rigs.chain import Chain
+from inercal.rigs.outputs import table_outputs
+from inercal.sensitivity import averages
+from inercal.sensitivity.averages import Averages, Flag
+from inercal.sensitivity.indices import Indices
+from inercal.turntable.settings import TurntableSettings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Analysed:
+    """A sensitivity analysis: ``indices`` at each position, and averages over them.
+
+    ``joints`` names the columns of `Indices.angles`, ``what`` says each factor in words, ``note`` is for the
+    user (may be empty), ``solve`` is the time of the computation alone [s].
+    """
+
+    indices: Indices
+    joints: tuple[str, ...]
+    what: tuple[str, ...]
+    note: str = ""
+    solve: float = field(default=0.0, compare=False)
+
+    @cached_property
+    def mean(self) -> Averages:
+        """Mean over positions (o, k), as in Zhao et al. 2023."""
+        return averages.mean(self.indices)
+
+    @cached_property
+    def weighted(self) -> Averages:
+        """Parts summed over positions, over the variance summed (o, k)."""
+        return averages.weighted(self.indices)
+
+    @cached_property
+    def aggregate(self) -> Averages:
+        """All outputs and positions together (k,), each output divided by its scale."""
+        return averages.aggregate(self.indices)
+
+    @cached_property
+    def flagged(self) -> tuple[Flag, ...]:
+        """Outputs and positions where interactions rule."""
+        return averages.flagged(self.indices)
+
+    @property
+    def message(self) -> str:
+        """What was found, in a sentence."""
+        found = self.indices
+        top = [found.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
+        head = (
+            f"{len(found.factors)} errors, {len(found.outputs)} outputs, {len(found.angles)} positions; "
+            f"the largest shares are those of {', '.join(top)}"
+        )
+        if not self.flagged:
+            return head
+        places = len({flag.angles for flag in self.flagged})
+        return f"{head}; interactions rule at {places} of the positions"
+
+
+def analyse(
+    settings: TurntableSettings,
+    second: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Analysed:
+    """Analyse the study's table by the study's method.
+
+    Parameters
+    ----------
+    settings : TurntableSettings
+    second : bool
+        Second-order parts too; only the exact method has them.
+    say : callable
+        Told, in words, what takes long before the computation begins.
+    progress : callable, optional
+        Told the positions done and all of them.
+
+    Raises
+    ------
+    StudyError
+        A table without errors, rates without a latitude.
+    """
+    chain, how = settings.chain, settings.analysis
+    if not chain.errors:
+        raise StudyError(
+            "rig.errors",
+            'found no errors of the table, expected some such as default = { uniform = "2 arcmin" }',
+        )
+    outputs = table_outputs(how.outputs, settings.site.gravity, settings.site.latitude)
+    angles, note = settings.plan.angles, ""
+    if how.method == "exact":
+        from inercal._jit import compiling
+        from inercal.sensitivity import exact
+
+        with compiling("sensitivity", say):
+            exact.analyse(chain, outputs[:1], angles[:1], shapley=True, second=True)
+        clock = time.perf_counter()
+        indices = exact.analyse(chain, outputs, angles, shapley=True, second=second)
+    elif how.method == "sampled":
+        from inercal.sensitivity import sampled
+
+        clock = time.perf_counter()
+        rng = np.random.default_rng(how.seed)
+        indices = sampled.analyse(chain, outputs, angles, how.samples, rng, how.sampling, progress)
+        indices = replace(indices, method={**indices.method, "seed": how.seed})
+        taken = indices.method["samples"]
+        if taken != how.samples:
+            note = f"{how.samples} samples rounded up to {taken}, a power of two, for Sobol points"
+    else:
+        from inercal.sensitivity import local
+
+        clock = time.perf_counter()
+        indices = local.analyse(chain, outputs, angles)
+    solve = time.perf_counter() - clock
+    return Analysed(indices, chain.joints, _words(chain), note, solve)
+
+
+def result(analysed: Analysed) -> dict[str, Any]:
+    """The command's own part of the JSON result: the contract's keys, arrays as arrays."""
+    found = analysed.indices
+    part = analysed.aggregate
+    return {
+        "factors": found.factors,
+        "outputs": found.outputs,
+        "positions": _angles(analysed),
+        "mean": {**_plain(analysed.mean), **_shapley(found, averages.mean)},
+        "weighted": {**_plain(analysed.weighted), **_shapley(found, averages.weighted)},
+        "aggregate": {"outputs": found.outputs, "first": part.first, "total": part.total},
+        "flagged": [
+            {
+                "output": flag.output,
+                **dict(zip(analysed.joints, flag.angles, strict=True)),
+                "sum_first": flag.sum_first,
+            }
+            for flag in analysed.flagged
+        ],
+        "method": found.method,
+    }
+
+
+def table(analysed: Analysed) -> str:
+    """The errors as aligned text, those with the largest shares first."""
+    found, share, mean = analysed.indices, analysed.aggregate, analysed.mean
+    head = ("", "S", "ST", *(f"S {output}" for output in found.outputs), "")
+    rows = [
+        (
+            found.factors[k],
+            *(_number(x) for x in (share.first[k], share.total[k], *mean.first[:, k])),
+            analysed.what[k],
+        )
+        for k in np.argsort(-share.total, kind="stable")
+    ]
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if i in (0, len(head) - 1) else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in (head, *rows)
+    ]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"S, ST: first and total order over {', '.join(found.outputs)} and all positions, each output in "
+            "units of its reference",
+            "S of an output: mean of its first-order indices over the positions",
+        ]
+    )
+
+
+def _words(chain: Chain) -> tuple[str, ...]:
+    """Each error in words."""
+    return tuple(error.what for error in chain.errors)
+
+
+def _angles(analysed: Analysed) -> dict[str, Array]:
+    """Angles of the positions [rad] by joint."""
+    return {joint: analysed.indices.angles[:, k] for k, joint in enumerate(analysed.joints)}
+
+
+def _plain(found: Averages) -> Mapping[str, Array]:
+    """Averages by name."""
+    return {"first": found.first, "total": found.total, "total_minus_first": found.total_minus_first}
+
+
+def _shapley(found: Indices, average: Callable[[Indices], Averages]) -> Mapping[str, Array]:
+    """Shapley effects, averaged as if they were parts of variance; none where they were not computed."""
+    if found.shapley is None:
+        return {}
+    parts = np.nan_to_num(found.shapley) * found.variance[..., None]
+    return {"shapley": average(replace(found, first_variance=parts)).first}
+
+
+def _number(share: float) -> str:
+    """An index in a column: three digits, or its size."""
+    if np.isnan(share):
+        return "-"
+    return f"{share:.4f}" if share >= 5e-5 or share == 0.0 else f"{share:.0e}"

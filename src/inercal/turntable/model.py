@@ -1,0 +1,153 @@
+"""What the instrument on the table should indicate, and how the table's errors change that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import StudyError
+from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
+from inercal.instruments.polynomial import ChannelModel
+from inercal.rigs.chain import Chain
+from inercal.rigs.outputs import gravity_reference, rate_reference
+from inercal.turntable.settings import TurntableSettings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TableModel:
+    """An instrument's channels on a table.
+
+    Attributes
+    ----------
+    chain : Chain
+        The table with its errors.
+    a_n : (3,)
+        What the monomials call a, in n: the gravity reference in units of the site's gravity for a gyrowheel,
+        specific force [m/s^2] for the others.
+    w_n : (3,)
+        Earth rate [rad/s] in n.
+    channels : tuple of ChannelModel
+    """
+
+    chain: Chain
+    a_n: Array
+    w_n: Array
+    channels: tuple[ChannelModel, ...]
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Terms of all channels, one channel after the other."""
+        return tuple(symbol for channel in self.channels for symbol in channel.symbols)
+
+    @property
+    def blocks(self) -> tuple[slice, ...]:
+        """Where the terms of each channel stand among `symbols`."""
+        ends = np.cumsum([len(channel.symbols) for channel in self.channels]).tolist()
+        return tuple(slice(a, b) for a, b in zip([0, *ends], ends, strict=False))
+
+    def inputs(self, angles: Array, errors: Array | None = None) -> tuple[Array, Array]:
+        """a and w (*batch, 3) on the instrument's axes at ``angles`` (*batch, joints) [rad]."""
+        C_nb = self.chain.attitude(angles, errors)
+        return self.a_n @ C_nb, self.w_n @ C_nb
+
+    def rows(self, angles: Array) -> Array:
+        """Regressors (n, channels, p) of all coefficients, at the nominal attitudes."""
+        a, w = self.inputs(angles)
+        made = np.zeros((len(a), len(self.channels), len(self.symbols)))
+        for k, (channel, block) in enumerate(zip(self.channels, self.blocks, strict=True)):
+            made[:, k, block] = channel.regressors(a, w)
+        return made
+
+    def outputs(self, angles: Array, c: Array, errors: Array | None = None) -> Array:
+        """Outputs (*batch, channels) for linear coefficients ``c`` (p,)."""
+        a, w = self.inputs(angles, errors)
+        return np.stack(
+            [
+                channel.regressors(a, w) @ c[block]
+                for channel, block in zip(self.channels, self.blocks, strict=True)
+            ],
+            axis=-1,
+        )
+
+    def by_inputs(self, angles: Array, c: Array) -> Array:
+        """Derivatives (n, channels, 6) of the outputs with respect to a and w on the instrument's axes."""
+        a, w = self.inputs(angles)
+        return np.stack(
+            [
+                np.einsum("npi,p->ni", channel.slopes(a, w), c[block])
+                for channel, block in zip(self.channels, self.blocks, strict=True)
+            ],
+            axis=1,
+        )
+
+    def by_errors(self, angles: Array, c: Array) -> Array:
+        """Derivatives (n, channels, k) of the outputs with respect to the table's errors, at none."""
+        turns = self.chain.slopes(angles)
+        moved = np.concatenate([self.a_n @ turns, self.w_n @ turns], axis=-1)  # (n, k, 6)
+        return np.asarray(np.einsum("nci,nki->nck", self.by_inputs(angles, c), moved))
+
+    def by_references(self, angles: Array, c: Array, a_n: Array, w_n: Array) -> Array:
+        """Change (n, channels) of the outputs for small changes of the references in n."""
+        C_nb = self.chain.attitude(angles)
+        moved = np.concatenate([a_n @ C_nb, w_n @ C_nb], axis=-1)
+        return np.asarray(np.einsum("nci,ni->nc", self.by_inputs(angles, c), moved))
+
+
+def table_model(settings: TurntableSettings, channels: Sequence[str]) -> TableModel:
+    """The model of a study for these channels, with the terms it asks for.
+
+    Raises
+    ------
+    StudyError
+        A latitude that is missing, or terms that leave a channel without any.
+    """
+    site, instrument = settings.site, settings.instrument
+    if site.latitude is None:
+        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
+    models = [channel_model(instrument.kind, channel) for channel in channels]
+    wanted = instrument.terms
+    chosen = []
+    for model in models:
+        unwanted = EXTRA if wanted is None else set(model.symbols) - set(wanted)
+        kept = model.without(unwanted)
+        if not kept.symbols:
+            raise StudyError(
+                "instrument.terms", f"none of them belongs to {model.channel}, which the record has"
+            )
+        if kept.relative & set(kept.symbols) and kept.leading not in kept.symbols:
+            raise StudyError(
+                "instrument.terms", f"{kept.leading} is missing, to which others of {model.channel} relate"
+            )
+        chosen.append(kept)
+    a_n = gravity_reference() if instrument.kind == "gyrowheel" else -gravity_reference(site.gravity)
+    return TableModel(settings.chain, a_n, rate_reference(site.latitude), tuple(chosen))
+
+
+def channels_of(settings: TurntableSettings) -> tuple[str, ...]:
+    """Channels of which the study states a coefficient; all of the kind where it states none."""
+    kind, stated = settings.instrument.kind, settings.instrument.coefficients
+    named = [
+        channel
+        for channel in CHANNELS[kind]
+        if any(symbol in stated for symbol in channel_model(kind, channel).symbols)
+    ]
+    return tuple(named) or CHANNELS[kind]
+
+
+def stated_values(settings: TurntableSettings, channel: ChannelModel) -> Array:
+    """Values (p,) of the terms of a channel as the study states them.
+
+    Of those it does not state, the gain is 1 where the output is in the unit of its input; all others are 0.
+    """
+    stated, dimension = settings.instrument.coefficients, settings.instrument.unit.dimension
+    gain = 1.0 if dimension in ("rate", "acceleration") else 0.0
+    return np.array([stated.get(symbol, gain if symbol in UNIT_GAINS else 0.0) for symbol in channel.symbols])
+
+
+UNIT_GAINS = ("k_x", "kY_y", *(f"{k}_{i}" for k in ("S", "K1") for i in "xyz"))
+"""Terms that are 1 where nothing is said and the output is in the unit of the input."""

@@ -1,0 +1,346 @@
+"""The estimate of a calibration on a table: coefficients, covariance, budget, shares and verdict."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.status import Status
+from inercal.geometry.earth import EARTH_RATE
+from inercal.instruments.terms import TERMS
+from inercal.records.places import counted
+from inercal.records.record import Record
+from inercal.turntable.fitting import Fitting
+from inercal.turntable.readings import Readings
+from inercal.turntable.regression import Regression
+from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.tolerance import alternatives, coefficient_shares, drift_shares, shifts
+from inercal.units import Unit
+
+Array = NDArray[np.float64]
+
+COMMAND = "calibrate turntable"
+
+WORST_CONDITION = 100.0
+"""Condition number of the unit-length columns beyond which a combination of terms counts as weakly known."""
+
+SURPRISE = 1e-4
+"""Probability of a misfit as large by chance, below which the readings contradict what is stated of them."""
+
+MODELS = {
+    "gyrowheel": (
+        "y = k_x w_x + k_y w_y + k_z w_z + DX_F + DX_X a_x + DX_Y a_y + DX_Z a_z + DX_XX a_x^2 + DX_YY a_y^2 "
+        "+ DX_XY a_x a_y + DX_XZ a_x a_z + DX_YZ a_y a_z (axis Y: kY, DY); a = [0 0 -1] C_nb, the gravity reference "
+        "in units of the site's gravity (an accelerometer reads -a); w the earth rate"
+    ),
+    "gyro": (
+        "y_i = D_F_i + S_i (w_i + T_ij w_j + T_ik w_k) + G_ij f_j, f the specific force (+g up at rest), w the earth "
+        "rate"
+    ),
+    "accelerometer": (
+        "y_i = K0 + K1 (f_i + M_ip f_p + M_io f_o + K2 f_i^2 + K3 f_i^3 + Koq f_i |f_i| + Kip f_i f_p + Kio f_i f_o "
+        "+ Kpo f_p f_o + Kpp f_p^2 + Koo f_o^2), f the specific force (+g up at rest), p and o the axes after i"
+    ),
+}
+
+REFERENCES = (
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+    "Zhao et al., Error sensitivity analysis of a turntable-gyrowheel calibration system, Journal of Ordnance "
+    "Equipment Engineering 44(1) (2023)",
+    "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
+    "Chemistry 42 (1970) 1194",
+)
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Terms as they are reported: ``values`` (p,) and the ``slope`` (p, p) by the linear coefficients."""
+
+    values: Array
+    slope: Array
+
+
+def terms_of(fit: Regression) -> Terms:
+    """Values of the terms of all channels."""
+    values, slope = np.zeros(len(fit.c)), np.zeros((len(fit.c), len(fit.c)))
+    for channel, block in zip(fit.model.channels, fit.model.blocks, strict=True):
+        values[block], slope[block, block] = channel.terms(fit.c[block])
+    return Terms(values, slope)
+
+
+def sources(fitting: Fitting, settings: TurntableSettings, terms: Terms, unit: str) -> list[TypeA | TypeB]:
+    """Everything the terms are uncertain by: noise, each error of the table, the site, stated terms."""
+    fit = fitting.fit
+    assert fit is not None
+    gain = np.einsum("pq,qnc->pnc", terms.slope, fit.gain)
+    found: list[TypeA | TypeB] = []
+    for k, channel in enumerate(fit.model.channels):
+        sigma, dof = float(fit.noise[k]), float(fit.noise_dof[k])
+        name = f"noise of {channel.channel}"
+        if np.isinf(dof):
+            found.append(TypeB(name, sigma, unit, gain[..., k]))
+        else:
+            found.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
+    for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
+        std = error.distribution.std
+        found.append(TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std))
+    found += _of_site(fit, settings, gain)
+    for k, symbol in enumerate(fitting.stated.symbols):
+        if fitting.stated.u[k] > 0.0:
+            by_value = -np.einsum("pnc,nc->p", gain, fitting.stated.rows[..., k])
+            found.append(TypeB(f"stated {symbol}", float(fitting.stated.u[k]), _unit(symbol, unit), by_value))
+    return found
+
+
+def _of_site(fit: Regression, settings: TurntableSettings, gain: Array) -> list[TypeB]:
+    """What gravity and latitude do to the terms."""
+    site, model = settings.site, fit.model
+    still = np.zeros(3)
+
+    def moved(a_n: Array, w_n: Array) -> Array:
+        change = model.by_references(fit.angles, fit.c, a_n, w_n)
+        # readings made with another reference than stated: the fit takes the difference for coefficients
+        return np.asarray(np.einsum("pnc,nc->p", gain, change))
+
+    assert site.latitude is not None
+    by_latitude = moved(still, EARTH_RATE * np.array([-np.sin(site.latitude), 0.0, np.cos(site.latitude)]))
+    # in units of the site's gravity, gravity is one whatever its value
+    of_gravity = settings.instrument.kind != "gyrowheel"
+    by_gravity = moved(np.array([0.0, 0.0, 1.0]), still) if of_gravity else np.zeros(len(fit.c))
+    effects: dict[tuple[str, float, str], Array] = {}
+    for source in site.inputs:
+        effects[source.source, source.u, source.unit] = by_gravity * source.sensitivity
+    if site.latitude_u > 0.0:
+        key = ("latitude", site.latitude_u, "rad")
+        effects[key] = effects.get(key, np.zeros(len(fit.c))) + by_latitude
+    return [TypeB(*key, sensitivity) for key, sensitivity in effects.items() if np.any(sensitivity)]
+
+
+def assemble(record: Record, found: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
+    """Put the estimate together."""
+    unit = si_unit(found.unit)
+    common: dict[str, Any] = {
+        "command": COMMAND,
+        "model": MODELS[settings.instrument.kind],
+        "conditions": _conditions(found, settings),
+        "traceability": settings.traceability,
+        "inputs": record.sources,
+        "provenance": _provenance(settings),
+        "references": REFERENCES,
+    }
+    findings = [*record.findings, *fitting.findings]
+    ranks = [each.identifiability.rank for each in fitting.known]
+    result: dict[str, Any] = {
+        "rank": min(ranks),
+        "terms": max(len(channel.symbols) for channel in fitting.model.channels),
+        "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
+        "plan": {"name": _plan_name(found, settings), "positions": len(found.y)},
+        "instrument": settings.instrument.kind,
+        "earth_rate": "stated" if fitting.stated.symbols else "fitted",
+    }
+    if fitting.fit is None:
+        return Estimate(
+            names=(),
+            units=(),
+            values=np.zeros(0),
+            covariance=np.zeros((0, 0)),
+            dof=np.zeros(0),
+            k=np.zeros(0),
+            status=Status.UNOBSERVABLE,
+            message=_unobservable(found, fitting),
+            findings=tuple(findings),
+            statistics={"positions": float(len(found.y))},
+            result=result | {"tolerance_shares": {}},
+            **common,
+        )
+    fit, terms = fitting.fit, terms_of(fitting.fit)
+    names = fit.model.symbols
+    covariance, dof, budget = combine(names, sources(fitting, settings, terms, unit))
+    status, message = _verdict(found, fitting)
+    return Estimate(
+        names=names,
+        units=tuple(_unit(name, unit) for name in names),
+        values=terms.values,
+        covariance=covariance,
+        dof=dof,
+        k=np.array([coverage_factor(float(value)) for value in dof]),
+        status=status,
+        message=message,
+        findings=tuple(findings),
+        statistics=_statistics(found, fitting),
+        budget=budget,
+        result=result
+        | _shares(fit, terms)
+        | {"table_errors": _table_errors(fit), "noise": _noise(found, fit, unit)},
+        **common,
+    )
+
+
+def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
+    """Status and its sentence."""
+    from scipy.special import chdtrc
+
+    fit = fitting.fit
+    assert fit is not None
+    worst = max(fitting.known, key=lambda each: each.identifiability.condition).identifiability
+    if worst.condition > WORST_CONDITION:
+        return Status.ILL_CONDITIONED, (
+            f"the {len(found.y)} positions fix {worst.weakest()} only weakly (condition number "
+            f"{worst.condition:.0f} of the scaled columns): add positions that change it"
+        )
+    stated = np.isinf(fit.noise_dof).all()
+    if stated and fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < SURPRISE:
+        return Status.INCONSISTENT, (
+            f"the readings miss the model by {np.sqrt(fit.chi2 / fit.dof):.1f} times what the stated noise and table "
+            "errors explain: check both, signs and units, or fit more terms"
+        )
+    return Status.OK, (
+        f"{counted(len(fit.c), 'coefficient')} from {counted(len(found.y), 'position')} of "
+        f"{counted(len(found.channels), 'channel')}"
+    )
+
+
+def _unobservable(found: Readings, fitting: Fitting) -> str:
+    """Why nothing was fitted, and what would help."""
+    words = [text for each in fitting.known for text in each.words]
+    if not words:
+        fewest = max(len(channel.symbols) for channel in fitting.model.channels)
+        return f"found {counted(len(found.y), 'position')} for {fewest} terms, expected at least as many"
+    first = next(each for each in fitting.known if each.words)
+    rank, terms = first.identifiability.rank, len(first.identifiability.names)
+    return (
+        f"the {len(found.y)} positions identify {rank} of {terms} terms: the readings do not change along "
+        f"{'; '.join(dict.fromkeys(words))} (each term by the output it causes at full input); add positions, or leave "
+        "terms out"
+    )
+
+
+def _statistics(found: Readings, fitting: Fitting) -> Mapping[str, float]:
+    """Figures of the fit."""
+    fit = fitting.fit
+    assert fit is not None
+    return {
+        "dof": float(fit.dof),
+        "condition": max(each.identifiability.condition for each in fitting.known),
+        "residual_rms": float(np.sqrt(np.mean(np.square(fit.residuals)))),
+        "chi2": fit.chi2,
+        "positions": float(len(found.y)),
+    }
+
+
+def _shares(fit: Regression, terms: Terms) -> dict[str, Any]:
+    """Shares of the table's errors, and what the terms would be uncertain by were the table otherwise."""
+    other = alternatives(fit, terms.slope)
+    names = fit.model.symbols
+    stated = other.scopes["stated"]
+
+    def named(values: Array) -> dict[str, float]:
+        return dict(zip(names, values.tolist(), strict=True))
+
+    return {
+        "tolerance_shares": coefficient_shares(fit, terms.slope),
+        "drift_shares": drift_shares(fit),
+        "halved": {name: named(u / stated) for name, u in other.halved.items()},
+        "scopes": {scope: named(u) for scope, u in other.scopes.items()},
+    }
+
+
+def _table_errors(fit: Regression) -> list[dict[str, Any]]:
+    """What the test tells of the errors that stay constant; ``observed`` where u is below 0.9 of the prior."""
+    errors = [fit.model.chain.errors[k] for k in fit.constant]
+    return [
+        {
+            "factor": error.name,
+            "scope": error.scope.value,
+            "value_rad": float(value),
+            "u_rad": float(u),
+            "prior_rad": error.distribution.std,
+            "observed": bool(u < 0.9 * error.distribution.std),
+        }
+        for error, value, u in zip(errors, fit.table, fit.table_u, strict=True)
+        if not error.is_offset
+    ]
+
+
+def _noise(found: Readings, fit: Regression, unit: str) -> list[dict[str, Any]]:
+    """Noise of a reading by channel: as used, and as the scatter within the dwells would have it."""
+    return [
+        {
+            "channel": channel,
+            "noise": float(used),
+            "within_dwells": float(within),
+            "from": "stated" if np.isinf(dof) else "residuals",
+            "unit": unit,
+        }
+        for channel, used, within, dof in zip(
+            found.channels, fit.noise, found.u_mean, fit.noise_dof, strict=True
+        )
+    ]
+
+
+def _conditions(found: Readings, settings: TurntableSettings) -> dict[str, Any]:
+    """Conditions and ranges over which the result is valid."""
+    ranges = {
+        f"reading_of_{name}": [low, high]
+        for name, low, high in zip(
+            found.channels, found.y.min(axis=0).tolist(), found.y.max(axis=0).tolist(), strict=True
+        )
+    }
+    return {
+        "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
+        "temperature": None if settings.temperature is None else settings.temperature.text,
+        "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
+        "date": settings.traceability.get("date", ""),
+        "ranges": ranges,
+    }
+
+
+def _provenance(settings: TurntableSettings) -> dict[str, Any]:
+    """What a repetition needs beside the inputs."""
+    import scipy
+
+    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+    return {"settings": settings.given, "seed": None, "versions": versions}
+
+
+def _plan_name(found: Readings, settings: TurntableSettings) -> str:
+    """Name of the study's plan, where the record holds its positions."""
+    plan = settings.plan.angles
+    if plan.shape != found.angles.shape:
+        return "of the record"
+    apart = np.abs(np.remainder(plan - found.angles + np.pi, 2.0 * np.pi) - np.pi)
+    return settings.plan.name if apart.max() < 1e-3 else "of the record"
+
+
+def si_unit(unit: Unit) -> str:
+    """The SI unit of a record's outputs."""
+    return unit.si
+
+
+def _unit(symbol: str, output: str) -> str:
+    """Unit of a term for outputs of that unit."""
+    text = TERMS[symbol].unit_for(output)
+    return "1" if text in ("(rad/s)/(rad/s)", "(m/s^2)/(m/s^2)") else text
+
+
+def displayed(estimate: Estimate, unit: Unit) -> Estimate:
+    """The estimate for people: coefficients in SI units of a rate or acceleration in the record's own unit."""
+    if unit.factor == 1.0:
+        return estimate
+    factor = np.array([unit.factor if text.startswith(unit.si) else 1.0 for text in estimate.units])
+    return replace(
+        estimate,
+        units=tuple(
+            unit.symbol + text.removeprefix(unit.si) if text.startswith(unit.si) else text
+            for text in estimate.units
+        ),
+        values=estimate.values / factor,
+        covariance=estimate.covariance / np.outer(factor, factor),
+    )

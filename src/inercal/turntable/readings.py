@@ -1,0 +1,159 @@
+"""A record of a test on a table, as one reading for each position: rows as they are, or dwells averaged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import RecordError
+from inercal.instruments.by_angle import CHANNELS
+from inercal.records.findings import Finding
+from inercal.records.places import counted
+from inercal.records.record import Record
+from inercal.units import Unit
+
+Array = NDArray[np.float64]
+
+STILL = np.radians(30.0 / 3600.0)
+"""Angle [rad] within which neighbouring rows are one position, where the record does not number them."""
+
+SHORT = 0.5
+"""A stay of less than this part of the median one is the table on its way, where dwells are found by angle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of a test.
+
+    Attributes
+    ----------
+    angles : (n, joints) rad, commanded or measured, in the order of the chain's joints
+    channels : (c,) names
+    unit : Unit
+        Of the record.
+    y : (n, c) readings, means over the dwells; in the SI unit of ``unit`` (count, V and 1 stay what they are)
+    samples : (n,) rows behind each reading
+    u_mean : (c,) standard deviation of a reading that the scatter within the dwells explains if it is white,
+        in the unit of y; NaN where a reading is a single row
+    findings : what is to be said of the record
+    """
+
+    angles: Array
+    channels: tuple[str, ...]
+    unit: Unit
+    y: Array
+    samples: NDArray[np.int64]
+    u_mean: Array
+    findings: tuple[Finding, ...] = ()
+
+
+def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
+    """Find the positions of a record and average over them.
+
+    Rows belong to one position while ``position`` keeps its number, or, where there is no such column, while the
+    angles stand still.
+
+    Parameters
+    ----------
+    record : Record
+        Angles of the ``joints``, and any channels of an instrument of that ``kind``.
+
+    Raises
+    ------
+    RecordError
+        No such channel, channels in different units, angles that are missing or change within a position, or a
+        position without a number.
+    """
+    where = record.sources[0].path if record.sources else "record"
+    channels = tuple(name for name in CHANNELS[kind] if name in record)
+    if not channels:
+        raise RecordError(
+            where,
+            f"found {', '.join(record.columns)}, expected one of {', '.join(CHANNELS[kind])} of a {kind}",
+        )
+    columns = [record[name] for name in channels]
+    for column in columns:
+        if column.unit != columns[0].unit or len(column.values) != len(columns[0].values):
+            raise RecordError(
+                where,
+                f"{column.name} has another unit or length than {columns[0].name}, expected one for all channels",
+            )
+    angles = np.stack([record[name].si() for name in joints], axis=-1)
+    if len(angles) != len(columns[0].values):
+        raise RecordError(where, f"{joints[0]} and {channels[0]} have different lengths, expected one table")
+    values = np.stack([column.values for column in columns], axis=-1) * columns[0].unit.factor
+    groups = _by_number(record, angles, where) if "position" in record else _by_angle(angles)
+    if not groups:
+        raise RecordError(where, "found no rows with angles, expected one or more for each position")
+    return _averaged(angles, values, groups, channels, columns[0].unit, where)
+
+
+def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int64]]:
+    """Rows of each stretch of one position number."""
+    number = record["position"].values
+    known = np.flatnonzero(np.isfinite(number) & np.isfinite(angles).all(axis=1))
+    parts = _stretches(known, np.diff(number[known]) != 0.0)
+    for part in parts:
+        if np.abs(_apart(angles[part], angles[part[0]])).max() > STILL:
+            raise RecordError(
+                where,
+                f"the angles change within position {number[part[0]]:g}, expected one attitude for each number",
+            )
+    return parts
+
+
+def _by_angle(angles: Array) -> list[NDArray[np.int64]]:
+    """Rows of each stretch of equal angles; short ones, where the others are long, are motion."""
+    known = np.flatnonzero(np.isfinite(angles).all(axis=1))
+    moved = np.abs(_apart(angles[known[1:]], angles[known[:-1]])).max(axis=1) > STILL if len(known) else []
+    parts = _stretches(known, np.asarray(moved, dtype=bool))
+    lengths = np.array([len(part) for part in parts])
+    usual = float(np.median(lengths[lengths > 1])) if np.any(lengths > 1) else 1.0
+    return [part for part in parts if len(part) >= SHORT * usual]
+
+
+def _stretches(rows: NDArray[np.int64], breaks: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Rows cut where there is a break."""
+    return np.split(rows, np.flatnonzero(breaks) + 1) if len(rows) else []
+
+
+def _apart(a: Array, b: Array) -> Array:
+    """Difference of angles, within ±pi."""
+    return np.asarray(np.remainder(a - b + np.pi, 2.0 * np.pi) - np.pi)
+
+
+def _averaged(
+    angles: Array,
+    values: Array,
+    groups: list[NDArray[np.int64]],
+    channels: tuple[str, ...],
+    unit: Unit,
+    where: str,
+) -> Readings:
+    """Means over the groups of rows; numbers that are missing do not count."""
+    y = np.empty((len(groups), values.shape[1]))
+    scatter, freedom = np.zeros(values.shape[1]), np.zeros(values.shape[1])
+    missing = 0
+    for k, rows in enumerate(groups):
+        known = np.isfinite(values[rows])
+        count = known.sum(axis=0)
+        if not count.all():
+            channel = channels[int(np.argmin(count))]
+            raise RecordError(
+                where, f"{channel} has no number at position {k + 1} of {len(groups)}, expected one for each"
+            )
+        missing += int((~known).sum())
+        y[k] = np.where(known, values[rows], 0.0).sum(axis=0) / count
+        scatter += np.square(np.where(known, values[rows] - y[k], 0.0)).sum(axis=0)
+        freedom += count - 1
+    samples = np.array([len(rows) for rows in groups])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u_mean = np.sqrt(scatter / freedom / np.mean(samples))
+    findings = []
+    if missing:
+        said = f"{counted(missing, 'value')} within the dwells are no numbers: the means are over the others"
+        findings.append(Finding("nan", said))
+    still = [angles[rows[0]] + _apart(angles[rows], angles[rows[0]]).mean(axis=0) for rows in groups]
+    return Readings(np.array(still), channels, unit, y, samples, u_mean, tuple(findings))

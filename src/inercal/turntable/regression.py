@@ -1,0 +1,263 @@
+"""Coefficients from readings: generalised least squares with the table's errors in the covariance.
+
+The readings of all channels are stacked, ``y = A c + J chi + e``: chi the errors of the table with the
+derivatives J of the readings. Errors redrawn at each position add to the covariance V of the readings there;
+errors that stay constant over the test are unknowns with the prior variance of their distribution::
+
+    [V^-1/2 y]   [V^-1/2 A   V^-1/2 J s]  [ c     ]
+    [   0    ] = [   0           1     ]  [ chi/s ]
+
+which is the same as weighting with V + J s^2 J^T, and also says what the test tells about chi. J depends on c,
+so that the fit is repeated until c rests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.identifiability import Identifiability, identify, in_words
+from inercal.instruments.polynomial import ChannelModel
+from inercal.turntable.model import TableModel
+
+Array = NDArray[np.float64]
+
+ROUNDS = 6
+"""Fits that are made at most; the derivatives hardly change after the first."""
+
+FLOOR = 1e-12
+"""Least standard deviation of a reading, over the rms of the readings: that of a simulation without noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """What the readings are uncertain by.
+
+    ``within`` (n, c, c) covariance redrawn at each position, noise and table; ``common`` (n, c, q) derivatives
+    with respect to the constant errors, in their standard deviations.
+    """
+
+    within: Array
+    common: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """A fit of linear coefficients.
+
+    Attributes
+    ----------
+    model : TableModel
+    angles : (n, joints) rad
+    c : (p,) linear coefficients [output per monomial]
+    covariance : (p, p) of them
+    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``
+    residuals : (n, c) readings minus model at the nominal attitudes
+    chi2, dof : weighted sum of squares, prior of the constant errors included, and its degrees of freedom
+    noise : (c,) standard deviation of a reading that is not the table's doing
+    noise_dof : (c,) its degrees of freedom; inf where it was stated
+    slopes : (n, c, k) derivatives of the readings with respect to all errors of the table
+    table : (q,) estimated constant errors [rad or m], in the order of ``constant``
+    table_u : (q,) their standard uncertainties
+    constant : (q,) indices of the constant errors among the chain's
+    """
+
+    model: TableModel
+    angles: Array
+    c: Array
+    covariance: Array
+    gain: Array
+    residuals: Array
+    chi2: float
+    dof: int
+    noise: Array
+    noise_dof: Array
+    slopes: Array
+    table: Array
+    table_u: Array
+    constant: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """One weighted fit: ``c`` (p,), ``joint`` (p + q, p + q) covariance, ``gain`` (p, n, c), chi (q,), chi2."""
+
+    c: Array
+    joint: Array
+    gain: Array
+    chi: Array
+    chi2: float
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the plan lets a channel say: rank and null vectors of its terms, ``words`` for each null vector."""
+
+    identifiability: Identifiability
+    words: tuple[str, ...] = field(default=())
+
+
+def known(model: TableModel, angles: Array) -> tuple[Known, ...]:
+    """Rank and null vectors of each channel at these positions."""
+    rows = model.rows(angles)
+    found = []
+    for k, (channel, block) in enumerate(zip(model.channels, model.blocks, strict=True)):
+        own = identify(rows[:, k, block], channel.symbols)
+        found.append(Known(own, _null_words(own, full_inputs(model, channel))))
+    return tuple(found)
+
+
+def full_inputs(model: TableModel, channel: ChannelModel) -> Array:
+    """Size (p,) of the monomials of a channel when the whole of a and of earth rate acts."""
+    a, w = float(np.linalg.norm(model.a_n)), float(np.linalg.norm(model.w_n))
+    return np.array([a**each.order * w ** sum(each.powers[3:]) for each in channel.monomials])
+
+
+def _null_words(own: Identifiability, sizes: Array) -> tuple[str, ...]:
+    """The null vectors in words, with as few terms as they can have, each times its full input."""
+    if not len(own.null_vectors):
+        return ()
+    return tuple(
+        in_words(vector, own.names, 1e-9) for vector in _few_terms(own.null_vectors / own.scale * sizes)
+    )
+
+
+def _few_terms(vectors: Array) -> Array:
+    """The same space in reduced row echelon form, largest pivots first."""
+    rows = vectors.copy()
+    for k in range(len(rows)):
+        j = int(np.argmax(np.abs(rows[k:]).max(axis=0)))
+        i = k + int(np.argmax(np.abs(rows[k:, j])))
+        rows[[k, i]] = rows[[i, k]]
+        rows[k] /= rows[k, j]
+        others = np.arange(len(rows)) != k
+        rows[others] -= rows[others, j][:, None] * rows[k]
+    rows[np.abs(rows) < 1e-9] = 0.0
+    return rows
+
+
+def weights(model: TableModel, angles: Array, c: Array, noise: Array, std: Array | None = None) -> Weights:
+    """Covariance of the readings for coefficients ``c``, noise (c,) and errors of the table.
+
+    ``std`` (k,) stands in for the standard deviations of the chain's errors.
+    """
+    slopes = model.by_errors(angles, c) * (model.chain.std if std is None else std)
+    constant = np.array([error.scope.constant for error in model.chain.errors], dtype=bool)
+    redrawn = slopes[..., ~constant]
+    return Weights(
+        np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)), slopes[..., constant]
+    )
+
+
+def solve(rows: Array, y: Array, weight: Weights) -> Solution:
+    """The weighted fit; raises LinAlgError where a position's covariance is not positive definite.
+
+    Parameters
+    ----------
+    rows : (n, c, p) regressors
+    y : (n, c) readings
+    weight : Weights
+    """
+    n, channels, p = rows.shape
+    factor = np.linalg.cholesky(weight.within)
+    left = np.linalg.solve(factor, np.concatenate([rows, weight.common], axis=-1)).reshape(n * channels, -1)
+    right = np.linalg.solve(factor, y[..., None]).reshape(n * channels)
+    q = left.shape[1] - p
+    whole = np.vstack([left, np.hstack([np.zeros((q, p)), np.eye(q)])])
+    length = np.linalg.norm(whole, axis=0)
+    length[length == 0.0] = 1.0
+    u, s, vt = np.linalg.svd(whole / length, full_matrices=False)
+    inverse = (vt.T / s) @ u.T / length[:, None]
+    joint = inverse @ inverse.T
+    solution = inverse[:, : n * channels] @ right
+    misfit = np.concatenate([right - left @ solution, solution[p:]])
+    # c = inverse L^-1 y, with L block diagonal
+    whitened = inverse[:p, : n * channels].reshape(p, n, channels)
+    gain = np.einsum("pnd,ndc->pnc", whitened, np.linalg.inv(factor))
+    return Solution(solution[:p], joint, gain, solution[p:], float(misfit @ misfit))
+
+
+def fit(
+    model: TableModel, angles: Array, y: Array, noise: Sequence[float | None], start: Array | None = None
+) -> Regression:
+    """Fit all channels together.
+
+    Parameters
+    ----------
+    model : TableModel
+        Whose terms the positions identify (see `known`).
+    angles : (n, joints) rad
+    y : (n, c) readings
+    noise : (c,) standard deviation of a reading; None where it is to be estimated from the scatter
+    start : (p,) coefficients for the first derivatives; from an unweighted fit if absent
+    """
+    rows = model.rows(angles)
+    n, channels, p = rows.shape
+    size = np.sqrt(np.mean(np.square(y), axis=0))
+    floor = FLOOR * np.where(size > 0.0, size, 1.0)
+    plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
+    c = solve(rows, y, plain).c if start is None else start
+    stated = np.array([np.nan if each is None else max(each, 0.0) for each in noise])
+    sigma = floor
+    for _ in range(ROUNDS):
+        sigma = np.maximum(np.where(np.isnan(stated), _scatter(model, angles, y, c), stated), floor)
+        solution = solve(rows, y, weights(model, angles, c, sigma))
+        change, c = np.abs(solution.c - c), solution.c
+        if np.all(change <= 1e-3 * np.sqrt(np.diag(solution.joint)[:p])):
+            break
+    constant = np.flatnonzero([error.scope.constant for error in model.chain.errors])
+    std = model.chain.std[constant]
+    return Regression(
+        model,
+        angles,
+        c,
+        solution.joint[:p, :p],
+        solution.gain,
+        y - np.einsum("ncp,p->nc", rows, c),
+        solution.chi2,
+        n * channels - p,
+        sigma,
+        np.where(np.isnan(stated), [n - len(channel.symbols) for channel in model.channels], np.inf),
+        model.by_errors(angles, c),
+        solution.chi * std,
+        np.sqrt(np.diag(solution.joint)[p:]) * std,
+        constant,
+    )
+
+
+def _scatter(model: TableModel, angles: Array, y: Array, c: Array) -> Array:
+    """Noise (c,) of a reading beyond what the table explains: with it, chi2 of a channel is its dof.
+
+    After Mandel and Paule 1970; zero where the table alone explains more than the scatter.
+    """
+    rows, found = model.rows(angles), []
+    for k, block in enumerate(model.blocks):
+        table = weights(model, angles, c, np.zeros(y.shape[1]))
+        own, here = rows[:, k : k + 1, block], slice(k, k + 1)
+        dof = len(y) - own.shape[2]
+
+        def excess(variance: float, here: slice = here, own: Array = own, table: Weights = table) -> float:
+            part = Weights(table.within[:, here, here] + variance, table.common[:, here])
+            return solve(own, y[:, here], part).chi2 - len(own) + own.shape[2]
+
+        plain = Weights(np.ones((len(y), 1, 1)), np.zeros((len(y), 1, 0)))
+        high = solve(own, y[:, here], plain).chi2 / max(dof, 1)
+        found.append(_zero(excess, FLOOR**2 * high, high) if dof > 0 and high > 0.0 else 0.0)
+    return np.sqrt(found)
+
+
+def _zero(falling: Callable[[float], float], low: float, high: float) -> float:
+    """Where a falling function of a positive number is zero, by halving its logarithm; 0 below ``low``."""
+    if falling(low) <= 0.0:
+        return 0.0
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        if falling(middle) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return math.sqrt(low * high)

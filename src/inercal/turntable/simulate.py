@@ -1,0 +1,84 @@
+"""A simulated test on a table: an instrument of known coefficients, table errors by scope, noise, dwells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.instruments.by_angle import channel_model
+from inercal.records.record import Column, Record, Source
+from inercal.rigs.chain import Scope
+from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
+from inercal.turntable.settings import TurntableSettings
+from inercal.units import Unit, parse_unit
+
+Array = NDArray[np.float64]
+
+
+def truth(settings: TurntableSettings) -> tuple[TableModel, Array]:
+    """The model of all terms, and its linear coefficients (p,) from what the study states."""
+    everything = replace(settings, instrument=replace(settings.instrument, terms=_all_terms(settings)))
+    model = table_model(everything, channels_of(settings))
+    parts = [channel.linear(stated_values(settings, channel)) for channel in model.channels]
+    return model, np.concatenate(parts)
+
+
+def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
+    """Take the plan's positions one after the other and record the instrument.
+
+    Parameters
+    ----------
+    settings : TurntableSettings
+        The stated coefficients are the truth; each error of the table is drawn by its scope.
+    rng : Generator
+
+    Returns
+    -------
+    Record
+        ``position``, commanded angles [deg] and outputs: one row for each position (the mean over the dwell,
+        at its middle), or all samples where the study gives a rate. An error of scope ``sample`` is redrawn at
+        every sample; without a rate, a position has only one.
+    """
+    model, c = truth(settings)
+    instrument, plan = settings.instrument, settings.plan
+    n = len(plan)
+    per_dwell = 1 if instrument.rate is None else max(1, round(instrument.rate * instrument.dwell))
+    errors = np.repeat(model.chain.draw(rng, n)[:, None, :], per_dwell, axis=1)
+    for k, error in enumerate(model.chain.errors):
+        if error.scope is Scope.SAMPLE:
+            errors[..., k] = error.distribution.sample(rng, (n, per_dwell))
+    y = model.outputs(plan.angles[:, None, :], c, errors)
+    if instrument.noise is not None:
+        y = y + rng.normal(0.0, instrument.noise * np.sqrt(per_dwell), y.shape)
+    begin = instrument.dwell * np.arange(n)[:, None]
+    t = (begin + instrument.dwell * (np.arange(per_dwell) + 0.5) / per_dwell).ravel()
+    angles = np.repeat(plan.angles, per_dwell, axis=0)
+    columns = [("position", parse_unit("1"), np.repeat(np.arange(1.0, n + 1.0), per_dwell))]
+    columns += [
+        (name, parse_unit("deg"), np.degrees(angles[:, k])) for k, name in enumerate(model.chain.joints)
+    ]
+    columns += [
+        (channel.channel, instrument.unit, y[..., k].ravel() / instrument.unit.factor)
+        for k, channel in enumerate(model.channels)
+    ]
+    return _record(columns, t)
+
+
+def _all_terms(settings: TurntableSettings) -> tuple[str, ...]:
+    """Every term of the instrument's channels."""
+    kind = settings.instrument.kind
+    return tuple(
+        symbol for channel in channels_of(settings) for symbol in channel_model(kind, channel).symbols
+    )
+
+
+def _record(columns: list[tuple[str, Unit, Array]], t: Array) -> Record:
+    """A record of these columns (name, unit, values)."""
+    source = Source("simulated", "")
+    made = {}
+    for name, unit, values in columns:
+        sensor, _, axis = name.rpartition("_") if "_" in name else (name, "", "")
+        made[name] = Column(name, sensor, axis, unit, values, t, source)
+    return Record(made, sources=(source,))

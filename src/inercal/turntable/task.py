@@ -1,0 +1,79 @@
+"""What the commands run on a turntable study: a calibration of a record, and a simulated record."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from inercal.errors import StudyError
+from inercal.estimate.result import Estimate
+from inercal.records.record import Record
+from inercal.turntable.fitting import Fitting, fit_readings
+from inercal.turntable.outcome import assemble, displayed
+from inercal.turntable.readings import Readings, readings
+from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.simulate import simulate as simulate
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """An ``estimate``, and the evidence behind it for pictures and tests."""
+
+    estimate: Estimate
+    readings: Readings
+    fitting: Fitting
+
+    @property
+    def shown(self) -> Estimate:
+        """The estimate in the units of the record, for people."""
+        return displayed(self.estimate, self.readings.unit)
+
+
+def calibrate(
+    record: Record, settings: TurntableSettings, progress: Callable[[str], None] = lambda _: None
+) -> Calibration:
+    """Calibrate an instrument that was taken through positions on a table.
+
+    Parameters
+    ----------
+    record : Record
+        Angles of the table and outputs of the instrument: a row for each position, or samples.
+    settings : TurntableSettings
+        Site, table with its errors, instrument.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    Calibration
+        Its estimate's status says whether the values can be used; nothing is raised for a poor fit.
+
+    Raises
+    ------
+    InputError
+        The record has no angles or no outputs of such an instrument, or the study does not fit it.
+    """
+    import scipy.special  # noqa: F401  (loading it is not part of the computation)
+
+    clock = time.perf_counter()
+    progress("averaging over the positions")
+    found = readings(record, settings.chain.joints, settings.instrument.kind)
+    settings = _with_unit(settings, found)
+    progress("fitting")
+    fitting = fit_readings(found, settings)
+    estimate = assemble(record, found, fitting, settings)
+    timed = replace(estimate, timing={"solve": time.perf_counter() - clock})
+    return Calibration(timed, found, fitting)
+
+
+def _with_unit(settings: TurntableSettings, found: Readings) -> TurntableSettings:
+    """The settings with the record's unit; refused where values were stated for another."""
+    stated = settings.instrument
+    if stated.unit.dimension != found.unit.dimension and (stated.noise is not None or stated.coefficients):
+        raise StudyError(
+            "instrument.unit",
+            f"noise or coefficients are stated for outputs in {stated.unit.symbol}, and the record's are in "
+            f"{found.unit.symbol}, expected the same kind of unit",
+        )
+    return replace(settings, instrument=replace(stated, unit=found.unit))

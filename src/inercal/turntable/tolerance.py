@@ -1,0 +1,125 @@
+"""Which error of the table matters for which coefficient, and what halving it would bring.
+
+Goal-oriented shares: the part of the variance of a coefficient, or of the mean square of the predicted output
+over the sphere, that each error of the table causes. For one that stays constant it is
+``std^2 ||T G J_k||^2``, for one redrawn at each position ``std^2 ||T G diag(J_k)||^2``, with G the gain of the fit,
+J_k the derivatives of the readings and T one row for each coefficient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.instruments.polynomial import ChannelModel
+from inercal.rigs.chain import Chain, Scope
+from inercal.turntable.model import TableModel
+from inercal.turntable.regression import Regression, solve, weights
+
+Array = NDArray[np.float64]
+
+
+def shifts(fit: Regression) -> tuple[Array, ...]:
+    """Shift (p, q) of the linear coefficients by one standard deviation of each error of the table.
+
+    q is 1 for a constant error, and the number of positions for one that is redrawn there.
+    """
+    found = []
+    for k, error in enumerate(fit.model.chain.errors):
+        each = np.einsum("pnc,nc->pn", fit.gain, fit.slopes[..., k]) * error.distribution.std
+        found.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
+    return tuple(found)
+
+
+def coefficient_shares(fit: Regression, slope: Array) -> dict[str, dict[str, float]]:
+    """Share of each error of the table in the table's part of the variance of each term.
+
+    ``slope`` (p, p) derivatives of the terms with respect to the linear coefficients. The shares of a term sum
+    to one; a term that the table does not touch has none.
+    """
+    parts = np.array([np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)])
+    return {symbol: _shares(fit.model.chain, parts[:, j]) for j, symbol in enumerate(fit.model.symbols)}
+
+
+def drift_shares(fit: Regression) -> dict[str, float]:
+    """Share of each error of the table in the table's part of the mean square error of the predicted output.
+
+    The mean is over all directions of gravity and over the channels; earth rate takes no part.
+    """
+    B = sphere_moments(fit.model)
+    parts = np.array([np.einsum("pq,pr,rq->", shift, B, shift) for shift in shifts(fit)])
+    return _shares(fit.model.chain, parts)
+
+
+def _shares(chain: Chain, parts: Array) -> dict[str, float]:
+    """Parts (k,) over their sum, by name of the error."""
+    whole = float(parts.sum())
+    if not whole > 0.0:
+        return {}
+    return {name: float(part / whole) for name, part in zip(chain.factors, parts, strict=True)}
+
+
+def sphere_moments(model: TableModel) -> Array:
+    """Mean products (p, p) of the monomials over all directions of a; zero where a rate takes part.
+
+    ``c^T B c`` is the mean square over the sphere, summed over the channels, of the output that coefficients c
+    predict. Gauss-Legendre in the height times even steps in longitude integrates polynomials up to order 6
+    exactly; only the magnitude in Koq is not one, and is good to a few per mille.
+    """
+    height, weight = np.polynomial.legendre.leggauss(8)
+    longitude = 2.0 * np.pi * (np.arange(16) + 0.5) / 16
+    ring = np.sqrt(1.0 - height**2)[:, None]
+    directions = np.stack(
+        np.broadcast_arrays(ring * np.cos(longitude), ring * np.sin(longitude), height[:, None]), axis=-1
+    )
+    a = directions.reshape(-1, 3) * np.linalg.norm(model.a_n)
+    mass = np.repeat(0.5 * weight / 16, 16)
+    p = len(model.symbols)
+    B = np.zeros((p, p))
+    for channel, block in zip(model.channels, model.blocks, strict=True):
+        rows = channel.regressors(a, np.zeros(3)) * _without_rate(channel)
+        B[block, block] = np.einsum("n,np,nq->pq", mass, rows, rows)
+    return B
+
+
+def _without_rate(channel: ChannelModel) -> Array:
+    """1 for the terms (p,) without a rate, else 0."""
+    return np.array([0.0 if each.of_rate else 1.0 for each in channel.monomials])
+
+
+@dataclass(frozen=True)
+class Alternatives:
+    """Standard uncertainties of the terms, were the table otherwise.
+
+    ``halved`` by error: if its tolerance were half; ``scopes`` ``random``: all errors redrawn at each position,
+    ``constant``: all constant over the test, ``stated``: as they are.
+    """
+
+    halved: Mapping[str, Array]
+    scopes: Mapping[str, Array]
+
+
+def alternatives(fit: Regression, slope: Array) -> Alternatives:
+    """What halving each tolerance would bring, and what the scopes mean; the fit is weighted anew each time."""
+    chain = fit.model.chain
+
+    def u(changed: Chain) -> Array:
+        model = replace(fit.model, chain=changed)
+        weight = weights(model, fit.angles, fit.c, fit.noise)
+        joint = solve(model.rows(fit.angles), np.zeros_like(fit.residuals), weight).joint
+        p = len(fit.c)
+        return np.sqrt(np.diag(slope @ joint[:p, :p] @ slope.T))
+
+    halved = {
+        error.name: u(chain.with_errors(replace(error, distribution=error.distribution.scaled(0.5))))
+        for error in chain.errors
+    }
+    scopes = {
+        "stated": u(chain),
+        "random": u(chain.with_scope(Scope.POSITION)),
+        "constant": u(chain.with_scope(Scope.RIG)),
+    }
+    return Alternatives(halved, scopes)
