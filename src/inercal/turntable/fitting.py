@@ -61,7 +61,7 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
     lacking = any(each.words for each in what)
     if of_rate and (choice == "stated" or (choice is None and lacking)):
         stated = _stated(whole, of_rate, settings, found.angles)
-        model = _without(whole, of_rate)
+        model = without_terms(whole, of_rate)
         if choice is None:
             said = (
                 f"the positions do not identify the terms of the earth rate ({what[0].words[0]} is free): earth rate "
@@ -86,7 +86,7 @@ def rate_terms(model: TableModel) -> tuple[str, ...]:
     )
 
 
-def _without(model: TableModel, symbols: tuple[str, ...]) -> TableModel:
+def without_terms(model: TableModel, symbols: tuple[str, ...]) -> TableModel:
     """The model without these terms."""
     channels = tuple(channel.without(symbols) for channel in model.channels)
     return TableModel(model.chain, model.a_n, model.w_n, channels)

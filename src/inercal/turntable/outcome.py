@@ -95,7 +95,9 @@ def sources(fitting: Fitting, settings: TurntableSettings, terms: Terms, unit: s
     for k, symbol in enumerate(fitting.stated.symbols):
         if fitting.stated.u[k] > 0.0:
             by_value = -np.einsum("pnc,nc->p", gain, fitting.stated.rows[..., k])
-            found.append(TypeB(f"stated {symbol}", float(fitting.stated.u[k]), _unit(symbol, unit), by_value))
+            found.append(
+                TypeB(f"stated {symbol}", float(fitting.stated.u[k]), unit_of_term(symbol, unit), by_value)
+            )
     return found
 
 
@@ -125,7 +127,7 @@ def _of_site(fit: Regression, settings: TurntableSettings, gain: Array) -> list[
 
 def assemble(record: Record, found: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
     """Put the estimate together."""
-    unit = si_unit(found.unit)
+    unit = found.unit.si
     common: dict[str, Any] = {
         "command": COMMAND,
         "model": MODELS[settings.instrument.kind],
@@ -166,7 +168,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     status, message = _verdict(found, fitting)
     return Estimate(
         names=names,
-        units=tuple(_unit(name, unit) for name in names),
+        units=tuple(unit_of_term(name, unit) for name in names),
         values=terms.values,
         covariance=covariance,
         dof=dof,
@@ -319,13 +321,8 @@ def _plan_name(found: Readings, settings: TurntableSettings) -> str:
     return settings.plan.name if apart.max() < 1e-3 else "of the record"
 
 
-def si_unit(unit: Unit) -> str:
-    """The SI unit of a record's outputs."""
-    return unit.si
-
-
-def _unit(symbol: str, output: str) -> str:
-    """Unit of a term for outputs of that unit."""
+def unit_of_term(symbol: str, output: str) -> str:
+    """SI unit of a term, for outputs of that unit."""
     text = TERMS[symbol].unit_for(output)
     return "1" if text in ("(rad/s)/(rad/s)", "(m/s^2)/(m/s^2)") else text
 

@@ -1,4 +1,4 @@
-"""What the commands run on a turntable study: a calibration of a record, and a simulated record."""
+"""What the commands run on a turntable study: a calibration of a record, a simulated record, a design."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from inercal.estimate.result import Estimate
 from inercal.records.record import Record
 from inercal.turntable.fitting import Fitting, fit_readings
 from inercal.turntable.outcome import assemble, displayed
+from inercal.turntable.planning import design as design
 from inercal.turntable.readings import Readings, readings
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.simulate import simulate as simulate

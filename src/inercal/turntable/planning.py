@@ -1,0 +1,291 @@
+"""Choosing the positions of a test: optimal plans beside the named ones, judged with and without table errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.design.allowed import insensitive, within
+from inercal.design.candidates import Candidates
+from inercal.design.comparison import PlanFigures, judge
+from inercal.design.criteria import Criterion, D, a_criterion
+from inercal.design.exchange import exchange
+from inercal.design.spherical import basis
+from inercal.errors import StudyError
+from inercal.rigs.outputs import gravity_reference, table_outputs
+from inercal.rigs.plans import Plan, named
+from inercal.turntable.fitting import rate_terms, without_terms
+from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
+from inercal.turntable.outcome import unit_of_term
+from inercal.turntable.regression import fit, full_inputs, known, weights
+from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.tolerance import drift_shares, sphere_moments
+from inercal.units import Unit
+
+Array = NDArray[np.float64]
+
+DEFAULT_LINES = ("6-position", "8-position", "12-position", "24-position")
+"""Named plans of a two-axis table that stand beside a design where the study names none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A plan and what it is worth.
+
+    ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``names`` (p,) of ``figures.u``, without
+    the terms of the earth rate where ``earth_rate`` is stated because the plan does not identify them;
+    ``drift_shares`` of the table's errors, as in `inercal.turntable.tolerance.drift_shares`.
+    """
+
+    plan: Plan
+    figures: PlanFigures
+    terms: int
+    names: tuple[str, ...]
+    earth_rate: str
+    drift_shares: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Designed:
+    """A plan that was searched for.
+
+    Attributes
+    ----------
+    plan : Plan
+        The positions chosen.
+    judged : tuple of Judged
+        The chosen plan first, then those it is compared with; u in SI.
+    units : mapping
+        SI unit of each coefficient.
+    unit : Unit
+        Of the outputs, for people.
+    message : str
+        What was searched, in words.
+    findings : tuple of str
+        What is to be known about it.
+    result : mapping
+        The command's part of the JSON result.
+    """
+
+    plan: Plan
+    judged: tuple[Judged, ...]
+    units: Mapping[str, str]
+    unit: Unit
+    message: str
+    findings: tuple[str, ...]
+    result: dict[str, Any]
+
+    def table(self) -> str:
+        """The positions chosen and the comparison, as aligned text."""
+        positions = [
+            f"{k:4d}  " + "  ".join(f"{angle:8.1f}" for angle in row)
+            for k, row in enumerate(np.degrees(self.plan.angles), start=1)
+        ]
+        joints = self.plan.angles.shape[1]
+        head = "   #  " + "  ".join(f"{f'phi{j} [deg]':>8}" for j in range(1, joints + 1))
+        return "\n".join([head, *positions, "", *_comparison(self)])
+
+
+def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda _: None) -> Designed:
+    """Search for positions, and set the best beside other plans.
+
+    Parameters
+    ----------
+    settings : TurntableSettings
+        The instrument with its expected coefficients and noise; what the table's errors do depends on them.
+    progress : callable
+        Told, in words, what is being done.
+
+    Raises
+    ------
+    InputError
+        No noise is stated, or no choice among the candidates that the limits leave identifies the terms.
+    """
+    asked = settings.design
+    if settings.instrument.noise is None:
+        raise StudyError(
+            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
+        )
+    model, c, findings = _model(settings)
+    everywhere = _candidates(model, asked.candidates.angles, c, settings, asked.table_errors)
+    mask = within(asked.candidates.angles, [settings.limits.get(joint) for joint in model.chain.joints])
+    of_noise = _candidates(model, asked.candidates.angles, c, settings, False)
+    plans = []
+    searched = (
+        f"{asked.criterion}-optimal, {'table errors and noise' if asked.table_errors else 'noise alone'}"
+    )
+
+    def search(name: str, candidates: Candidates, criterion: Criterion, allowed: NDArray[np.bool_]) -> None:
+        progress(f"searching {asked.positions} positions: {name}")
+        rng = np.random.default_rng(asked.seed)
+        found = exchange(candidates, asked.positions, criterion, rng, allowed=allowed)
+        plans.append(Plan(name, asked.candidates.angles[found.chosen]))
+
+    criterion = _criterion(asked.criterion, model)
+    if asked.constraint is not None:
+        progress("computing the indices of the candidates")
+        indices = _largest_index(settings)
+        allowed = mask & insensitive(
+            everywhere, np.where(mask, indices, np.nan), asked.constraint.below, asked.positions
+        )
+        search(f"{searched}, S below {asked.constraint.below:g}", everywhere, criterion, allowed)
+    search(searched, everywhere, criterion, mask)
+    if asked.table_errors or asked.criterion != "D":
+        search("D-optimal, noise alone", of_noise, D, mask)
+    if len(settings.plan) != len(asked.candidates):
+        plans.append(settings.plan)
+    plans += [named(name) for name in _lines(settings) if name != settings.plan.name]
+    judged = tuple(_judged(plan, settings, model, c) for plan in plans)
+    unit = settings.instrument.unit.si
+    return Designed(
+        plan=plans[0],
+        judged=judged,
+        units={symbol: unit_of_term(symbol, unit) for symbol in model.symbols},
+        unit=settings.instrument.unit,
+        message=f"{asked.positions} of {int(mask.sum())} candidates, {plans[0].name}",
+        findings=tuple(findings),
+        result={"positions": plans[0].angles.tolist()}
+        | _entry(judged[0])
+        | {
+            "compare": [
+                {"name": each.plan.name, "positions": len(each.plan)} | _entry(each) for each in judged
+            ]
+        },
+    )
+
+
+def _judged(plan: Plan, settings: TurntableSettings, model: TableModel, c: Array) -> Judged:
+    """Figures of a plan, with table errors; the earth rate as `calibrate` would treat it there."""
+    seen, earth_rate = known(model, plan.angles), "fitted" if rate_terms(model) else "stated"
+    ranks = [each.identifiability.rank for each in seen]
+    words = tuple(text for each in seen for text in each.words)
+    used, rates = model, rate_terms(model)
+    if words and rates and settings.instrument.earth_rate is None:
+        used, earth_rate = without_terms(model, rates), "stated"
+        c = c[[symbol not in rates for symbol in model.symbols]]
+    candidates = _candidates(used, plan.angles, c, settings, True)
+    prediction = Criterion("I", sphere_moments(used) / len(used.channels))
+    figures = judge(plan.name, candidates, functions(used, plan.angles), prediction)
+    shares: Mapping[str, float] = {}
+    if not any(each.words for each in known(used, plan.angles)):
+        y = used.outputs(plan.angles, c)
+        shares = drift_shares(fit(used, plan.angles, y, [settings.instrument.noise] * y.shape[1], start=c))
+    return Judged(
+        plan,
+        replace(figures, rank=min(ranks), unidentified=words),
+        max(len(channel.symbols) for channel in model.channels),
+        used.symbols,
+        earth_rate,
+        shares,
+    )
+
+
+def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[str]]:
+    """The terms that are to be identified, their expected linear coefficients, and remarks."""
+    model, findings = table_model(settings, channels_of(settings)), []
+    candidates, choice = settings.design.candidates.angles, settings.instrument.earth_rate
+    rates = rate_terms(model)
+    if rates and (
+        choice == "stated" or (choice is None and any(each.words for each in known(model, candidates)))
+    ):
+        findings.append("the terms of the earth rate are taken as stated")
+        model = without_terms(model, rates)
+    lost = [words for each in known(model, candidates) for words in each.words]
+    if lost:
+        raise StudyError("design", f"no plan on this table identifies {'; '.join(lost)}: leave terms out")
+    if settings.design.table_errors and not settings.instrument.coefficients:
+        findings.append(
+            "no coefficients are expected of the instrument: what the table's errors do to its readings cannot be "
+            "foreseen, state them under [instrument.coefficients]"
+        )
+    c = np.concatenate([channel.linear(stated_values(settings, channel)) for channel in model.channels])
+    return model, c, findings
+
+
+def _candidates(
+    model: TableModel, angles: Array, c: Array, settings: TurntableSettings, table_errors: bool
+) -> Candidates:
+    """What each position tells, with the table's errors or without."""
+    noise = np.full(len(model.channels), settings.instrument.noise)
+    std = None if table_errors else np.zeros(len(model.chain.errors))
+    weight = weights(model, angles, c, noise, std)
+    return Candidates(
+        model.symbols, model.rows(angles), weight.within, weight.common if table_errors else None
+    )
+
+
+def _criterion(name: str, model: TableModel) -> Criterion:
+    """D, or A of the outputs that the terms cause at full input, or I over the sphere."""
+    if name == "D":
+        return D
+    if name == "A":
+        return a_criterion(
+            np.diag(np.concatenate([full_inputs(model, channel) for channel in model.channels]))
+        )
+    return Criterion("I", sphere_moments(model))
+
+
+def functions(model: TableModel, angles: Array) -> Array:
+    """The orthonormal functions (n, b) of the direction of gravity: up to second order, or to first."""
+    quadratic = any(each.order > 1 for channel in model.channels for each in channel.monomials)
+    made = basis(gravity_reference() @ model.chain.attitude(angles))
+    return made if quadratic else made[:, :4]
+
+
+def _largest_index(settings: TurntableSettings) -> Array:
+    """Largest first-order index (m,) of the constrained factors on the constrained outputs."""
+    from inercal.sensitivity import exact
+
+    constraint, site = settings.design.constraint, settings.site
+    assert constraint is not None
+    outputs = table_outputs(constraint.outputs, site.gravity, site.latitude)
+    indices = exact.analyse(settings.chain, outputs, settings.design.candidates.angles)
+    factors = [indices.factors.index(name) for name in constraint.factors]
+    # an output without variance there is touched by no factor
+    return np.asarray(np.nan_to_num(indices.first[..., factors]).max(axis=(0, 2)))
+
+
+def _lines(settings: TurntableSettings) -> tuple[str, ...]:
+    """Named plans to compare with."""
+    if settings.design.compare:
+        return settings.design.compare
+    return DEFAULT_LINES if len(settings.chain.joints) == 2 else ()
+
+
+def _entry(judged: Judged) -> dict[str, Any]:
+    """Figures of a plan for JSON; what it does not identify has no number."""
+    figures = judged.figures
+    return {
+        "rank": figures.rank,
+        "terms": judged.terms,
+        "null_vectors": list(figures.unidentified),
+        "earth_rate": judged.earth_rate,
+        "condition": figures.condition,
+        "d_efficiency": figures.d_efficiency,
+        "rms_prediction": figures.rms_prediction,
+        "predicted": dict(zip(judged.names, figures.u.tolist(), strict=True)),
+        "drift_shares": dict(judged.drift_shares),
+    }
+
+
+def _comparison(designed: Designed) -> list[str]:
+    """Lines of the comparison table."""
+    wide = max(len(each.plan.name) for each in designed.judged)
+    unit = designed.unit
+    lines = [
+        f"{'plan':<{wide}}  positions     rank  condition  D-efficiency  earth rate  rms u of output [{unit.symbol}]"
+    ]
+    for each in designed.judged:
+        figures = each.figures
+        rank = f"{figures.rank}/{each.terms}"
+        condition = f"{figures.condition:9.2f}" if np.isfinite(figures.condition) else "        –"
+        rms = f"{figures.rms_prediction / unit.factor:.4g}" if np.isfinite(figures.rms_prediction) else "–"
+        lines.append(
+            f"{each.plan.name:<{wide}}  {len(each.plan):9d}  {rank:>7}  {condition}  {figures.d_efficiency:12.4f}  "
+            f"{each.earth_rate:>10}  {rms}"
+        )
+    return lines

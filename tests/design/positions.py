@@ -1,0 +1,42 @@
+"""Positions of a two-axis table as design problems, for the tests of this folder."""
+
+import numpy as np
+
+from inercal.design import candidates as ca
+from inercal.design.spherical import NAMES, basis
+from inercal.rigs.outputs import gravity_reference, rate_reference
+from inercal.rigs.tables import turntable
+
+TERMS = ("F", "X", "Y", "Z", "XX", "YY", "XY", "XZ", "YZ")
+RATES = ("k_x", "k_y", "k_z")
+
+
+def attitude(plan, **kwargs):
+    return turntable("two_axis_turntable", default=None, **kwargs).attitude(plan.angles)
+
+
+def gravity(plan, **kwargs):
+    """Gravity on the instrument's axes (n, 3), in units of the site's."""
+    return gravity_reference() @ attitude(plan, **kwargs)
+
+
+def monomials(a):
+    x, y, z = np.moveaxis(a, -1, 0)
+    return np.stack([np.ones_like(x), x, y, z, x * x, y * y, x * y, x * z, y * z], axis=-1)
+
+
+def drift(plan, **kwargs):
+    """The nine drift functions in the spherical basis, readings of unit variance."""
+    return ca.plain(NAMES, basis(gravity(plan, **kwargs)))
+
+
+def with_rates(plan, latitude):
+    """Nine drift terms as the field writes them and three earth-rate terms."""
+    rows = np.hstack([monomials(gravity(plan)), rate_reference(latitude) @ attitude(plan)])
+    return ca.plain((*TERMS, *RATES), rows)
+
+
+def efficiency(plan):
+    """D-efficiency of a plan in the spherical basis, from its definition."""
+    X = plan.rows[:, 0]
+    return np.linalg.det(X.T @ X / len(X)) ** (1.0 / X.shape[1])
