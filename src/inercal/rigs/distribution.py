@@ -21,7 +21,7 @@ NODES = 64
 width of 180 deg, or a standard deviation of 60 deg."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Distribution:
     """Distribution of an error [rad, or m for an offset], known by its quantiles and quadrature nodes.
 
@@ -40,9 +40,9 @@ class Distribution:
 
     kind: str
     size: float
-    nodes: Array = field(repr=False, compare=False)
-    weights: Array = field(repr=False, compare=False)
-    quantile: Callable[[Array], Array] = field(repr=False, compare=False)
+    nodes: Array = field(repr=False)
+    weights: Array = field(repr=False)
+    quantile: Callable[[Array], Array] = field(repr=False)
 
     @cached_property
     def mean(self) -> float:
@@ -123,20 +123,23 @@ def density(pdf: Callable[[Array], ArrayLike], low: float, high: float) -> Distr
     Raises
     ------
     ValueError
-        An empty interval, or a density that is negative, not finite or zero throughout.
+        An empty interval, a density that is negative, not finite or zero throughout, or one too rough or too
+        narrow for the nodes.
     """
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ValueError(f"found the interval {low:g} to {high:g}, expected two finite ends in order")
     x, w = np.polynomial.legendre.leggauss(NODES)
     nodes = 0.5 * (low + high) + 0.5 * (high - low) * x
-    mass = w * np.asarray(pdf(nodes), dtype=float)
+    grid = np.linspace(low, high, 4097)
+    mass, steps = (np.broadcast_to(np.asarray(pdf(at), dtype=float), at.shape) for at in (nodes, grid))
+    mass = 0.5 * (high - low) * w * mass
     total = float(mass.sum())
-    if not (np.all(mass >= 0.0) and math.isfinite(total) and total > 0.0):
+    if not (np.all(mass >= 0.0) and np.all(steps >= 0.0) and math.isfinite(steps.sum()) and total > 0.0):
         raise ValueError("found a density that is negative, not finite or zero throughout")
     weights = mass / total
-    grid = np.linspace(low, high, 4097)
-    steps = np.asarray(pdf(grid), dtype=float)
     cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (steps[1:] + steps[:-1]))])
+    if abs(cumulative[-1] * (grid[1] - grid[0]) / total - 1.0) > 1e-3:
+        raise ValueError(f"found a density too rough or too narrow for {NODES} nodes, expected a smooth one")
 
     def quantile(p: Array) -> Array:
         return np.asarray(np.interp(p * cumulative[-1], cumulative, grid))

@@ -31,7 +31,7 @@ def grid(counts: Sequence[int], half_step: bool = True) -> Plan:
     counts : sequence of int
         Number of angles of each joint.
     half_step : bool
-        Start half a step from zero, so that no position is singular; else at zero.
+        Start half a step from zero, else at zero. With multiples of four no axis then lies along gravity.
     """
     if any(count < 1 for count in counts):
         raise ValueError(f"found counts {tuple(counts)}, expected 1 or more of each joint")
