@@ -21,6 +21,7 @@ test: .venv/dev/installed
 
 bench: .venv/dev/installed
 	$(DEV)/python benchmarks/imu_calibration.py
+	$(DEV)/python benchmarks/sensitivity.py
 
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network.
 .venv/run/installed: requirements/run.txt pyproject.toml
