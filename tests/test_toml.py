@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 import pytest
-from pydantic import BeforeValidator, Field, StrictBool
+from pydantic import BeforeValidator, Field, StrictBool, StrictInt
 from pydantic_core import PydanticCustomError
 
 from inercal._toml import Strict, check, read_toml
@@ -15,6 +15,8 @@ class Leaf(Strict):
     on: StrictBool = False
     note: str = ""
     size: int = Field(default=1, gt=0, alias="length")
+    count: StrictInt = 1
+    many: list[str] = Field(default=["a"], min_length=1)
 
 
 class Tree(Strict):
@@ -37,6 +39,9 @@ class Tree(Strict):
         ({"leaf": {"kind": "a", "on": "yes"}}, "f.toml: leaf.on: found 'yes', expected true or false"),
         ({"leaf": {"kind": "a", "note": 5}}, "f.toml: leaf.note: found 5, expected a text in quotes"),
         ({"leaf": {"kind": "a", "length": 0}}, "f.toml: leaf.length: found 0, expected greater than 0"),
+        ({"leaf": {"kind": "a", "count": 1.5}}, "f.toml: leaf.count: found 1.5, expected a whole number"),
+        ({"leaf": {"kind": "a", "many": "b"}}, "f.toml: leaf.many: found 'b', expected a list in brackets"),
+        ({"leaf": {"kind": "a", "many": []}}, "f.toml: leaf.many: found [], expected 1 or more in it"),
         ({"a\nb": 1}, r"f.toml: 'a\nb': unknown key, known keys: leaf, leaves"),
     ],
 )
@@ -84,6 +89,24 @@ def test_what_is_no_toml(tmp_path, content, message):
     with pytest.raises(MapError, match=message) as caught:
         read_toml(path, MapError)
     assert caught.value.where == str(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("[a]\nb = 1\nc = 2\nb = 3\n", "line 4: b is given a second time, expected it once"),
+        ("[a]\nb = 1\n'b' = 3", "line 3: 'b' is given a second time, expected it once"),
+        ("b = 1\nb = [\n1]\n", "line 3: a key is given a second time, expected it once"),
+        ("a = { b = 1, b = 2 }", "not valid TOML: Duplicate inline table key 'b'"),
+        ("[a]\n[a]\n", "not valid TOML: Cannot declare"),
+    ],
+)
+def test_what_is_given_twice(tmp_path, content, message):
+    path = tmp_path / "f.toml"
+    path.write_text(content)
+    with pytest.raises(StudyError) as caught:
+        read_toml(path, StudyError)
+    assert caught.value.message.startswith(message)
 
 
 def test_files_that_cannot_be_read(tmp_path):

@@ -13,10 +13,16 @@ Frames, signs, units
 Instruments, forward: truth to indication
     triad          y = S M x + b: S scale factors, M unit-diagonal misalignment, b the output at zero input
     accelerometers K1_i, M_ij, K0_i; gyro S_i, T_ij, D_F_i and g-sensitive drift G_ij
+    by table angle K2_i, K3_i, cross terms; gyrowheels k_i, DX_F, DX_X .. DX_YZ (`inercal.instruments.by_angle`)
+
+Rigs: chains of joints, fixed transforms and elementary errors, base first (`inercal.rigs.chain.Chain`)
+    turntables     n is north, west, up; C_nb = M_1 M_2 ... M_m; a = [0 0 -1] C_nb, omega = earth rate C_nb
+    errors         dphi positioning, dalpha wobble, deps perpendicularity, dtheta mounting, dbase levelling, azimuth;
+                   scope sample, position, run or rig: how long a value lasts
 
 Records: labelled columns (`inercal.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
-    turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's
+    turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's; rate in a rate test
     selfcal        t, wc_x.. or gyro_x.., th_x.., acc_x..
     aoa            t, a1 .. an, gyro, gyro_roll, gyro_yaw, point, trigger, theta_ref
 
@@ -27,11 +33,15 @@ Uncertainty
 Map, lower floors first; each imports only from those above its own line
     errors, units              what goes wrong; texts with units
     geometry                   rotations, earth, site
-    instruments                terms, triad
+    instruments                terms, triad, polynomial, by_angle
     records                    record, findings, maps, read, write, dwells
+    rigs                       chain, distribution, tables, plans, outputs
     estimate                   result, status, budget, linear, nonlinear, runs, coverage, exchange
     noise                      allan
+    sensitivity                exact, sampled, local, dense, averages
+    design                     candidates, criteria, exchange, comparison
     imu                        multi-position calibration: poses, accelerometer, turns, gyro, simulate, task
+    turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     convert                    calibrations applied
     study, report, examples    files people write; pages people read; recordings that ship
     cli                        one module per verb
@@ -45,6 +55,8 @@ if TYPE_CHECKING:
     from inercal.imu.task import calibrate as calibrate_imu
     from inercal.records.read import read as read
     from inercal.records.record import Record as Record
+    from inercal.sensitivity.exact import analyse as exact_sobol
+    from inercal.turntable.task import calibrate as calibrate_turntable
 
 __version__ = "0.1.0"
 
@@ -53,11 +65,13 @@ _WHERE = {
     "Estimate": ("inercal.estimate.result", "Estimate"),
     "Record": ("inercal.records.record", "Record"),
     "calibrate_imu": ("inercal.imu.task", "calibrate"),
+    "calibrate_turntable": ("inercal.turntable.task", "calibrate"),
+    "exact_sobol": ("inercal.sensitivity.exact", "analyse"),
     "load": ("inercal.estimate.exchange", "load"),
     "read": ("inercal.records.read", "read"),
 }
 
-__all__ = ["Estimate", "Record", "calibrate_imu", "load", "read"]
+__all__ = ["Estimate", "Record", "calibrate_imu", "calibrate_turntable", "exact_sobol", "load", "read"]
 
 
 def __getattr__(name: str) -> object:

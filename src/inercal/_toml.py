@@ -26,16 +26,30 @@ M = TypeVar("M", bound=BaseModel)
 
 def read_toml(path: str | Path, error: type[InputError]) -> dict[str, Any]:
     """Parse a TOML file; raises ``error`` naming file, line and column."""
+    text = ""
     try:
-        return tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
+        text = Path(path).read_bytes().decode("utf-8-sig")
+        return tomllib.loads(text)
     except OSError as problem:
         raise error(path, f"cannot be read ({problem.strerror}), expected a TOML file") from problem
     except UnicodeDecodeError as problem:
         raise error(path, f"byte {problem.start} is not UTF-8 text, expected a TOML file") from problem
     except ValueError as problem:  # a TOMLDecodeError, an integer of thousands of digits, a NUL in the path
-        raise error(path, f"not valid TOML: {str(problem)[:200]}") from problem
+        twice = _given_twice(text, str(problem))
+        raise error(path, twice or f"not valid TOML: {str(problem)[:200]}") from problem
     except RecursionError as problem:
         raise error(path, "tables or lists are nested too deeply, expected a TOML file") from problem
+
+
+def _given_twice(text: str, problem: str) -> str | None:
+    """A sentence for a key that occurs twice in a table, which the parser reports as an overwriting."""
+    if not problem.startswith("Cannot overwrite a value"):
+        return None
+    lines = text.rstrip().splitlines()
+    at = re.search(r"at line (\d+)", problem)
+    number = int(at[1]) if at else len(lines)
+    key = re.match(r"""\s*([\w."'-]{1,80})\s*=""", lines[number - 1])
+    return f"line {number}: {key[1] if key else 'a key'} is given a second time, expected it once"
 
 
 def check(model: type[M], data: Mapping[str, Any], where: object, error: type[InputError]) -> M:
@@ -74,6 +88,12 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: found {shown(found)}, expected {first['ctx']['expected']}"
         case "model_type" | "dict_type":
             return f"{key}: found {shown(found)}, expected a table"
+        case "list_type" | "tuple_type":
+            return f"{key}: found {shown(found)}, expected a list in brackets"
+        case "too_short":
+            return f"{key}: found {shown(found)}, expected {first['ctx']['min_length']} or more in it"
+        case "int_type" | "int_from_float":
+            return f"{key}: found {shown(found)}, expected a whole number"
         case "bool_type":
             return f"{key}: found {shown(found)}, expected true or false"
         case "string_type":

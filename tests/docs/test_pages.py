@@ -76,13 +76,16 @@ def test_commands_run_and_print_what_the_page_shows(page, tmp_path):
 
 
 def test_the_studies_on_the_pages_are_studies(tmp_path):
-    from inercal.study.load import load_imu_study
+    import tomllib
+
+    from inercal.study.load import load_imu_study, load_turntable_study
 
     texts = [text for page in PAGES for text in blocks(page, "toml")]
     assert texts
     for text in texts:
         (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-        load_imu_study(tmp_path / "study.toml")
+        on_table = tomllib.loads(text).get("rig", {}).get("kind", "").endswith("_axis_turntable")
+        (load_turntable_study if on_table else load_imu_study)(tmp_path / "study.toml")
 
 
 def test_every_link_between_pages_leads_somewhere():

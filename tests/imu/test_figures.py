@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from importlib.resources import files
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from scipy.io import loadmat
 from inercal.estimate.status import Status
 from inercal.geometry.rotations import conjugate, exp
 from inercal.geometry.site import GravityInput, Site
-from inercal.imu.figures import _flat, pictures
+from inercal.imu.figures import pictures
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, simulate
 from inercal.imu.task import calibrate
@@ -104,15 +103,6 @@ def test_the_pose_that_would_cure_an_ill_conditioned_fit_is_marked():
     caption = next(picture.caption for picture in pictures(calibration) if picture.title == "Poses")
     words = calibration.estimate.message.partition("force along ")[2].removesuffix(" and its opposite")
     assert f"Stars: the pose {words} and its opposite" in caption
-
-
-def test_equal_areas_on_the_sphere_are_equal_on_the_disc():
-    height = np.linspace(0.0, 1.0, 11)
-    up = np.stack([np.sqrt(1.0 - height**2), np.zeros(11), height], axis=-1)
-    radius2 = _flat(up)[0] ** 2
-    assert radius2[0] == 1.0
-    assert all(a - b == pytest.approx(0.1) for a, b in pairwise(radius2))
-    assert np.array_equal(_flat(up)[0], _flat(-up)[0] * -1.0)
 
 
 def test_a_million_rows_stay_small():

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD, TERMS
 
 
@@ -19,10 +20,22 @@ def test_names_of_the_contract():
 
 
 def test_every_term_once_and_in_the_order_of_results():
-    assert tuple(TERMS) == ACCELEROMETER_TRIAD + GYRO_TRIAD + GYRO_G_SENSITIVITY
+    triads = ACCELEROMETER_TRIAD + GYRO_TRIAD + GYRO_G_SENSITIVITY
+    assert tuple(TERMS)[: len(triads)] == triads
     for symbol, term in TERMS.items():
         assert term.symbol == symbol
-        assert re.search(r"\b[xyz]\b", term.name)
+        assert re.search(r"\b[xyzXYZ]\b", term.name)
+
+
+def test_every_term_of_an_instrument_on_a_table_is_in_the_table():
+    for kind, channels in CHANNELS.items():
+        symbols = [symbol for channel in channels for symbol in channel_model(kind, channel).symbols]
+        assert len(set(symbols)) == len(symbols)
+        assert set(symbols) <= set(TERMS)
+    assert set(EXTRA) <= set(TERMS)
+
+
+def test_the_names_of_the_terms_are_told_apart():
     assert len({term.name for term in TERMS.values()}) == len(TERMS)
 
 

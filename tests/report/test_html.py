@@ -150,7 +150,7 @@ def test_order_of_the_sections():
     heads = re.findall("<h2>(.*?)</h2>", text)
     assert heads == [
         "Findings", "Coefficients", "Model, conditions and validity", "Figures", "Uncertainty budget",
-        "Residuals", "How it was done",
+        "Details", "How it was done",
     ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The study that ``inercal new imu`` writes: complete, commented, loadable, honest where unedited."""
+"""The studies that ``inercal new`` writes: complete, commented, loadable, honest where unedited."""
 
 import math
 import re
@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
+from inercal.rigs.tables import slots
 from inercal.study.load import load_imu_study
 from inercal.study.schema import json_schema
-from inercal.study.template import imu_template
+from inercal.study.template import imu_template, turntable_template
+from inercal.study.turntable import turntable_study
 
-KEY = re.compile(r"(?:# )?(\w+) = (.*\S)  +# (.+)")
+KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
+SCHEMA = json_schema()
 
 
 def load(tmp_path, text):
@@ -42,19 +45,78 @@ def test_every_key_is_there_and_loads_when_uncommented(tmp_path):
     text = uncommented(imu_template())
     study = load(tmp_path, text)
     assert study.static_start == 50.0
-    for name, table in json_schema()["$defs"].items():
-        given = tomllib.loads(text)
-        if name != "ImuStudyFile":
-            given = given[name.removesuffix("Table").lower()]
-        assert list(given) == list(table["properties"])
+    whole = tomllib.loads(text)
+    assert list(whole) == list(SCHEMA["$defs"]["ImuStudyFile"]["properties"])
+    for name, given in whole.items():
+        if name != "schema":
+            assert list(given) == list(SCHEMA["$defs"][f"{name.title()}Table"]["properties"])
 
 
-def test_every_key_and_table_has_its_comment_on_the_line():
-    body = imu_template().partition("schema = 1")
+@pytest.mark.parametrize("template", [imu_template, turntable_template])
+def test_every_key_and_table_has_its_comment_on_the_line(template):
+    body = template().partition("schema = 1")
     for line in (body[1] + body[2]).splitlines():
         assert len(line) <= 110
-        assert not line or line.startswith("[") or KEY.fullmatch(line), line
-        assert not line.startswith("[") or re.fullmatch(r"\[\w+\]  +# \S.*", line)
+        if "= " in line:
+            assert KEY.fullmatch(line), line
+        elif "[" in line:
+            assert re.fullmatch(r"(# )?\[[\w.]+\]  +# \S.*", line), line
+
+
+def test_the_study_of_a_turntable_loads_as_written_and_fits_the_schema():
+    data = tomllib.loads(turntable_template())
+    study = turntable_study(data, "t.toml")
+    assert (len(study.chain.factors), len(study.plan)) == (11, 1296)
+    assert study.site.latitude_u == pytest.approx(math.radians(26.0))
+    Draft202012Validator(SCHEMA).validate(data)
+
+
+def lines_with_keys():
+    """(table, line) of every key that is commented out in the study of a turntable."""
+    table = ""
+    for line in turntable_template().splitlines():
+        if found := re.match(r"(?:# )?\[([\w.]+)\]", line):
+            table = found[1]
+        elif re.match(r"# \w+ = ", line):
+            yield table, line
+
+
+@pytest.mark.parametrize(("table", "line"), list(lines_with_keys()))
+def test_every_key_of_a_turntable_loads_when_uncommented(table, line):
+    text = turntable_template().replace(line, line.removeprefix("# "))
+    if table == "rate_test":
+        text = text.replace("# [rate_test]", "[rate_test]")
+    if table == "positions":  # one of three
+        text = re.sub("(?m)^grid = .*", "", text)
+    data = tomllib.loads(text)
+    if 'unit = "deg/h"' not in line:
+        assert (
+            turntable_study(data, "t.toml").given
+            != turntable_study(tomllib.loads(turntable_template()), "t.toml").given
+        )
+    Draft202012Validator(SCHEMA).validate(data)
+
+
+def test_every_key_of_a_turntable_is_there():
+    """Keys of a three-axis table are those of the rig; they are told in words."""
+    text = re.sub(r"(?m)^# ((\w+) = |\[)", r"\1", turntable_template())
+    text = re.sub(r"(?m)^(plan|list) = .*", "", text)
+    whole = tomllib.loads(text)
+    assert set(whole) == set(SCHEMA["$defs"]["TurntableStudyFile"]["properties"])
+    for name, given in whole.items():
+        if name in ("schema", "positions"):
+            continue
+        title = "".join(part.title() for part in name.split("_"))
+        assert set(given) == set(SCHEMA["$defs"][f"{title}Table"]["properties"]), name
+    factors = [slot.name for slot in slots("two_axis_turntable")]
+    assert list(whole["rig"]["errors"]) == ["default", *factors]
+
+
+def test_the_next_command_of_a_turntable():
+    assert "# Next: inercal sensitivity t.toml\n" in turntable_template((), "t.toml")
+    assert "# Next: inercal calibrate turntable a.csv --study t.toml\n" in turntable_template(
+        ["a.csv"], "t.toml"
+    )
 
 
 def test_the_header_names_the_next_command():

@@ -3,10 +3,29 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from inercal.cli import EXIT_BAD_VERDICT, process_age
 from inercal.cli.options import Files, MapFile, Overrides, ReportOutput, StudyFile, read_record, working
+
+if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
+    from inercal.records.record import Record
+
+
+class Calibrated(Protocol):
+    """What the calibration of any system brings back."""
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate."""
+
+
+S = TypeVar("S")
+C = TypeVar("C", bound=Calibrated)
 
 
 def calibrate_imu(
@@ -19,35 +38,88 @@ def calibrate_imu(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU that was held still in many poses by hand."""
-    from inercal.estimate.exchange import save, to_json
-    from inercal.estimate.status import Status
     from inercal.imu.task import calibrate
-    from inercal.records.read import source_of
     from inercal.study.load import load_imu_study
 
+    found, estimate = _solve(
+        files, study, map_file, output, lambda: load_imu_study(study, overrides or ()), calibrate
+    )
+
+    def page() -> str:
+        from inercal.imu.figures import pictures
+        from inercal.report.html import render
+
+        return render(estimate, pictures(found), "Calibration of an inertial measurement unit")
+
+    return _hand_over(estimate, estimate, page, output)
+
+
+def calibrate_turntable(
+    files: Files,
+    /,
+    *,
+    study: StudyFile,
+    map_file: MapFile = None,
+    overrides: Overrides = None,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Calibrate an instrument that was taken through positions on a turntable."""
+    from inercal.study.load import load_turntable_study
+    from inercal.turntable.task import Calibration, calibrate
+
+    found, estimate = _solve(
+        files, study, map_file, output, lambda: load_turntable_study(study, overrides or ()), calibrate
+    )
+    shown = replace(found, estimate=estimate).shown
+
+    def page() -> str:
+        from inercal.report.html import render
+        from inercal.turntable.figures import pictures
+
+        drawn = pictures(found) if isinstance(found, Calibration) else []
+        return render(shown, drawn, "Calibration on a turntable")
+
+    return _hand_over(estimate, shown, page, output)
+
+
+def _solve(
+    files: list[Path],
+    study: Path,
+    map_file: Path | None,
+    output: ReportOutput,
+    settings: Callable[[], S],
+    calibrate: Callable[[Record, S, Callable[[str], None]], C],
+) -> tuple[C, Estimate]:
+    """Read study and record and calibrate; the estimate comes with its times and inputs."""
+    from inercal.records.read import source_of
+
     output.check((".json", ".toml"), (*files, map_file, study))
-    settings = load_imu_study(study, overrides or ())
+    told = settings()
     clock = time.perf_counter()
     record = read_record(files, map_file, output)
     read_s = time.perf_counter() - clock
     with working(output) as progress:
-        calibration = calibrate(record, settings, progress)
-    estimate = calibration.estimate
+        found = calibrate(record, told, progress)
+    estimate = found.estimate
     timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
-    estimate = replace(estimate, timing=timing, inputs=(*estimate.inputs, source_of(study)))
+    return found, replace(estimate, timing=timing, inputs=(*estimate.inputs, source_of(study)))
+
+
+def _hand_over(estimate: Estimate, shown: Estimate, page: Callable[[], str], output: ReportOutput) -> int:
+    """Write what was asked for, say the verdict, and give the exit code; people see ``shown``."""
+    from inercal.estimate.exchange import save, to_json
+    from inercal.estimate.status import Status
+
     output.say_findings(estimate.findings)
     if output.out is not None:
         save(estimate, output.out)
         output.say(f"calibration: {output.out}")
     if output.report is not None:
         from inercal._files import write_text
-        from inercal.imu.figures import pictures
-        from inercal.report.html import render
 
-        page = render(estimate, pictures(calibration), "Calibration of an inertial measurement unit")
-        write_text(output.report, page)
+        write_text(output.report, page())
         output.say(f"report: {output.report}")
-    text = f"{estimate.table()}\n\n" if estimate.names else ""
+    text = f"{shown.table()}\n\n" if shown.names else ""
     verdict = f"{estimate.status.value}: {estimate.message}"
     if estimate.status is not Status.OK:
         verdict += f"\n{estimate.status.advice}"

@@ -28,6 +28,7 @@ MapFile = Annotated[
     Path | None, Parameter(name="--map", help="Column map (TOML) for files without canonical headers.")
 ]
 StudyFile = Annotated[Path, Parameter(name="--study", help="Study file (TOML); `inercal new` writes one.")]
+Study = Annotated[Path, Parameter(help="Study file (TOML); `inercal new` writes one.")]
 Overrides = Annotated[
     list[str] | None, Parameter(name="--set", help="Override one study key: key=value. May be repeated.")
 ]
@@ -120,6 +121,7 @@ def envelope(
     result: Mapping[str, Any],
     inputs: Iterable[Source] = (),
     findings: Iterable[Finding] = (),
+    timing: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """The JSON object of a command that ended well, with the keys that all have in common."""
     from inercal import __version__
@@ -132,7 +134,7 @@ def envelope(
             "status": {"code": "ok", "message": message},
             "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in findings],
             "inputs": [{"path": s.path, "sha256": s.sha256} for s in inputs],
-            "timing_s": {"total": process_age()},
+            "timing_s": {**(timing or {}), "total": process_age()},
             "result": result,
         }
     )
@@ -164,7 +166,7 @@ def working(output: Output) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def reading(output: Output) -> Iterator[Callable[[int, int], None] | None]:
+def reading(output: Output, what: str = "reading") -> Iterator[Callable[[int, int], None] | None]:
     """A callback (done, total) that shows a bar on standard error once a second has passed."""
     if output.quiet or not sys.stderr.isatty():
         yield None
@@ -181,7 +183,7 @@ def reading(output: Output) -> Iterator[Callable[[int, int], None] | None]:
 
             bar = Progress(console=Console(stderr=True), transient=True)
             bar.start()
-            task = bar.add_task("reading", total=total)
+            task = bar.add_task(what, total=total)
         if bar is not None:
             bar.update(task, completed=done, total=total)
 

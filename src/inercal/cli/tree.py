@@ -19,6 +19,13 @@ COMMANDS = {
         "is overwritten.",
         "inercal new imu log.csv --out imu.toml",
     ),
+    ("new", "turntable"): (
+        "inercal.cli.new:new_turntable",
+        "Write a commented study of a turntable: of its sensitivity, design, simulation and calibration.\n\nGiven a "
+        "recording, also a column map guessed from it. The study goes to --out (turntable.toml if absent), the map "
+        "beside it (turntable-map.toml). Nothing that exists is overwritten.",
+        "inercal new turntable --out turntable.toml",
+    ),
     ("inspect", ""): (
         "inercal.cli.inspect:inspect",
         "Look at a recording before it is used.\n\nChannels, units, rates, and everything suspicious about it; "
@@ -31,6 +38,33 @@ COMMANDS = {
         "of the accelerometers, and of the gyro if there is one, with uncertainties. --out saves them (.json or "
         ".toml), --report writes a page to hand over. Exit code 1: done, but the verdict is not ok.",
         "inercal calibrate imu log.csv --study imu.toml --report cal.html",
+    ),
+    ("calibrate", "turntable"): (
+        "inercal.cli.calibrate:calibrate_turntable",
+        "Calibrate an instrument that was taken through positions on a turntable.\n\nGives the coefficients of a "
+        "gyrowheel, gyro or accelerometer with uncertainties that hold the errors of the table, and which of them "
+        "to tighten. --out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: done, but "
+        "the verdict is not ok.",
+        "inercal calibrate turntable test.csv --study turntable.toml",
+    ),
+    ("sensitivity", ""): (
+        "inercal.cli.sensitivity:sensitivity",
+        "Say which error of a turntable matters for what the instrument should read.\n\nSobol indices of first and "
+        "total order and Shapley effects, exactly or from samples, over the positions of the study. --out writes "
+        "the maps (.nc or .npz), --report a page with pictures.",
+        "inercal sensitivity turntable.toml --out maps.nc",
+    ),
+    ("design", "positions"): (
+        "inercal.cli.design:design_positions",
+        "Find the positions of a turntable that calibrate an instrument best, and compare them with plans of the "
+        "field.\n\n--out writes the positions (.csv) or the whole result (.json), --report a page with pictures.",
+        "inercal design positions turntable.toml --out positions.csv",
+    ),
+    ("simulate", "turntable"): (
+        "inercal.cli.simulate:simulate_turntable",
+        "Simulate a test on a turntable, with the errors of the table and the noise of the instrument.\n\nThe study "
+        "states the true coefficients under [instrument.coefficients]. The recording goes to --out (.csv).",
+        "inercal simulate turntable turntable.toml --seed 1 --out test.csv",
     ),
     ("apply", ""): (
         "inercal.cli.apply:apply",
@@ -54,6 +88,8 @@ COMMANDS = {
 _GROUPS = {
     "new": "Write a commented study, and a map guessed from a recording.",
     "calibrate": "Calibrate an instrument from a recording.",
+    "design": "Design a test before it is made.",
+    "simulate": "Simulate a recording of a test.",
 }
 
 

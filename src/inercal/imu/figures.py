@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,10 +13,10 @@ from inercal.imu.verdict import WORST_CONDITION, curing_pose, pose_words
 from inercal.records.places import counted
 from inercal.report.figures import budget, correlation
 from inercal.report.html import Picture
+from inercal.report.positions import hemispheres
 from inercal.report.style import (
     ALARM,
     COLOURS,
-    DIVERGING,
     INK,
     QUIET,
     WIDTH,
@@ -36,9 +35,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
-_NET = "#D5DBE1"
-_NEAR = 0.15
-"""Distance on the unit disc up to which poses share a label."""
 
 
 def pictures(calibration: Calibration) -> list[Picture]:
@@ -98,29 +94,11 @@ def _rest(calibration: Calibration) -> Picture:
 def _sphere(poses: Poses) -> Picture:
     """Directions of the specific force on two hemispheres, with the pose that is lacking."""
     fit = poses.accelerometer
-    residuals = 1e3 * fit.fit.residuals
-    limit = float(np.max(np.abs(residuals)))
     lacking = _lacking(fit)
     with figure(WIDTH, 3.3) as page:
-        panels = page.subplots(1, 2)
-        for axes, side in zip(panels, (1.0, -1.0), strict=True):
-            _hemisphere(axes, side)
-            here = side * fit.directions[:, 2] >= 0
-            marks = axes.scatter(
-                *_flat(fit.directions[here]),
-                c=residuals[here],
-                cmap=DIVERGING,
-                vmin=-limit,
-                vmax=limit,
-                s=42,
-                edgecolors=INK,
-                linewidths=0.5,
-                zorder=3,
-            )
-            _number(axes, fit.directions, here)
-            for cure in lacking[side * lacking[:, 2] >= 0]:
-                axes.scatter(*_flat(cure), marker="*", s=190, c="none", edgecolors=ALARM, lw=1.4, zorder=5)
-        page.colorbar(marks, ax=panels, shrink=0.7, label="|f| − g [mm/s²]")
+        hemispheres(
+            page.subplots(1, 2), fit.directions, 1e3 * fit.fit.residuals, "|f| − g [mm/s²]", stars=lacking
+        )
         drawn = svg(page)
     star = (
         f" Stars: the pose {pose_words(lacking[0])} and its opposite, which would add most to what is known of the "
@@ -144,32 +122,6 @@ def _lacking(fit: AccelerometerFit) -> Array:
     gravity = float(np.mean(np.linalg.norm(fit.f, axis=1)))
     cure = curing_pose(fit, gravity)
     return np.array([cure, -cure])
-
-
-def _flat(directions: Array) -> tuple[Array, Array]:
-    """Lambert's equal-area projection of unit vectors (*batch, 3) from the nearer pole; the equator has radius 1."""
-    shrink = np.sqrt(1.0 + np.abs(directions[..., 2]))
-    return directions[..., 0] / shrink, directions[..., 1] / shrink
-
-
-def _hemisphere(axes: Axes, side: float) -> None:
-    """The net of one hemisphere, with the names of its axes."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    for colatitude in (30.0, 60.0, 90.0):
-        radius = np.sqrt(2.0) * np.sin(np.radians(colatitude) / 2.0)
-        edge = colatitude == 90.0
-        axes.plot(
-            radius * np.cos(angle),
-            radius * np.sin(angle),
-            color=QUIET if edge else _NET,
-            lw=0.9 if edge else 0.5,
-        )
-    axes.plot([-1, 1], [0, 0], [0, 0], [-1, 1], color=_NET, lw=0.5)
-    for x, y, name in ((1, 0, "+x"), (-1, 0, "−x"), (0, 1, "+y"), (0, -1, "−y")):
-        axes.text(1.12 * x, 1.12 * y, name, ha="center", va="center")
-    axes.set_title(f"towards {'+' if side > 0 else '−'}z", pad=12)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
 
 
 def _residuals(poses: Poses, scatter: float) -> Picture:
@@ -226,26 +178,6 @@ def _misses(gyro: GyroFit, durations: Array, scatter: float) -> Picture:
         f"{gyro.walk:.2g} rad/√s make expect. Turns left out of the fit are not counted.",
         drawn,
     )
-
-
-def _number(axes: Axes, directions: Array, here: NDArray[np.bool_]) -> None:
-    """Write the numbers of the poses on one hemisphere beside them, those of near ones together."""
-    places = np.stack(_flat(directions), axis=-1)
-    shared: dict[int, list[int]] = {}
-    for k in np.flatnonzero(here).tolist():
-        first = next((j for j in shared if np.linalg.norm(places[j] - places[k]) < _NEAR), k)
-        shared.setdefault(first, []).append(k + 1)
-    for k, numbers in shared.items():
-        inward, below = -1 if places[k, 0] > 0.5 else 1, places[k, 1] > 0.7
-        axes.annotate(
-            fill(", ".join(map(str, numbers)), 16),
-            places[k],
-            (6 * inward, -8 if below else 4),
-            textcoords="offset points",
-            fontsize=6,
-            ha="left" if inward > 0 else "right",
-            zorder=4,
-        )
 
 
 def _whole_numbers(axes: Axes, label: str) -> None:

@@ -70,7 +70,10 @@ class ChannelModel:
     def regressors(self, a: Array, w: Array) -> Array:
         """Monomials (*batch, p) of ``a`` (*batch, 3) and ``w`` (*batch, 3) [rad/s]."""
         inputs = np.concatenate(np.broadcast_arrays(a, w), axis=-1)
-        return np.stack([_product(inputs, m.powers, m.odd) for m in self.monomials], axis=-1)
+        made = np.empty((*inputs.shape[:-1], len(self.monomials)))
+        for j, m in enumerate(self.monomials):
+            made[..., j] = _product(inputs, m.powers, m.odd)
+        return made
 
     def slopes(self, a: Array, w: Array) -> Array:
         """Derivatives (*batch, p, 6) of the monomials with respect to a_x, a_y, a_z, w_x, w_y, w_z."""

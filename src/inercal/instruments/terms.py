@@ -53,6 +53,22 @@ _GYRO = (
     ),
 )
 
+_RATE_TEST = tuple(
+    Term(f"{symbol}_{i}", f"gyro {i} {name}", unit)
+    for i in _AXES
+    for symbol, name, unit in (
+        ("S_asym", "scale-factor asymmetry: difference for positive and negative rates over S", "1"),
+        ("S2", "second-order coefficient, of the square of the rate", "1/(rad/s)"),
+        ("S3", "third-order coefficient, of the cube of the rate", "1/(rad/s)^2"),
+        ("S_nl", "non-linearity: largest residual from the best straight line, over full scale", "1"),
+        (
+            "S_hyst",
+            "hysteresis: largest difference at a rate reached from below and above, over full scale",
+            "1",
+        ),
+    )
+)
+
 _ACCELEROMETER_BY_ANGLE = (
     *(
         Term(f"M_{i}{j}", f"misalignment: response of accelerometer {i} to specific force along {j}", "rad")
@@ -95,7 +111,7 @@ _DRIFT = tuple(
 
 #: every term, in the order results list them
 TERMS: dict[str, Term] = {
-    term.symbol: term for term in (*_ACCELEROMETER, *_GYRO, *_ACCELEROMETER_BY_ANGLE, *_DRIFT)
+    term.symbol: term for term in (*_ACCELEROMETER, *_GYRO, *_RATE_TEST, *_ACCELEROMETER_BY_ANGLE, *_DRIFT)
 }
 
 ACCELEROMETER_TRIAD = tuple(term.symbol for term in _ACCELEROMETER)

@@ -16,6 +16,7 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     (r"wc_[xyz]", ("rate", "count"), "angle"),
     (r"y_[xy]", ("rate", "number", "count", "voltage"), None),
     (r"phi[123]|th_[xyz]|theta_ref", ("angle", "count", "voltage"), None),
+    (r"rate", ("rate",), None),
     (r"temperature", ("temperature", "count", "voltage"), None),
     (r"trigger", ("number", "count", "voltage"), None),
     (r"position|point|label", ("number", "count"), None),
@@ -23,7 +24,7 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
 
 _EXAMPLES = (
     *(f"{sensor}_{axis}" for sensor in ("acc", "gyro", "wc", "th") for axis in "xyz"),
-    *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "y_x", "y_y"),
+    *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "y_x", "y_y"),
     *("a1", "a2", "a3", "a4", "gyro", "gyro_roll", "gyro_yaw", "point", "trigger", "theta_ref"),
 )
 

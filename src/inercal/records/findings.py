@@ -33,7 +33,9 @@ CODES: dict[str, str] = {
     "resolution": "the output moves in steps that hide its noise",
     "skipped_turn": "a turn was left out of the fit",
     "stated_earth_rate": "earth rate is subtracted and its terms are not fitted",
+    "whole_turns": "the angle of a turning axis is not known, and whole turns are taken for granted",
     "weak_term": "a term is hardly known",
+    "no_coefficients": "nothing is known of the instrument by which table errors act",
 }
 
 

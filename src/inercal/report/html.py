@@ -12,7 +12,7 @@ from inercal.estimate.budget import BudgetItem
 from inercal.estimate.exchange import plain_objects
 from inercal.estimate.result import Estimate, Parameter, rounded
 from inercal.estimate.status import Status
-from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD, TERMS
+from inercal.instruments.terms import TERMS
 from inercal.report.style import plain_unit
 
 
@@ -30,9 +30,12 @@ class Picture:
         return "data:image/svg+xml;base64," + base64.b64encode(self.svg.encode()).decode()
 
 
+#: group of terms -> how their symbols begin
 _GROUPS = {
-    "Accelerometers": frozenset(ACCELEROMETER_TRIAD),
-    "Gyro": frozenset(GYRO_TRIAD + GYRO_G_SENSITIVITY),
+    "Accelerometers": ("K", "M_"),
+    "Gyro": ("D_F_", "S_", "T_", "G_"),
+    "Axis X": ("DX_", "k_"),
+    "Axis Y": ("DY_", "kY_"),
 }
 
 #: key -> plain name and unit, where the key alone does not say them
@@ -44,6 +47,7 @@ _LABELS = {
     "scatter": ("standard deviation of |f| in a pose about the fit", "m/s²"),
     "scatter_over_noise": ("that deviation over what the noise at rest explains", ""),
     "threshold": ("threshold of rest, in variances of the initial static period", ""),
+    "chi2": ("weighted sum of squares", ""),
     "intervals": ("static poses", ""),
     "turns": ("turns", ""),
     "gyro_dof": ("degrees of freedom of the turns", ""),
@@ -52,7 +56,15 @@ _LABELS = {
     "miss_rad": ("miss", "rad"),
     "direction": ("direction of the specific force", ""),
 }
-_UNITS = {"_m_s2": "m/s²", "_rad": "rad", "_hz": "Hz", "_s": "s"}
+_UNITS = {
+    "_m_s2": "m/s²",
+    "_rad_s": "rad/s",
+    "_rad": "rad",
+    "_deg": "°",
+    "_arcsec": "arcsec",
+    "_hz": "Hz",
+    "_s": "s",
+}
 
 
 def render(estimate: Estimate, pictures: Sequence[Picture], title: str) -> str:
@@ -113,7 +125,13 @@ def page(template: str, **content: Any) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {"unit": plain_unit, "percent": _percent, "text": _text}
+    environment.filters |= {
+        "unit": plain_unit,
+        "percent": _percent,
+        "text": _text,
+        "index": _index,
+        "sentence": _sentence,
+    }
     environment.globals["version"] = __version__
     text = environment.get_template(template).render(**content)
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
@@ -145,7 +163,8 @@ def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
     """The coefficients by instrument, each with its printed numbers and its shares of the budget."""
     groups: dict[str, list[_Row]] = {}
     for p in estimate.parameters.values():
-        group = next((name for name, symbols in _GROUPS.items() if p.name in symbols), "Coefficients")
+        begun = (name for name, ways in _GROUPS.items() if p.name in TERMS and p.name.startswith(ways))
+        group = next(begun, "Coefficients")
         groups.setdefault(group, []).append(_row(p, estimate.budget))
     return list(groups.items())
 
@@ -162,6 +181,18 @@ def _percent(share: float) -> str:
     """A share in percent; what is tiny says so."""
     percent = 100.0 * share
     return "< 0.1" if percent < 0.1 else f"{percent:.1f}" if percent < 10 else f"{percent:.0f}"
+
+
+def _index(value: float) -> str:
+    """An index to three digits, a tiny one by its power of ten; a dash where there is none."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.1e}" if 0.0 < abs(value) < 5e-4 else f"{value:.3g}"
+
+
+def _sentence(text: str) -> str:
+    """A text with a capital letter and no full stop at its end."""
+    return text[:1].upper() + text[1:].rstrip(".")
 
 
 def _leaves(value: Any, keys: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -34,6 +34,9 @@ INK, QUIET, ALARM = "#22303C", "#8A949E", "#C03A2B"
 DIVERGING = "RdBu_r"
 """Colour map of numbers with a sign."""
 
+SEQUENTIAL = "Blues"
+"""Colour map of numbers from zero up."""
+
 _STYLE: Any = {
     "axes.axisbelow": True,
     "axes.edgecolor": QUIET,
@@ -127,6 +130,20 @@ def powers_of_ten(axis: Axis) -> None:
         return f"{value:g}" if 0 <= power <= 3 else f"10{str(power).translate(_SUPERSCRIPTS)}"
 
     axis.set_major_formatter(FuncFormatter(text))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def few_powers(axis: Axis, most: int = 6) -> None:
+    """Label a logarithmic axis of whatever span: at most so many powers of ten, or plain numbers over a short one."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high > 30.0 * low:
+        axis.set_major_locator(LogLocator(numticks=most))
+        powers_of_ten(axis)
+        return
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
 

@@ -32,9 +32,7 @@ class Flag:
 
 def mean(indices: Indices) -> Averages:
     """The mean of the indices over positions, (o, k), as in Zhao et al. 2023; null indices are left out."""
-    return Averages(
-        _mean(indices.first), _mean(indices.total), _mean(indices.total_minus_first)
-    )
+    return Averages(_mean(indices.first), _mean(indices.total), _mean(indices.total_minus_first))
 
 
 def weighted(indices: Indices) -> Averages:

@@ -12,12 +12,7 @@ from inercal._toml import Strict, check
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
 from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_of
-from inercal.study.fields import Duration, QuantityText, refusal
-from inercal.units import Quantity
-
-RelativeUncertainty = Annotated[
-    Quantity, QuantityText("number", "20 ppm", lambda u: 0.0 <= u < 1.0, "0 or more, and below 1")
-]
+from inercal.study.fields import Duration, RelativeUncertainty, refusal
 
 
 def _available(method: object) -> object:

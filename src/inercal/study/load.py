@@ -11,11 +11,14 @@ from inercal._toml import read_toml
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
 from inercal.study.imu import imu_study
+from inercal.study.turntable import turntable_study
+from inercal.turntable.settings import TurntableSettings
 from inercal.units import shown
 
-#: rig.kind -> the command whose studies have it
+#: rig.kind -> the command whose studies have it; those of a turntable serve several
 _COMMANDS = {
     "two_axis_turntable": "calibrate turntable",
+    "three_axis_turntable": "calibrate turntable",
     "three_axis_gimbals": "selfcal",
     "sting": "aoa",
 }
@@ -40,6 +43,24 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
     return imu_study(_read(path, overrides, "calibrate imu"), path)
 
 
+def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> TurntableSettings:
+    """Read the study of a turntable: of its sensitivity analysis, design, simulation and calibration.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file.
+    overrides : iterable of str
+        As for `load_imu_study`.
+
+    Raises
+    ------
+    StudyError
+        One sentence: file and key, what was found, what was expected.
+    """
+    return turntable_study(_read(path, overrides, "calibrate turntable"), path)
+
+
 def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
     """The file with the overrides put in; refused where it is a study for another command."""
     data = read_toml(path, StudyError)
@@ -51,6 +72,10 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
             path,
             f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, "
             f"expected one for `inercal {command}`",
+        )
+    if rig is None and "imu" in data and command != "calibrate imu":
+        raise StudyError(
+            path, f"found a study for `inercal calibrate imu`, expected one for `inercal {command}`"
         )
     for override in overrides:
         _put(data, override)

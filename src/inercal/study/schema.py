@@ -9,9 +9,10 @@ from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.study.imu import ImuStudyFile
+from inercal.study.turntable import TurntableStudyFile
 
 #: a study is one of these
-STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile,)
+STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile)
 
 
 class _TomlSchema(GenerateJsonSchema):

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-_IMU = """\
-# Study for `inercal calibrate imu`. Replace what is not so; take the "# " from keys that you know.
+from inercal.rigs.plans import NAMED
+from inercal.rigs.tables import Slot, slots
+
+_HEAD = """\
+# Study {what}. Replace what is not so; take the "# " from keys that you know.
 # Quantities are texts with a unit; "9.81744(2) m/s^2" is 9.81744 with a standard uncertainty of 0.00002.
 #
-# Next: inercal calibrate imu {files}
+# Next: inercal {next}
+"""
+
+_IMU = """\
 
 schema = 1                          # version of this format
 
@@ -24,7 +30,79 @@ method = "multiposition"            # many poses held still by hand, no turntabl
 # static_start = "50 s"             # length of the still period at the start [s]; found if absent
 # g_sensitivity = true              # also estimate how gyro drift depends on specific force [true, false]
 # time_base = "20 ppm"              # relative standard uncertainty of the record's clock; 0 if absent
+"""
 
+_TURNTABLE = """
+schema = 1                          # version of this format
+
+[site]                              # gravity and earth rate, in which the instrument turns
+latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere on Earth
+height = "0(300) m"                 # above sea level [m]; replace it: this is most inhabited places
+# gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
+
+[rig]                               # the turntable
+kind = "two_axis_turntable"         # outer axis y, inner z; or three_axis_turntable: z, y, x
+
+# An error is uniform, triangular or two_point (by its half width) or normal (by its standard deviation).
+# Its scope is how long a value lasts: sample, position, run (a mounting) or rig (for good).
+[rig.errors]                        # of the table; without a default only the named ones
+default = { uniform = "2 arcmin" }  # [arcmin]; of every error below but the optional ones
+{errors}
+[rig.base]                          # known attitude of the base: level, and outer axis to the west, if absent
+# azimuth = "0 deg"                 # about up, north to west positive [deg]
+# tilt_north = "0 arcsec"           # about north [arcsec]
+# tilt_west = "0 arcsec"            # about west [arcsec]
+
+[rig.limits]                        # ranges of the axes; whole circles if absent
+# phi1 = ["-90 deg", "90 deg"]      # lowest and highest outer angle [deg]
+# phi2 = ["-180 deg", "180 deg"]    # of the next axis [deg]; phi3 of the inner axis of three
+
+[positions]                         # where to stop: grid, plan or list
+grid = { phi1 = 36, phi2 = 36, offset = "half" }  # numbers of angles; offset "none" starts at zero
+# plan = "24-position"              # instead: {plans}
+# list = [["0 deg", "45 deg"]]      # instead: the angles of each position
+
+[analysis]                          # of the sensitivity
+outputs = ["ax", "ay", "az", "wx", "wy"]  # gravity and earth rate on the instrument's axes; wz too
+method = "exact"                    # or "sampled", "local" (derivatives alone)
+# sampling = "sobol"                # for sampled: scrambled Sobol points, or "random"
+# samples = 1024                    # for sampled: rows at each position
+# seed = 1                          # for sampled: of the random numbers
+
+[instrument]                        # what is on the table
+kind = "gyrowheel"                  # or "gyro", "accelerometer"
+# unit = "deg/h"                    # of its outputs in a simulation; rad/s or m/s^2 if absent
+# terms = ["DX_F", "DX_X", "k_x"]   # to estimate; those usual for the kind if absent
+# noise = "0.01 deg/h"              # of a reading, or "0.001 deg/sqrt(h)"; from the scatter if absent
+# dwell = "60 s"                    # time in each position [s]
+# rate = "10 Hz"                    # of a simulated recording [Hz]; one row a position if absent
+# earth_rate = "fitted"             # or "stated": k of the table below; if absent where the plan allows
+
+[instrument.coefficients]           # true values to simulate; stated ones of what is not fitted
+# DX_F = "50 deg/h"                 # fixed drift, in the unit of the outputs
+# DX_X = "60 deg/h/g"               # per gravity along x; g is 9.80665 m/s^2
+# DX_XX = "2 deg/h/g^2"             # per square of gravity along x
+# k_x = "1.00(2)"                   # response to earth rate about x
+
+[design]                            # search for positions
+positions = 24                      # how many
+criterion = "D"                     # all coefficients together; "A" their mean variance, "I" of prediction
+# table_errors = true               # judge with the errors of the table [true, false]
+# candidates = { phi1 = 36, phi2 = 36, offset = "none" }  # to choose from
+# compare = ["24-position"]         # named plans to set beside; all the table can take if absent
+# sensitivity = { factors = ["dtheta_x"], outputs = ["ax"], below = 0.3 }  # only where these are below
+# seed = 1                          # of the random starts
+
+# [rate_test]                       # take the "# " from this line too where the table turns at rates (gyro)
+# joint = "phi2"                    # axis that turns
+# full_scale = "100 deg/s"          # what non-linearity is stated against [deg/s]; the largest if absent
+# order = 1                         # 1 scale factor alone; 2, 3 with S2 and S3
+# rates = ["-10 deg/s", "10 deg/s"] # of a simulation [deg/s]
+# rate_uncertainty = "20 ppm"       # relative standard uncertainty of the table's rate; 0 if absent
+# at = { phi1 = "90 deg" }          # angles of a simulation, where each stay begins; 0 if absent
+"""
+
+_COMMON = """
 [traceability]                      # free texts that go with the result
 # instrument = "model, serial no."  # the instrument
 # operator = "name"                 # who made the recording
@@ -37,7 +115,7 @@ method = "multiposition"            # many poses held still by hand, no turntabl
 
 
 def imu_template(
-    record_paths: Iterable[str | Path] = (),
+    record_paths: Sequence[str | Path] = (),
     study_path: str | Path = "STUDY.toml",
     map_path: str | Path | None = None,
 ) -> str:
@@ -48,13 +126,47 @@ def imu_template(
 
     Parameters
     ----------
-    record_paths : iterable of str or Path
+    record_paths : sequence of str or Path
         The recordings that the next command in the header names.
     study_path, map_path : str or Path
         The study and, if there is one, the column map that it names.
     """
-    records = [str(path) for path in record_paths] or ["RECORD.csv"]
-    column_map = [] if map_path is None else ["--map", str(map_path)]
-    files = shlex.join([*records, *column_map, "--study", str(study_path)])
-    files = files.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-    return _IMU.replace("{files}", "".join(c if c.isprintable() else "?" for c in files))
+    files = _files(record_paths or ["RECORD.csv"], study_path, map_path)
+    return _HEAD.format(what="for `inercal calibrate imu`", next=f"calibrate imu {files}") + _IMU + _COMMON
+
+
+def turntable_template(
+    record_paths: Sequence[str | Path] = (),
+    study_path: str | Path = "STUDY.toml",
+    map_path: str | Path | None = None,
+) -> str:
+    """A study of a turntable with every key in it, each explained; arguments as for `imu_template`.
+
+    It loads as it is, with eleven errors of 2 arcmin and a latitude that stands for anywhere on Earth.
+    """
+    following = f"sensitivity {_words([study_path])}"
+    if record_paths:
+        following = f"calibrate turntable {_files(record_paths, study_path, map_path)}"
+    body = _TURNTABLE.replace("{errors}", "".join(map(_error_line, slots("two_axis_turntable"))))
+    body = body.replace("{plans}", " ".join(NAMED))
+    return _HEAD.format(what="of a turntable", next=following) + body + _COMMON
+
+
+def _error_line(slot: Slot) -> str:
+    """One error of a table, commented out."""
+    size = "10 um" if slot.is_offset else "1 arcmin"
+    note = ", optional" if slot.optional else ""
+    text = f'# {slot.name} = {{ normal = "{size}" }}'
+    return f"{text:38s}# {slot.what} [{size.split()[1]}]; {slot.scope.value}{note}\n"
+
+
+def _files(record_paths: Sequence[str | Path], study_path: str | Path, map_path: str | Path | None) -> str:
+    """Recordings, map and study as on a command line."""
+    column_map = [] if map_path is None else ["--map", map_path]
+    return _words([*record_paths, *column_map, "--study", study_path])
+
+
+def _words(words: Iterable[str | Path]) -> str:
+    """Words of a command line, printable in a comment."""
+    text = shlex.join(map(str, words)).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    return "".join(c if c.isprintable() else "?" for c in text)

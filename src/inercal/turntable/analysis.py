@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import StudyError
+from inercal.records.places import counted
 from inercal.rigs.chain import Chain
 from inercal.rigs.outputs import table_outputs
 from inercal.sensitivity import averages
@@ -62,7 +63,8 @@ class Analysed:
         found = self.indices
         top = [found.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
         head = (
-            f"{len(found.factors)} errors, {len(found.outputs)} outputs, {len(found.angles)} positions; "
+            f"{counted(len(found.factors), 'error')}, {counted(len(found.outputs), 'output')}, "
+            f"{counted(len(found.angles), 'position')}; "
             f"the largest shares are those of {', '.join(top)}"
         )
         if not self.flagged:
@@ -73,7 +75,7 @@ class Analysed:
 
 def analyse(
     settings: TurntableSettings,
-    second: bool = False,
+    maps: bool = False,
     say: Callable[[str], None] = lambda _: None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Analysed:
@@ -82,8 +84,8 @@ def analyse(
     Parameters
     ----------
     settings : TurntableSettings
-    second : bool
-        Second-order parts too; only the exact method has them.
+    maps : bool
+        Shapley effects and second-order parts too; only the exact method has them.
     say : callable
         Told, in words, what takes long before the computation begins.
     progress : callable, optional
@@ -107,9 +109,9 @@ def analyse(
         from inercal.sensitivity import exact
 
         with compiling("sensitivity", say):
-            exact.analyse(chain, outputs[:1], angles[:1], shapley=True, second=True)
+            exact.analyse(chain, outputs[:1], angles[:1], second=maps)
         clock = time.perf_counter()
-        indices = exact.analyse(chain, outputs, angles, shapley=True, second=second)
+        indices = exact.analyse(chain, outputs, angles, shapley=maps, second=maps)
     elif how.method == "sampled":
         from inercal.sensitivity import sampled
 

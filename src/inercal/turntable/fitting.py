@@ -21,20 +21,21 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class Stated:
     """Terms that are taken from the study: ``symbols`` (q,), ``values`` (q,) and ``u`` (q,), in the linear form,
-    and the ``rows`` (n, c, q) by which they enter the readings."""
+    and the ``rows`` (n, c, q) by which they enter the readings; ``earth_rate`` if rates are among them."""
 
     symbols: tuple[str, ...]
     values: Array
     u: Array
     rows: Array
+    earth_rate: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
     """What a plan allows, and the fit if it allows one.
 
-    ``known`` rank and null vectors by channel, of the terms of ``model``; ``stated`` the terms of the earth rate
-    where they are not fitted; ``fit`` None where a term is not identified.
+    ``known`` rank and null vectors by channel, of the terms of ``model``; ``stated`` those that are not fitted and
+    matter; ``fit`` None where a term is not identified.
     """
 
     model: TableModel
@@ -56,24 +57,34 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
     of_rate = rate_terms(whole)
     choice = settings.instrument.earth_rate
     model, what, findings = whole, known(whole, found.angles), list(found.findings)
-    none = Stated((), np.zeros(0), np.zeros(0), np.zeros((*found.y.shape, 0)))
-    stated = none
-    lacking = any(each.words for each in what)
-    if of_rate and (choice == "stated" or (choice is None and lacking)):
-        stated = _stated(whole, of_rate, settings, found.angles)
-        model = without_terms(whole, of_rate)
-        if choice is None:
-            said = (
-                f"the positions do not identify the terms of the earth rate ({what[0].words[0]} is free): earth rate "
-                f"is subtracted with stated {', '.join(stated.symbols)}"
-            )
-            findings.append(Finding("stated_earth_rate", said))
-        what = known(model, found.angles)
-    fewest = max(len(channel.symbols) for channel in model.channels)
-    if any(each.words for each in what) or len(found.y) < fewest:
+    if of_rate and (choice == "stated" or (choice is None and any(each.words for each in what))):
+        rest = table_model(settings, found.channels, of_rate)
+        without = known(rest, found.angles)
+        if choice == "stated" or leaves_rates_unknown(what, without):
+            if choice is None:
+                free = next(w for each in what for w in each.words if set(w.split()) & set(of_rate))
+                said = (
+                    f"the positions do not identify the terms of the earth rate ({free} is free): earth rate is "
+                    f"subtracted with stated {', '.join(of_rate)}"
+                )
+                findings.append(Finding("stated_earth_rate", said))
+            model, what = rest, without
+    stated = _stated(model, settings, found.angles)
+    if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
         return Fitting(model, what, stated, None, tuple(findings))
-    y = found.y - stated.rows @ stated.values
-    return Fitting(model, what, stated, fit(model, found.angles, y, _noise(found, settings)), tuple(findings))
+    noise = [settings.instrument.noise] * len(found.channels)
+    done = fit(model, found.angles, found.y, noise, samples=found.samples)
+    return Fitting(model, what, stated, done, tuple(findings))
+
+
+def leaves_rates_unknown(whole: tuple[Known, ...], without: tuple[Known, ...]) -> bool:
+    """True if fewer combinations are unknown once the earth rate is: ``whole`` with its terms, ``without`` them."""
+    return any(len(a.words) > len(b.words) for a, b in zip(whole, without, strict=True))
+
+
+def fewest_positions(model: TableModel, settings: TurntableSettings) -> int:
+    """Positions that a fit needs: one for each term, and one more where the noise is to be estimated."""
+    return max(len(channel.symbols) for channel in model.channels) + (settings.instrument.noise is None)
 
 
 def rate_terms(model: TableModel) -> tuple[str, ...]:
@@ -86,38 +97,33 @@ def rate_terms(model: TableModel) -> tuple[str, ...]:
     )
 
 
-def without_terms(model: TableModel, symbols: tuple[str, ...]) -> TableModel:
-    """The model without these terms."""
-    channels = tuple(channel.without(symbols) for channel in model.channels)
-    return TableModel(model.chain, model.a_n, model.w_n, channels)
-
-
-def _stated(
-    model: TableModel, symbols: tuple[str, ...], settings: TurntableSettings, angles: Array
-) -> Stated:
-    """The terms of the earth rate as stated, in the linear form."""
+def _stated(model: TableModel, settings: TurntableSettings, angles: Array) -> Stated:
+    """What the model takes as stated, in the linear form; all terms of the earth rate, others where they matter."""
     instrument = settings.instrument
-    values, u = [], []
-    for channel in model.channels:
+    a, w = model.inputs(angles)
+    symbols: list[str] = []
+    values, u, rows, said = [], [], [], []
+    for k, (channel, linear) in enumerate(model.stated):
         full = channel_model(instrument.kind, channel.channel)
-        linear = full.linear(stated_values(settings, full))
-        own_u = np.array([instrument.coefficients_u.get(symbol, 0.0) for symbol in full.symbols])
         # a misalignment enters times the scale factor, whose own small uncertainty does not matter to it
-        of = np.where([symbol in full.relative for symbol in full.symbols], full.gain(linear), 1.0)
-        for symbol in channel.symbols:
-            if symbol in symbols:
-                values.append(linear[full.symbols.index(symbol)])
-                u.append((own_u * of)[full.symbols.index(symbol)])
-    if not any(values):
+        lead = full.gain(stated_values(settings, full))
+        regressors = channel.regressors(a, w)
+        for j, (symbol, each) in enumerate(zip(channel.symbols, channel.monomials, strict=True)):
+            own_u = instrument.coefficients_u.get(symbol, 0.0) * (lead if symbol in full.relative else 1.0)
+            if each.of_rate:
+                said.append(symbol in instrument.coefficients or bool(linear[j]))
+            if each.of_rate or linear[j] or own_u:
+                row = np.zeros((len(angles), len(model.channels)))
+                row[:, k] = regressors[:, j]
+                symbols.append(symbol)
+                values.append(linear[j])
+                u.append(own_u)
+                rows.append(row)
+    if said and not any(said):
         raise StudyError(
             "instrument.coefficients",
-            f"none of {', '.join(symbols)} is stated, expected one or more: the positions do not identify them, and "
-            "the output is in no unit of rate",
+            f"none of {', '.join(symbols)} is stated, expected one or more: they are not fitted, and the output is in "
+            "no unit of rate",
         )
-    kept = [model.symbols.index(symbol) for symbol in symbols]
-    return Stated(symbols, np.array(values), np.array(u), model.rows(angles)[..., kept])
-
-
-def _noise(found: Readings, settings: TurntableSettings) -> list[float | None]:
-    """Noise of a reading as stated."""
-    return [settings.instrument.noise] * len(found.channels)
+    made = np.stack(rows, axis=-1) if rows else np.zeros((len(angles), len(model.channels), 0))
+    return Stated(tuple(symbols), np.array(values), np.array(u), made, bool(said))

@@ -52,17 +52,13 @@ def _maps(analysed: Analysed) -> Iterator[tuple[str, Array]]:
 def _npz(analysed: Analysed) -> bytes:
     """The maps and what their axes are, as an NPZ archive."""
     found = analysed.indices
-    axes = {"output": found.outputs, "unit": found.units, "factor": found.factors}
-    angles = dict(zip(analysed.joints, found.angles.T, strict=True))
+    texts = {"output": found.outputs, "unit": found.units, "factor": found.factors, "what": analysed.what}
+    arrays: dict[str, Any] = {name: np.array(values) for name, values in texts.items()}
+    arrays |= {"scale": found.scales, "method": np.array(json.dumps(dict(found.method)))}
+    arrays |= dict(zip(analysed.joints, found.angles.T, strict=True))
+    arrays |= dict(_maps(analysed))
     buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        **{name: np.array(texts) for name, texts in axes.items()},
-        scale=found.scales,
-        **angles,
-        **dict(_maps(analysed)),
-        method=np.array(json.dumps(dict(found.method))),
-    )
+    np.savez(buffer, **arrays)
     return buffer.getvalue()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,12 +32,16 @@ class TableModel:
     w_n : (3,)
         Earth rate [rad/s] in n.
     channels : tuple of ChannelModel
+        Their terms are those to be estimated.
+    stated : tuple of (ChannelModel, (q,) linear coefficients)
+        Of each channel what is known and not estimated; empty where there is nothing.
     """
 
     chain: Chain
     a_n: Array
     w_n: Array
     channels: tuple[ChannelModel, ...]
+    stated: tuple[tuple[ChannelModel, Array], ...] = ()
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -64,26 +68,26 @@ class TableModel:
         return made
 
     def outputs(self, angles: Array, c: Array, errors: Array | None = None) -> Array:
-        """Outputs (*batch, channels) for linear coefficients ``c`` (p,)."""
+        """Outputs (*batch, channels) for linear coefficients ``c`` (p,), what is stated included."""
         a, w = self.inputs(angles, errors)
-        return np.stack(
-            [
-                channel.regressors(a, w) @ c[block]
-                for channel, block in zip(self.channels, self.blocks, strict=True)
-            ],
-            axis=-1,
-        )
+        made = [
+            channel.regressors(a, w) @ c[block]
+            for channel, block in zip(self.channels, self.blocks, strict=True)
+        ]
+        for k, (channel, known) in enumerate(self.stated):
+            made[k] = made[k] + channel.regressors(a, w) @ known
+        return np.stack(made, axis=-1)
 
     def by_inputs(self, angles: Array, c: Array) -> Array:
         """Derivatives (n, channels, 6) of the outputs with respect to a and w on the instrument's axes."""
         a, w = self.inputs(angles)
-        return np.stack(
-            [
-                np.einsum("npi,p->ni", channel.slopes(a, w), c[block])
-                for channel, block in zip(self.channels, self.blocks, strict=True)
-            ],
-            axis=1,
-        )
+        made = [
+            np.einsum("npi,p->ni", channel.slopes(a, w), c[block])
+            for channel, block in zip(self.channels, self.blocks, strict=True)
+        ]
+        for k, (channel, known) in enumerate(self.stated):
+            made[k] = made[k] + np.einsum("npi,p->ni", channel.slopes(a, w), known)
+        return np.stack(made, axis=1)
 
     def by_errors(self, angles: Array, c: Array) -> Array:
         """Derivatives (n, channels, k) of the outputs with respect to the table's errors, at none."""
@@ -98,8 +102,12 @@ class TableModel:
         return np.asarray(np.einsum("nci,ni->nc", self.by_inputs(angles, c), moved))
 
 
-def table_model(settings: TurntableSettings, channels: Sequence[str]) -> TableModel:
-    """The model of a study for these channels, with the terms it asks for.
+def table_model(
+    settings: TurntableSettings, channels: Sequence[str], left_out: Collection[str] = ()
+) -> TableModel:
+    """The model of a study for these channels, with the terms it asks for but those ``left_out``.
+
+    All other terms of the channels are taken as stated.
 
     Raises
     ------
@@ -111,10 +119,10 @@ def table_model(settings: TurntableSettings, channels: Sequence[str]) -> TableMo
         raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
     models = [channel_model(instrument.kind, channel) for channel in channels]
     wanted = instrument.terms
-    chosen = []
+    chosen, stated = [], []
     for model in models:
-        unwanted = EXTRA if wanted is None else set(model.symbols) - set(wanted)
-        kept = model.without(unwanted)
+        unwanted = set(EXTRA) if wanted is None else set(model.symbols) - set(wanted)
+        kept = model.without(unwanted | set(left_out))
         if not kept.symbols:
             raise StudyError(
                 "instrument.terms", f"none of them belongs to {model.channel}, which the record has"
@@ -124,8 +132,11 @@ def table_model(settings: TurntableSettings, channels: Sequence[str]) -> TableMo
                 "instrument.terms", f"{kept.leading} is missing, to which others of {model.channel} relate"
             )
         chosen.append(kept)
+        rest = model.without(kept.symbols)
+        linear = dict(zip(model.symbols, model.linear(stated_values(settings, model)), strict=True))
+        stated.append((rest, np.array([linear[symbol] for symbol in rest.symbols])))
     a_n = gravity_reference() if instrument.kind == "gyrowheel" else -gravity_reference(site.gravity)
-    return TableModel(settings.chain, a_n, rate_reference(site.latitude), tuple(chosen))
+    return TableModel(settings.chain, a_n, rate_reference(site.latitude), tuple(chosen), tuple(stated))
 
 
 def channels_of(settings: TurntableSettings) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,11 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.turntable.fitting import Fitting
+from inercal.turntable.fitting import Fitting, fewest_positions
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import alternatives, coefficient_shares, drift_shares, shifts
-from inercal.units import Unit
 
 Array = NDArray[np.float64]
 
@@ -134,7 +133,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "conditions": _conditions(found, settings),
         "traceability": settings.traceability,
         "inputs": record.sources,
-        "provenance": _provenance(settings),
+        "provenance": provenance(settings),
         "references": REFERENCES,
     }
     findings = [*record.findings, *fitting.findings]
@@ -145,7 +144,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
         "plan": {"name": _plan_name(found, settings), "positions": len(found.y)},
         "instrument": settings.instrument.kind,
-        "earth_rate": "stated" if fitting.stated.symbols else "fitted",
+        "earth_rate": "stated" if fitting.stated.earth_rate else "fitted",
     }
     if fitting.fit is None:
         return Estimate(
@@ -156,7 +155,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
             dof=np.zeros(0),
             k=np.zeros(0),
             status=Status.UNOBSERVABLE,
-            message=_unobservable(found, fitting),
+            message=_unobservable(found, fitting, settings),
             findings=tuple(findings),
             statistics={"positions": float(len(found.y))},
             result=result | {"tolerance_shares": {}},
@@ -209,12 +208,13 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
     )
 
 
-def _unobservable(found: Readings, fitting: Fitting) -> str:
+def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings) -> str:
     """Why nothing was fitted, and what would help."""
     words = [text for each in fitting.known for text in each.words]
     if not words:
-        fewest = max(len(channel.symbols) for channel in fitting.model.channels)
-        return f"found {counted(len(found.y), 'position')} for {fewest} terms, expected at least as many"
+        fewest = fewest_positions(fitting.model, settings)
+        why = " to tell the noise too, which is not stated" if settings.instrument.noise is None else ""
+        return f"found {counted(len(found.y), 'position')}, expected at least {fewest}{why}"
     first = next(each for each in fitting.known if each.words)
     rank, terms = first.identifiability.rank, len(first.identifiability.names)
     return (
@@ -304,7 +304,7 @@ def _conditions(found: Readings, settings: TurntableSettings) -> dict[str, Any]:
     }
 
 
-def _provenance(settings: TurntableSettings) -> dict[str, Any]:
+def provenance(settings: TurntableSettings) -> dict[str, Any]:
     """What a repetition needs beside the inputs."""
     import scipy
 
@@ -325,19 +325,3 @@ def unit_of_term(symbol: str, output: str) -> str:
     """SI unit of a term, for outputs of that unit."""
     text = TERMS[symbol].unit_for(output)
     return "1" if text in ("(rad/s)/(rad/s)", "(m/s^2)/(m/s^2)") else text
-
-
-def displayed(estimate: Estimate, unit: Unit) -> Estimate:
-    """The estimate for people: coefficients in SI units of a rate or acceleration in the record's own unit."""
-    if unit.factor == 1.0:
-        return estimate
-    factor = np.array([unit.factor if text.startswith(unit.si) else 1.0 for text in estimate.units])
-    return replace(
-        estimate,
-        units=tuple(
-            unit.symbol + text.removeprefix(unit.si) if text.startswith(unit.si) else text
-            for text in estimate.units
-        ),
-        values=estimate.values / factor,
-        covariance=estimate.covariance / np.outer(factor, factor),
-    )

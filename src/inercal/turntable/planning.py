@@ -16,9 +16,10 @@ from inercal.design.criteria import Criterion, D, a_criterion
 from inercal.design.exchange import exchange
 from inercal.design.spherical import basis
 from inercal.errors import StudyError
+from inercal.records.findings import Finding
 from inercal.rigs.outputs import gravity_reference, table_outputs
 from inercal.rigs.plans import Plan, named
-from inercal.turntable.fitting import rate_terms, without_terms
+from inercal.turntable.fitting import rate_terms
 from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
 from inercal.turntable.outcome import unit_of_term
 from inercal.turntable.regression import fit, full_inputs, known, weights
@@ -27,9 +28,6 @@ from inercal.turntable.tolerance import drift_shares, sphere_moments
 from inercal.units import Unit
 
 Array = NDArray[np.float64]
-
-DEFAULT_LINES = ("6-position", "8-position", "12-position", "24-position")
-"""Named plans of a two-axis table that stand beside a design where the study names none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +63,7 @@ class Designed:
         Of the outputs, for people.
     message : str
         What was searched, in words.
-    findings : tuple of str
+    findings : tuple of Finding
         What is to be known about it.
     result : mapping
         The command's part of the JSON result.
@@ -76,7 +74,7 @@ class Designed:
     units: Mapping[str, str]
     unit: Unit
     message: str
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     result: dict[str, Any]
 
     def table(self) -> str:
@@ -138,7 +136,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
         search("D-optimal, noise alone", of_noise, D, mask)
     if len(settings.plan) != len(asked.candidates):
         plans.append(settings.plan)
-    plans += [named(name) for name in _lines(settings) if name != settings.plan.name]
+    plans += [named(name) for name in asked.compare if name != settings.plan.name]
     judged = tuple(_judged(plan, settings, model, c) for plan in plans)
     unit = settings.instrument.unit.si
     return Designed(
@@ -165,7 +163,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel, c: Array
     words = tuple(text for each in seen for text in each.words)
     used, rates = model, rate_terms(model)
     if words and rates and settings.instrument.earth_rate is None:
-        used, earth_rate = without_terms(model, rates), "stated"
+        used, earth_rate = table_model(settings, channels_of(settings), rates), "stated"
         c = c[[symbol not in rates for symbol in model.symbols]]
     candidates = _candidates(used, plan.angles, c, settings, True)
     prediction = Criterion("I", sphere_moments(used) / len(used.channels))
@@ -184,24 +182,28 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel, c: Array
     )
 
 
-def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[str]]:
+def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:
     """The terms that are to be identified, their expected linear coefficients, and remarks."""
-    model, findings = table_model(settings, channels_of(settings)), []
+    model = table_model(settings, channels_of(settings))
+    findings: list[Finding] = []
     candidates, choice = settings.design.candidates.angles, settings.instrument.earth_rate
     rates = rate_terms(model)
     if rates and (
         choice == "stated" or (choice is None and any(each.words for each in known(model, candidates)))
     ):
-        findings.append("the terms of the earth rate are taken as stated")
-        model = without_terms(model, rates)
+        findings.append(
+            Finding("stated_earth_rate", f"{', '.join(rates)} are taken as stated and not fitted")
+        )
+        model = table_model(settings, channels_of(settings), rates)
     lost = [words for each in known(model, candidates) for words in each.words]
     if lost:
         raise StudyError("design", f"no plan on this table identifies {'; '.join(lost)}: leave terms out")
     if settings.design.table_errors and not settings.instrument.coefficients:
-        findings.append(
+        said = (
             "no coefficients are expected of the instrument: what the table's errors do to its readings cannot be "
-            "foreseen, state them under [instrument.coefficients]"
+            "foreseen; state them under [instrument.coefficients]"
         )
+        findings.append(Finding("no_coefficients", said))
     c = np.concatenate([channel.linear(stated_values(settings, channel)) for channel in model.channels])
     return model, c, findings
 
@@ -247,13 +249,6 @@ def _largest_index(settings: TurntableSettings) -> Array:
     factors = [indices.factors.index(name) for name in constraint.factors]
     # an output without variance there is touched by no factor
     return np.asarray(np.nan_to_num(indices.first[..., factors]).max(axis=(0, 2)))
-
-
-def _lines(settings: TurntableSettings) -> tuple[str, ...]:
-    """Named plans to compare with."""
-    if settings.design.compare:
-        return settings.design.compare
-    return DEFAULT_LINES if len(settings.chain.joints) == 2 else ()
 
 
 def _entry(judged: Judged) -> dict[str, Any]:

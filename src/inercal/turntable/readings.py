@@ -16,11 +16,11 @@ from inercal.units import Unit
 
 Array = NDArray[np.float64]
 
-STILL = np.radians(30.0 / 3600.0)
-"""Angle [rad] within which neighbouring rows are one position, where the record does not number them."""
+STILL = np.radians(3.0 / 60.0)
+"""Angle [rad] within which rows are one position: above the noise of an encoder, below any step of a plan."""
 
 SHORT = 0.5
-"""A stay of less than this part of the median one is the table on its way, where dwells are found by angle."""
+"""A stay of less than this part of the usual one is the table on its way, where dwells are found by angle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,13 +105,34 @@ def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int
 
 
 def _by_angle(angles: Array) -> list[NDArray[np.int64]]:
-    """Rows of each stretch of equal angles; short ones, where the others are long, are motion."""
+    """Rows of each stretch of angles near those of its first row; short ones, where others are long, are motion.
+
+    The usual length is that of the stretch in which the middle row stands when stretches are sorted by length: a
+    slow turn makes many short ones, but of few rows.
+    """
     known = np.flatnonzero(np.isfinite(angles).all(axis=1))
-    moved = np.abs(_apart(angles[known[1:]], angles[known[:-1]])).max(axis=1) > STILL if len(known) else []
-    parts = _stretches(known, np.asarray(moved, dtype=bool))
-    lengths = np.array([len(part) for part in parts])
-    usual = float(np.median(lengths[lengths > 1])) if np.any(lengths > 1) else 1.0
+    still = angles[known]
+    parts, start = [], 0
+    while start < len(known):
+        stop = _departure(still, start)
+        parts.append(known[start:stop])
+        start = stop
+    if not parts:
+        return []
+    lengths = np.sort([len(part) for part in parts])
+    usual = lengths[np.searchsorted(np.cumsum(lengths), 0.5 * len(known))]
     return [part for part in parts if len(part) >= SHORT * usual]
+
+
+def _departure(angles: Array, start: int) -> int:
+    """First row after ``start`` that is not in its position."""
+    stop, size = start, 64
+    while stop < len(angles):
+        away = np.abs(_apart(angles[stop : stop + size], angles[start])).max(axis=1) > STILL
+        if away.any():
+            return stop + int(np.argmax(away))
+        stop, size = stop + size, 4 * size
+    return len(angles)
 
 
 def _stretches(rows: NDArray[np.int64], breaks: NDArray[np.bool_]) -> list[NDArray[np.int64]]:

@@ -14,17 +14,21 @@ so that the fit is repeated until c rests.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.identifiability import Identifiability, identify, in_words
 from inercal.instruments.polynomial import ChannelModel
+from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
 
 Array = NDArray[np.float64]
+Samples: TypeAlias = NDArray[np.int64]
+"""Rows behind each reading (n,)."""
 
 ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
@@ -61,6 +65,7 @@ class Regression:
     noise : (c,) standard deviation of a reading that is not the table's doing
     noise_dof : (c,) its degrees of freedom; inf where it was stated
     slopes : (n, c, k) derivatives of the readings with respect to all errors of the table
+    samples : (n,) rows behind each reading
     table : (q,) estimated constant errors [rad or m], in the order of ``constant``
     table_u : (q,) their standard uncertainties
     constant : (q,) indices of the constant errors among the chain's
@@ -77,6 +82,7 @@ class Regression:
     noise: Array
     noise_dof: Array
     slopes: Array
+    samples: Samples
     table: Array
     table_u: Array
     constant: NDArray[np.int64]
@@ -140,17 +146,43 @@ def _few_terms(vectors: Array) -> Array:
     return rows
 
 
-def weights(model: TableModel, angles: Array, c: Array, noise: Array, std: Array | None = None) -> Weights:
+def weights(
+    model: TableModel,
+    angles: Array,
+    c: Array,
+    noise: Array,
+    std: Array | None = None,
+    samples: Samples | None = None,
+) -> Weights:
     """Covariance of the readings for coefficients ``c``, noise (c,) and errors of the table.
 
-    ``std`` (k,) stands in for the standard deviations of the chain's errors.
+    ``std`` (k,) stands in for the standard deviations of the chain's errors; ``samples`` (n,) as in `fit`.
     """
-    slopes = model.by_errors(angles, c) * (model.chain.std if std is None else std)
-    constant = np.array([error.scope.constant for error in model.chain.errors], dtype=bool)
-    redrawn = slopes[..., ~constant]
-    return Weights(
-        np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)), slopes[..., constant]
+    slopes = model.by_errors(angles, c)
+    return weights_of(
+        model.chain, slopes, noise, np.ones(len(slopes), dtype=np.int64) if samples is None else samples, std
     )
+
+
+def weights_of(
+    chain: Chain, slopes: Array, noise: Array, samples: Samples, std: Array | None = None
+) -> Weights:
+    """As `weights`, for derivatives (n, c, k) of the readings with respect to the errors of the ``chain``."""
+    scaled = averaged(chain, slopes, samples) * (chain.std if std is None else std)
+    constant = np.array([error.scope.constant for error in chain.errors], dtype=bool)
+    redrawn = scaled[..., ~constant]
+    return Weights(
+        np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)), scaled[..., constant]
+    )
+
+
+def averaged(chain: Chain, slopes: Array, samples: Samples) -> Array:
+    """Derivatives (n, c, k) as one standard deviation of an error moves a mean over so many samples.
+
+    Errors of scope ``sample`` average out with the root of their number, the others do not.
+    """
+    each = np.array([error.scope is Scope.SAMPLE for error in chain.errors], dtype=bool)
+    return np.where(each, slopes / np.sqrt(samples)[:, None, None], slopes)
 
 
 def solve(rows: Array, y: Array, weight: Weights) -> Solution:
@@ -182,7 +214,12 @@ def solve(rows: Array, y: Array, weight: Weights) -> Solution:
 
 
 def fit(
-    model: TableModel, angles: Array, y: Array, noise: Sequence[float | None], start: Array | None = None
+    model: TableModel,
+    angles: Array,
+    y: Array,
+    noise: Sequence[float | None],
+    start: Array | None = None,
+    samples: Samples | None = None,
 ) -> Regression:
     """Fit all channels together.
 
@@ -194,18 +231,29 @@ def fit(
     y : (n, c) readings
     noise : (c,) standard deviation of a reading; None where it is to be estimated from the scatter
     start : (p,) coefficients for the first derivatives; from an unweighted fit if absent
+    samples : (n,) rows behind each reading, over which errors of scope ``sample`` average; one if absent
     """
     rows = model.rows(angles)
     n, channels, p = rows.shape
+    samples = np.ones(n, dtype=np.int64) if samples is None else samples
     size = np.sqrt(np.mean(np.square(y), axis=0))
-    floor = FLOOR * np.where(size > 0.0, size, 1.0)
+    least = FLOOR * np.where(size > 0.0, size, 1.0)
+    y = y - model.outputs(angles, np.zeros(p))  # what is stated
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
     c = solve(rows, y, plain).c if start is None else start
-    stated = np.array([np.nan if each is None else max(each, 0.0) for each in noise])
-    sigma = floor
     for _ in range(ROUNDS):
-        sigma = np.maximum(np.where(np.isnan(stated), _scatter(model, angles, y, c), stated), floor)
-        solution = solve(rows, y, weights(model, angles, c, sigma))
+        table = weights(model, angles, c, np.zeros(channels), samples=samples)
+        scatter = [
+            _scatter(rows[:, k, block], y[:, k], table, k)
+            if each is None
+            else Scatter(max(each, 0.0), np.inf)
+            for k, (block, each) in enumerate(zip(model.blocks, noise, strict=True))
+        ]
+        own = np.mean(np.diagonal(table.within, axis1=1, axis2=2), axis=0)
+        # errors of the table alone may leave the covariance of two channels without an inverse
+        floor = np.maximum(least, 1e-6 * np.sqrt(own))
+        sigma = np.maximum([each.std for each in scatter], floor)
+        solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
         change, c = np.abs(solution.c - c), solution.c
         if np.all(change <= 1e-3 * np.sqrt(np.diag(solution.joint)[:p])):
             break
@@ -221,43 +269,54 @@ def fit(
         solution.chi2,
         n * channels - p,
         sigma,
-        np.where(np.isnan(stated), [n - len(channel.symbols) for channel in model.channels], np.inf),
+        np.array([each.dof for each in scatter]),
         model.by_errors(angles, c),
+        samples,
         solution.chi * std,
         np.sqrt(np.diag(solution.joint)[p:]) * std,
         constant,
     )
 
 
-def _scatter(model: TableModel, angles: Array, y: Array, c: Array) -> Array:
-    """Noise (c,) of a reading beyond what the table explains: with it, chi2 of a channel is its dof.
+@dataclass(frozen=True)
+class Scatter:
+    """Noise of a reading: standard deviation ``std``, and its degrees of freedom ``dof``, inf where it is stated."""
 
-    After Mandel and Paule 1970; zero where the table alone explains more than the scatter.
+    std: float
+    dof: float
+
+
+def _scatter(rows: Array, y: Array, table: Weights, channel: int) -> Scatter:
+    """Noise of a reading beyond what the table explains: with it, chi2 of a channel is its degrees of freedom.
+
+    After Mandel and Paule 1970; zero where the table alone explains more than the scatter. Seen from outside the
+    space of the terms, ``chi2 = sum z^2 / (lambda + s^2)``, lambda the variances that the table causes there; the
+    variance of s^2 is ``2 nu / (sum 1 / (lambda + s^2))^2``.
+
+    Parameters
+    ----------
+    rows : (n, p), y : (n,) of one channel
+    table : Weights of all channels, without noise
+    channel : int
     """
-    rows, found = model.rows(angles), []
-    for k, block in enumerate(model.blocks):
-        table = weights(model, angles, c, np.zeros(y.shape[1]))
-        own, here = rows[:, k : k + 1, block], slice(k, k + 1)
-        dof = len(y) - own.shape[2]
-
-        def excess(variance: float, here: slice = here, own: Array = own, table: Weights = table) -> float:
-            part = Weights(table.within[:, here, here] + variance, table.common[:, here])
-            return solve(own, y[:, here], part).chi2 - len(own) + own.shape[2]
-
-        plain = Weights(np.ones((len(y), 1, 1)), np.zeros((len(y), 1, 0)))
-        high = solve(own, y[:, here], plain).chi2 / max(dof, 1)
-        found.append(_zero(excess, FLOOR**2 * high, high) if dof > 0 and high > 0.0 else 0.0)
-    return np.sqrt(found)
-
-
-def _zero(falling: Callable[[float], float], low: float, high: float) -> float:
-    """Where a falling function of a positive number is zero, by halving its logarithm; 0 below ``low``."""
-    if falling(low) <= 0.0:
-        return 0.0
-    for _ in range(40):
+    n, p = rows.shape
+    if n <= p:
+        return Scatter(0.0, 0.0)
+    outside = np.linalg.qr(rows / np.linalg.norm(rows, axis=0), mode="complete")[0][:, p:]
+    variance = (
+        np.diag(table.within[:, channel, channel]) + table.common[:, channel] @ table.common[:, channel].T
+    )
+    own, turn = np.linalg.eigh(outside.T @ variance @ outside)
+    z2 = np.square(turn.T @ (outside.T @ y))
+    high = float(np.mean(z2))
+    if not high > 0.0:
+        return Scatter(0.0, 0.0)
+    low = FLOOR**2 * high
+    own = np.maximum(own, 0.0)
+    if np.sum(z2 / (own + low)) <= n - p:
+        high = low
+    for _ in range(60):  # halving the logarithm
         middle = math.sqrt(low * high)
-        if falling(middle) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return math.sqrt(low * high)
+        low, high = (middle, high) if np.sum(z2 / (own + middle)) > n - p else (low, middle)
+    dof = np.sum(high / (own + high)) ** 2 / (n - p)
+    return Scatter(math.sqrt(high), float(dof))

@@ -97,11 +97,28 @@ class Design:
 class RateTest:
     """A rate test: the table turns about ``joint`` at each rate in turn, whole turns or not.
 
-    ``full_scale`` [rad/s] by which non-linearity is divided; None: the largest rate of the record.
+    Attributes
+    ----------
+    joint : str
+        The one that turns.
+    full_scale : float or None
+        Rate [rad/s] by which non-linearity is divided; None: the largest of the record.
+    rates : tuple of float
+        Rates [rad/s] of a simulation, in the order taken.
+    rate_u : float
+        Relative standard uncertainty of the table's rate, common to all rates.
+    order : int
+        Of the polynomial that is fitted: 1 scale factor, 2 and 3 with S2 and S3.
+    at : mapping
+        Angles [rad] of a simulation: where the other joints stand and each stay begins; 0 where nothing is said.
     """
 
     joint: str = "phi2"
     full_scale: float | None = None
+    rates: tuple[float, ...] = ()
+    rate_u: float = 0.0
+    order: Literal[1, 2, 3] = 1
+    at: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

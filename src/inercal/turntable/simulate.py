@@ -63,7 +63,7 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
         (channel.channel, instrument.unit, y[..., k].ravel() / instrument.unit.factor)
         for k, channel in enumerate(model.channels)
     ]
-    return _record(columns, t)
+    return record_of(columns, t)
 
 
 def _all_terms(settings: TurntableSettings) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ def _all_terms(settings: TurntableSettings) -> tuple[str, ...]:
     )
 
 
-def _record(columns: list[tuple[str, Unit, Array]], t: Array) -> Record:
+def record_of(columns: list[tuple[str, Unit, Array]], t: Array) -> Record:
     """A record of these columns (name, unit, values)."""
     source = Source("simulated", "")
     made = {}

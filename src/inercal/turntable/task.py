@@ -6,15 +6,20 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from inercal.errors import StudyError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
+from inercal.turntable.display import displayed
 from inercal.turntable.fitting import Fitting, fit_readings
-from inercal.turntable.outcome import assemble, displayed
+from inercal.turntable.outcome import assemble
 from inercal.turntable.planning import design as design
+from inercal.turntable.rate_calibration import RateCalibration, calibrate_rates
+from inercal.turntable.rate_simulate import simulate_rate_test
 from inercal.turntable.readings import Readings, readings
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.simulate import simulate as simulate
+from inercal.turntable.simulate import simulate as simulate_positions
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,21 +38,21 @@ class Calibration:
 
 def calibrate(
     record: Record, settings: TurntableSettings, progress: Callable[[str], None] = lambda _: None
-) -> Calibration:
-    """Calibrate an instrument that was taken through positions on a table.
+) -> Calibration | RateCalibration:
+    """Calibrate an instrument that was taken through positions on a table, or gyros by a rate test.
 
     Parameters
     ----------
     record : Record
         Angles of the table and outputs of the instrument: a row for each position, or samples.
     settings : TurntableSettings
-        Site, table with its errors, instrument.
+        Site, table with its errors, instrument; with a ``rate_test``, the record is one.
     progress : callable
         Told, in words, what is being done.
 
     Returns
     -------
-    Calibration
+    Calibration, or RateCalibration of a rate test
         Its estimate's status says whether the values can be used; nothing is raised for a poor fit.
 
     Raises
@@ -58,6 +63,11 @@ def calibrate(
     import scipy.special  # noqa: F401  (loading it is not part of the computation)
 
     clock = time.perf_counter()
+    if settings.rate_test is not None:
+        progress("fitting the rates")
+        tested = calibrate_rates(record, settings)
+        timing = {"solve": time.perf_counter() - clock}
+        return replace(tested, estimate=replace(tested.estimate, timing=timing))
     progress("averaging over the positions")
     found = readings(record, settings.chain.joints, settings.instrument.kind)
     settings = _with_unit(settings, found)
@@ -66,6 +76,12 @@ def calibrate(
     estimate = assemble(record, found, fitting, settings)
     timed = replace(estimate, timing={"solve": time.perf_counter() - clock})
     return Calibration(timed, found, fitting)
+
+
+def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
+    """A simulated record of the study: its rate test if it has one, else its positions."""
+    made = simulate_positions if settings.rate_test is None else simulate_rate_test
+    return made(settings, rng)
 
 
 def _with_unit(settings: TurntableSettings, found: Readings) -> TurntableSettings:

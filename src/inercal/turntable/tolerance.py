@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
-from inercal.turntable.regression import Regression, solve, weights
+from inercal.turntable.regression import Regression, averaged, solve, weights_of
 
 Array = NDArray[np.float64]
 
@@ -27,9 +27,10 @@ def shifts(fit: Regression) -> tuple[Array, ...]:
 
     q is 1 for a constant error, and the number of positions for one that is redrawn there.
     """
-    found = []
-    for k, error in enumerate(fit.model.chain.errors):
-        each = np.einsum("pnc,nc->pn", fit.gain, fit.slopes[..., k]) * error.distribution.std
+    chain, found = fit.model.chain, []
+    slopes = averaged(chain, fit.slopes, fit.samples)
+    for k, error in enumerate(chain.errors):
+        each = np.einsum("pnc,nc->pn", fit.gain, slopes[..., k]) * error.distribution.std
         found.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
     return tuple(found)
 
@@ -40,7 +41,8 @@ def coefficient_shares(fit: Regression, slope: Array) -> dict[str, dict[str, flo
     ``slope`` (p, p) derivatives of the terms with respect to the linear coefficients. The shares of a term sum
     to one; a term that the table does not touch has none.
     """
-    parts = np.array([np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)])
+    found = [np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)]
+    parts = np.array(found).reshape(-1, len(fit.c))
     return {symbol: _shares(fit.model.chain, parts[:, j]) for j, symbol in enumerate(fit.model.symbols)}
 
 
@@ -104,13 +106,11 @@ class Alternatives:
 
 def alternatives(fit: Regression, slope: Array) -> Alternatives:
     """What halving each tolerance would bring, and what the scopes mean; the fit is weighted anew each time."""
-    chain = fit.model.chain
+    chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
 
     def u(changed: Chain) -> Array:
-        model = replace(fit.model, chain=changed)
-        weight = weights(model, fit.angles, fit.c, fit.noise)
-        joint = solve(model.rows(fit.angles), np.zeros_like(fit.residuals), weight).joint
-        p = len(fit.c)
+        weight = weights_of(changed, fit.slopes, fit.noise, fit.samples)
+        joint = solve(rows, np.zeros_like(fit.residuals), weight).joint
         return np.sqrt(np.diag(slope @ joint[:p, :p] @ slope.T))
 
     halved = {

@@ -1,0 +1,98 @@
+"""An estimate of a turntable for people: rates and accelerations in the record's unit, small angles in arcsec."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from inercal.estimate.result import Estimate
+from inercal.units import Unit
+
+_ARCSEC = np.radians(1.0 / 3600.0)
+
+
+def shown_unit(text: str, unit: Unit) -> tuple[str, float]:
+    """A unit with SI rate or acceleration as the record has them, and how many of the old it is.
+
+    ``deg/h`` and 4.8e-6 for ``rad/s`` where ``unit`` is deg/h; units of anything else stay.
+    """
+    if unit.factor == 1.0 or not text.startswith(unit.si):
+        return text, 1.0
+    return unit.symbol + text.removeprefix(unit.si), unit.factor
+
+
+def displayed(estimate: Estimate, unit: Unit) -> Estimate:
+    """The estimate with coefficients, budget, noise and residuals in the ``unit`` of the record.
+
+    Scopes and the like in ``result`` stay in SI; keys of statistics and ranges then name their unit.
+    """
+    shown = [shown_unit(text, unit) for text in estimate.units]
+    factor = np.array([size for _, size in shown])
+    return replace(
+        estimate,
+        units=tuple(text for text, _ in shown),
+        values=estimate.values / factor,
+        covariance=estimate.covariance / np.outer(factor, factor),
+        budget=tuple(
+            replace(item, u=item.u / size, unit=text)
+            for item in estimate.budget
+            for text, size in [_of_source(item.unit, unit)]
+        ),
+        statistics=_with_unit(estimate.statistics, "residual_rms", unit),
+        conditions=_conditions(estimate.conditions, unit),
+        result=_result(estimate.result, unit),
+    )
+
+
+def _of_source(text: str, unit: Unit) -> tuple[str, float]:
+    """The unit of a source of the budget, for people."""
+    return ("arcsec", _ARCSEC) if text == "rad" else shown_unit(text, unit)
+
+
+def _with_unit(values: Mapping[str, float], key: str, unit: Unit) -> dict[str, float]:
+    """Numbers with that one in the unit of the record, which its key then names."""
+    return {
+        (f"{name} [{unit.symbol}]" if name == key else name): value / (unit.factor if name == key else 1.0)
+        for name, value in values.items()
+    }
+
+
+def _conditions(conditions: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
+    """Conditions with the ranges of readings in the unit of the record, and the latitude in degrees."""
+    changed = dict(conditions)
+    if "ranges" in changed:
+        changed["ranges"] = {
+            (f"{name} [{unit.symbol}]" if name.startswith("reading_of_") else name): (
+                [end / unit.factor for end in ends] if name.startswith("reading_of_") else ends
+            )
+            for name, ends in changed["ranges"].items()
+        }
+    site = dict(changed.get("site", {}))
+    if site.get("latitude_rad") is not None:
+        site["latitude_deg"] = float(np.degrees(site.pop("latitude_rad")))
+        changed["site"] = site
+    return changed
+
+
+def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
+    """The result with noise in the unit of the record and errors of the table in arcsec."""
+    changed = dict(result)
+    if "noise" in changed:
+        changed["noise"] = [
+            row | {key: row[key] / unit.factor for key in ("noise", "within_dwells")} | {"unit": unit.symbol}
+            for row in changed["noise"]
+        ]
+    if "table_errors" in changed:
+        changed["table_errors"] = [
+            {
+                (f"{name.removesuffix('_rad')}_arcsec" if name.endswith("_rad") else name): (
+                    value / _ARCSEC if name.endswith("_rad") else value
+                )
+                for name, value in row.items()
+            }
+            for row in changed["table_errors"]
+        ]
+    return changed

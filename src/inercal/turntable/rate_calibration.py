@@ -1,0 +1,160 @@
+"""Calibration of gyros by a rate test: what the record holds, what its rates can tell, and the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.errors import StudyError
+from inercal.estimate.identifiability import in_words
+from inercal.estimate.result import Estimate
+from inercal.geometry.earth import EARTH_RATE
+from inercal.records.findings import Finding
+from inercal.records.places import counted
+from inercal.records.record import Record
+from inercal.turntable.display import displayed
+from inercal.turntable.outcome import SURPRISE
+from inercal.turntable.rate import Input, RateDwells, gyro_input, rate_dwells, turning_axis
+from inercal.turntable.rate_fit import RateFit, fit_rates, separable
+from inercal.turntable.rate_outcome import assemble, unobservable
+from inercal.turntable.settings import TurntableSettings
+
+ACROSS = 0.1
+"""Cosine of turning axis and gyro axis below which a gyro takes no part in the test."""
+
+
+@dataclass(frozen=True, eq=False)
+class RateCalibration:
+    """An ``estimate``, and the evidence behind it: stays, inputs and fits of the gyros that took part."""
+
+    estimate: Estimate
+    readings: RateDwells
+    inputs: tuple[Input, ...] = ()
+    fits: tuple[RateFit, ...] = ()
+
+    @property
+    def shown(self) -> Estimate:
+        """The estimate in the units of the record, for people."""
+        return displayed(self.estimate, self.readings.unit)
+
+
+def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibration:
+    """Calibrate gyros by a rate test.
+
+    Parameters
+    ----------
+    record : Record
+        As `inercal.turntable.rate.rate_dwells` reads it.
+    settings : TurntableSettings
+        With a ``rate_test``, and an instrument of kind gyro.
+
+    Raises
+    ------
+    InputError
+        The record is no rate test, or the study does not fit it.
+    """
+    test, chain, instrument = settings.rate_test, settings.chain, settings.instrument
+    assert test is not None
+    check_rate_test(settings)
+    found = rate_dwells(record, chain.joints, test.joint, instrument.dwell)
+    stated = instrument.unit
+    if instrument.noise is not None and stated.dimension != found.unit.dimension:
+        raise StudyError(
+            "instrument.unit",
+            f"noise is stated for outputs in {stated.symbol}, and the record's are in {found.unit.symbol}, expected "
+            "the same kind of unit",
+        )
+    findings = [*record.findings]
+    along = turning_axis(chain, test.joint, found.angles)
+    taken = []
+    for channel in found.channels:
+        if np.abs(along[:, "xyz".index(channel[-1])]).min() > ACROSS:
+            taken.append(channel)
+        else:
+            said = f"{channel} lies across the turning axis {test.joint} and is left out"
+            findings.append(Finding("weak_term", said))
+
+    def nothing(rank: int, said: str, words: Sequence[str] = ()) -> RateCalibration:
+        return RateCalibration(unobservable(record, found, settings, findings, rank, words, said), found)
+
+    if not taken:
+        return nothing(0, f"no gyro of the record lies along the turning axis {test.joint}")
+    axis, asymmetry = taken[0][-1], True
+    known = separable(found.rate, axis, test.order, asymmetry)
+    if known.rank < len(known.names):
+        asymmetry = False
+        known = separable(found.rate, axis, test.order, asymmetry)
+        said = "the rates do not tell the asymmetry from the other terms: take two or more of either sign"
+        findings.append(Finding("weak_term", said))
+    stays, terms = len(found.rate), len(known.names)
+    if known.rank < terms:
+        words = [in_words(vector / known.scale, known.names) for vector in known.null_vectors]
+        return nothing(
+            known.rank,
+            f"{counted(stays, 'stay')} identify {known.rank} of {terms} terms: the readings do not change along "
+            f"{'; '.join(words)} (by rad/s); add rates",
+            words,
+        )
+    if stays == terms and instrument.noise is None:
+        said = f"found {counted(stays, 'stay')} for {terms} terms and no stated noise, expected one stay more"
+        return nothing(known.rank, said)
+    inputs = tuple(gyro_input(found, settings, "xyz".index(channel[-1])) for channel in taken)
+    if found.assumed:
+        findings += _whole_turns(found, inputs)
+    full_scale = test.full_scale or float(np.abs(found.rate).max())
+    fits = tuple(
+        fit_rates(
+            channel[-1],
+            found.rate,
+            found.y[:, found.channels.index(channel)],
+            given,
+            instrument.noise,
+            test.order,
+            asymmetry,
+            full_scale,
+        )
+        for channel, given in zip(taken, inputs, strict=True)
+    )
+    findings += [finding for fit in fits for finding in _excess(fit)]
+    estimate = assemble(record, found, settings, findings, inputs, fits, full_scale, known)
+    return RateCalibration(estimate, found, inputs, fits)
+
+
+def check_rate_test(settings: TurntableSettings) -> None:
+    """Refuse a study that cannot be a rate test; raises StudyError."""
+    if settings.instrument.kind != "gyro":
+        raise StudyError(
+            "instrument.kind", f'found "{settings.instrument.kind}", expected "gyro" for a rate test'
+        )
+    if settings.site.latitude is None:
+        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
+
+
+def _excess(fit: RateFit) -> list[Finding]:
+    """A finding where the readings scatter about the fit by more than what is stated of them."""
+    from scipy.special import chdtrc
+
+    if fit.dof < 1 or np.isfinite(fit.noise_dof) or chdtrc(fit.dof, fit.chi2) >= SURPRISE:
+        return []
+    said = (
+        f"gyro_{fit.axis} misses the fit by {np.sqrt(fit.chi2 / fit.dof):.1f} times what the stated noise and the "
+        "table explain: what S_nl and S_hyst say is the gyro's own, and the uncertainties are those of the terms over "
+        "these rates"
+    )
+    return [Finding("excess_scatter", said)]
+
+
+def _whole_turns(found: RateDwells, inputs: Sequence[Input]) -> list[Finding]:
+    """A finding where a gyro is oblique, so that earth rate across the turning axis must average out."""
+    oblique = max(float(np.sqrt(1.0 - np.square(given.gain).min().clip(0.0, 1.0))) for given in inputs)
+    if oblique < 1e-6:
+        return []
+    moving = np.abs(found.rate[np.abs(found.rate) > 0.0])
+    worst = 1e6 * oblique * EARTH_RATE / float(moving.min()) if len(moving) else np.inf
+    said = (
+        "the record does not hold the angle of the turning axis: the earth rate across it is taken to average out over "
+        f"whole turns; were they not whole, an input could be wrong by up to {worst:.0f} ppm"
+    )
+    return [Finding("whole_turns", said)]

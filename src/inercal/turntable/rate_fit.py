@@ -1,0 +1,238 @@
+"""The fit of a rate test: scale factor, bias, asymmetry, polynomial, and what remains of the straight line.
+
+Of a gyro whose input is the rate x::
+
+    y = D_F + S (x + S_asym |x| / 2 + S2 x^2 + S3 x^3)
+
+so that its slopes on either side of zero are S (1 ± S_asym/2): their difference over their mean is S_asym, as the
+gyro standards (IEEE 952-style) define the asymmetry. Non-linearity and hysteresis are what a best straight line
+leaves, over the full scale: the largest residual, and the largest difference between readings at one rate that
+was reached from below and from above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.identifiability import Identifiability, identify
+from inercal.turntable.rate import Effect, Input
+from inercal.turntable.regression import FLOOR, Solution, Weights, solve
+
+Array = NDArray[np.float64]
+
+SAME = 1e-3
+"""Rates apart by less than this part of themselves are one rate."""
+
+ROUNDS = 3
+"""Fits that are made: the effect of the table depends on the scale factor, and hardly changes after the first."""
+
+
+@dataclass(frozen=True, eq=False)
+class RateFit:
+    """A gyro's fit.
+
+    Attributes
+    ----------
+    axis : str
+        Of the gyro: ``x``, ``y`` or ``z``.
+    names : tuple of str
+        Terms, those of the fit first, then what the straight line leaves.
+    values : (p,)
+    gain : (p, n) change of each with each reading
+    scale : float
+        S as fitted [output per rad/s].
+    residuals : (n,) readings minus the best straight line
+    remainder : (n, n) how each reading enters each residual
+    noise : float
+        Standard deviation of a reading that is not the table's doing; ``noise_dof`` inf where it was stated.
+    chi2, dof : weighted sum of squares of the fit, and its degrees of freedom
+    """
+
+    axis: str
+    names: tuple[str, ...]
+    values: Array
+    gain: Array
+    scale: float
+    residuals: Array
+    remainder: Array
+    noise: float
+    noise_dof: float
+    chi2: float
+    dof: int
+
+
+def columns(x: Array, order: int, asymmetry: bool) -> Array:
+    """Regressors (n, p) of D_F, S, then S_asym, S2, S3 as far as they are wanted."""
+    made = [np.ones_like(x), x]
+    if asymmetry:
+        made.append(0.5 * np.abs(x))
+    made += [x**power for power in range(2, order + 1)]
+    return np.stack(made, axis=-1)
+
+
+def symbols(axis: str, order: int, asymmetry: bool) -> tuple[str, ...]:
+    """Names of the `columns`."""
+    middle = (f"S_asym_{axis}",) if asymmetry else ()
+    return (f"D_F_{axis}", f"S_{axis}", *middle, *(f"S{power}_{axis}" for power in range(2, order + 1)))
+
+
+def separable(rate: Array, axis: str, order: int, asymmetry: bool) -> Identifiability:
+    """What the rates let the terms say.
+
+    By the rates of the table alone, rounded to what counts as one rate: earth rate and jitter would make terms
+    seem known that hang on a millionth of the rate.
+    """
+    size = np.empty(len(rate))
+    for same in levels(np.abs(rate)):
+        size[same] = np.abs(rate[same]).mean()
+    return identify(columns(np.copysign(size, rate), order, asymmetry), symbols(axis, order, asymmetry))
+
+
+def levels(rate: Array) -> list[NDArray[np.int64]]:
+    """Stays (indices, in the order taken) at each distinct rate, lowest first."""
+    order = np.argsort(rate, kind="stable")
+    steps = np.diff(rate[order])
+    apart = steps > SAME * np.maximum(np.abs(rate[order])[1:], 1e-3 * np.abs(rate).max(initial=0.0))
+    return [np.sort(part) for part in np.split(order, np.flatnonzero(apart) + 1)]
+
+
+def approaches(rate: Array) -> NDArray[np.int64]:
+    """+1 (n,) where a rate was reached from below, -1 from above; the first from rest, 0 if that is at rest."""
+    level = np.empty(len(rate))
+    for same in levels(rate):
+        level[same] = rate[same].mean()
+    smallest = SAME * 1e-3 * np.abs(level).max(initial=0.0)
+    steps = np.diff(level, prepend=0.0)
+    found = np.where(np.abs(steps) <= smallest, 0, np.sign(steps)).astype(np.int64)
+    for k in range(1, len(found)):
+        if found[k] == 0:
+            found[k] = found[k - 1]
+    return found
+
+
+def fit_rates(
+    axis: str,
+    rate: Array,
+    y: Array,
+    given: Input,
+    noise: float | None,
+    order: int,
+    asymmetry: bool,
+    full_scale: float,
+) -> RateFit:
+    """Fit one gyro.
+
+    Parameters
+    ----------
+    axis : str
+    rate : (n,) rad/s, of the table
+    y : (n,) readings
+    given : Input
+        The rate about the gyro's axis and what it is uncertain by.
+    noise : float or None
+        Standard deviation of a reading; None: from the scatter, which needs more readings than terms.
+    order, asymmetry
+        Terms; the rates must let them be separated (`separable`).
+    full_scale : float
+        rad/s
+    """
+    rows = columns(given.x, order, asymmetry)
+    n, p = rows.shape
+    floor = FLOOR * float(np.sqrt(np.mean(np.square(y))) or 1.0)
+    c: Array = np.asarray(np.linalg.lstsq(rows, y, rcond=None)[0], dtype=float)
+    sigma = floor
+    for _ in range(ROUNDS):
+        weight = _weights(given.effects, float(c[1]), n)
+        sigma = max(_scatter(rows, y, weight) if noise is None else noise, floor)
+        solution = _solve(rows, y, weight, sigma)
+        c = solution.c
+    line = _solve(rows[:, :2], y, weight, sigma)
+    remainder = np.eye(n) - rows[:, :2] @ line.gain[:, :, 0]
+    residuals = y - rows[:, :2] @ line.c
+    values, gain = _relative(c, solution.gain[:, :, 0])
+    span = abs(float(c[1])) * full_scale
+    names, extra, extra_gain = _left_over(axis, rate, residuals, remainder)
+    return RateFit(
+        axis,
+        (*symbols(axis, order, asymmetry), *names),
+        np.concatenate([values, np.array(extra) / span]),
+        np.vstack([gain, *(row[None] / span for row in extra_gain)]),
+        float(c[1]),
+        residuals,
+        remainder,
+        sigma,
+        float(n - p) if noise is None else np.inf,
+        solution.chi2,
+        n - p,
+    )
+
+
+def _relative(c: Array, gain: Array) -> tuple[Array, Array]:
+    """Terms (p,) from linear coefficients, all but the first two over the second, with their gain (p, n)."""
+    values, made = c.copy(), gain.copy()
+    values[2:] = c[2:] / c[1]
+    made[2:] = (gain[2:] - values[2:, None] * gain[1]) / c[1]
+    return values, made
+
+
+def _left_over(
+    axis: str, rate: Array, residuals: Array, remainder: Array
+) -> tuple[list[str], list[float], list[Array]]:
+    """Non-linearity and hysteresis [output] where the test shows them: names, values, and rows of gain (n,)."""
+    names, values, rows = [], [], []
+    groups, way = levels(rate), approaches(rate)
+    if len(groups) > 2:
+        k = int(np.argmax(np.abs(residuals)))
+        names.append(f"S_nl_{axis}")
+        values.append(abs(float(residuals[k])))
+        rows.append(np.sign(residuals[k]) * remainder[k])
+    contrasts = []
+    for same in groups:
+        up, down = same[way[same] > 0], same[way[same] < 0]
+        if len(up) and len(down):
+            contrast = np.zeros(len(rate))
+            contrast[up], contrast[down] = 1.0 / len(up), -1.0 / len(down)
+            contrasts.append(contrast)
+    if contrasts:
+        largest = max(contrasts, key=lambda contrast: abs(float(contrast @ residuals)))
+        difference = float(largest @ residuals)
+        names.append(f"S_hyst_{axis}")
+        values.append(abs(difference))
+        rows.append(np.sign(difference) * (largest @ remainder))
+    return names, values, rows
+
+
+def _weights(effects: Sequence[Effect], scale: float, n: int) -> Weights:
+    """Covariance of the readings (one channel) without noise, for a scale factor."""
+    none = [np.zeros((n, 0))]
+    redrawn = scale * np.hstack(none + [effect.shift for effect in effects if effect.redrawn])
+    common = scale * np.hstack(none + [effect.shift for effect in effects if not effect.redrawn])
+    return Weights(np.square(redrawn).sum(axis=1)[:, None, None], common[:, None, :])
+
+
+def _solve(rows: Array, y: Array, weight: Weights, sigma: float) -> Solution:
+    """The weighted fit with that noise."""
+    return solve(rows[:, None, :], y[:, None], Weights(weight.within + sigma**2, weight.common))
+
+
+def _scatter(rows: Array, y: Array, weight: Weights) -> float:
+    """Noise with which chi2 is its degrees of freedom (Mandel and Paule 1970); 0 where the table explains it all."""
+    from scipy.optimize import brentq
+
+    dof = len(y) - rows.shape[1]
+    rest = y - rows @ np.linalg.lstsq(rows, y, rcond=None)[0]
+    low, high = FLOOR**2 * float(np.mean(np.square(y))), float(rest @ rest) / dof
+    if high <= low:
+        return 0.0
+
+    def excess(log_variance: float) -> float:
+        return float(_solve(rows, y, weight, np.exp(0.5 * log_variance)).chi2 - dof)
+
+    bottom, top = float(np.log(low)), float(np.log(2.0 * high))
+    if excess(bottom) <= 0.0:
+        return 0.0
+    return float(np.exp(0.5 * brentq(excess, bottom, top, xtol=1e-6)))

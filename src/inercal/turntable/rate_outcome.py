@@ -1,0 +1,246 @@
+"""The estimate of a rate test: terms with their covariance, budget, residual at each rate, and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.identifiability import Identifiability
+from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.status import Status
+from inercal.records.findings import Finding
+from inercal.records.places import counted
+from inercal.records.record import Record
+from inercal.turntable.outcome import COMMAND, WORST_CONDITION, provenance, unit_of_term
+from inercal.turntable.rate import Input, RateDwells
+from inercal.turntable.rate_fit import RateFit, approaches
+from inercal.turntable.settings import RateTest, TurntableSettings
+
+Array = NDArray[np.float64]
+
+SEEN = 5.0
+"""Standard uncertainties that a scale factor is above zero, lest the output has nothing to do with the rate."""
+
+MODEL = (
+    "y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3), x the rate about the gyro's axis: the table's rate times the "
+    "cosine of the axes, and the mean of earth rate over the stay; D_F holds what gravity does at this attitude"
+)
+
+REFERENCES = (
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+    "IEEE Std 952, Specification format guide and test procedure for single-axis interferometric fiber optic gyros",
+    "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
+    "Chemistry 42 (1970) 1194",
+)
+
+
+def assemble(
+    record: Record,
+    found: RateDwells,
+    settings: TurntableSettings,
+    findings: Sequence[Finding],
+    inputs: tuple[Input, ...],
+    fits: tuple[RateFit, ...],
+    full_scale: float,
+    known: Identifiability,
+) -> Estimate:
+    """Put the estimate together."""
+    unit = found.unit.si
+    names = tuple(name for fit in fits for name in fit.names)
+    found_sources = sources(found, inputs, fits, unit)
+    covariance, dof, budget = combine(names, found_sources)
+    values = np.concatenate([fit.values for fit in fits])
+    u = np.sqrt(np.diag(covariance))
+    status = Status.OK
+    message = f"{counted(len(names), 'term')} from {counted(len(found.rate), 'stay')} at rates"
+    for fit in fits:
+        k = names.index(f"S_{fit.axis}")
+        if abs(values[k]) < SEEN * u[k]:
+            status = Status.INCONSISTENT
+            message = f"the output of gyro_{fit.axis} does not follow the rate: check channel, axis and units"
+    if status is Status.OK and known.condition > WORST_CONDITION:
+        status = Status.ILL_CONDITIONED
+        weak = f"{known.weakest()} only weakly (condition number {known.condition:.0f})"
+        message = f"the rates fix {weak}: spread them wider"
+    test = settings.rate_test
+    assert test is not None
+    return Estimate(
+        names=names,
+        units=tuple(unit_of_term(name, unit) for name in names),
+        values=values,
+        covariance=covariance,
+        dof=dof,
+        k=np.array([coverage_factor(float(each)) for each in dof]),
+        status=status,
+        message=message,
+        findings=tuple(findings),
+        statistics={
+            "dof": float(min(fit.dof for fit in fits)),
+            "condition": known.condition,
+            "residual_rms": float(np.sqrt(np.mean([np.square(fit.residuals) for fit in fits]))),
+            "chi2": float(sum(fit.chi2 for fit in fits)),
+            "stays": float(len(found.rate)),
+        },
+        budget=budget,
+        result={
+            "rank": known.rank,
+            "null_vectors": [],
+            "plan": _plan(found, test, full_scale),
+            "tolerance_shares": _shares(settings, names, found_sources),
+            "instrument": settings.instrument.kind,
+            "rates": [
+                row
+                for given, fit in zip(inputs, fits, strict=True)
+                for row in _rows(found, given, fit, full_scale)
+            ],
+        },
+        **_common(record, found, settings),
+    )
+
+
+def unobservable(
+    record: Record,
+    found: RateDwells,
+    settings: TurntableSettings,
+    findings: Sequence[Finding],
+    rank: int,
+    words: Sequence[str],
+    said: str,
+) -> Estimate:
+    """An estimate without terms."""
+    test = settings.rate_test
+    assert test is not None
+    return Estimate(
+        names=(),
+        units=(),
+        values=np.zeros(0),
+        covariance=np.zeros((0, 0)),
+        dof=np.zeros(0),
+        k=np.zeros(0),
+        status=Status.UNOBSERVABLE,
+        message=said,
+        findings=tuple(findings),
+        statistics={"stays": float(len(found.rate))},
+        result={
+            "rank": rank,
+            "null_vectors": list(words),
+            "plan": _plan(found, test, test.full_scale or float(np.abs(found.rate).max(initial=0.0))),
+            "tolerance_shares": {},
+            "instrument": settings.instrument.kind,
+            "rates": [],
+        },
+        **_common(record, found, settings),
+    )
+
+
+def sources(
+    found: RateDwells, inputs: Sequence[Input], fits: Sequence[RateFit], unit: str
+) -> list[TypeA | TypeB]:
+    """Everything the terms are uncertain by: noise of each gyro, errors of the table, its rate, the latitude.
+
+    The table is common to the gyros: its errors make their terms correlated.
+    """
+    ends = np.cumsum([0, *(len(fit.names) for fit in fits)])
+    made: list[TypeA | TypeB] = []
+    for fit, begin in zip(fits, ends, strict=False):
+        gain = np.zeros((ends[-1], len(found.rate)))
+        gain[begin : begin + len(fit.names)] = fit.gain
+        name = f"noise of gyro_{fit.axis}"
+        if np.isinf(fit.noise_dof):
+            made.append(TypeB(name, fit.noise, unit, gain))
+        else:
+            made.append(TypeA(name, fit.noise, unit, fit.noise**2 * gain @ gain.T, fit.noise_dof))
+    everything = {effect.source: effect for given in inputs for effect in given.effects}
+    for source, effect in everything.items():
+        blocks = []
+        for given, fit in zip(inputs, fits, strict=True):
+            shift = next(
+                (own.shift for own in given.effects if own.source == source), np.zeros_like(effect.shift)
+            )
+            moved = fit.scale * shift / effect.u
+            blocks.append(
+                np.einsum("pn,nq->pnq", fit.gain, moved).reshape(len(fit.gain), -1)
+                if effect.redrawn
+                else fit.gain @ moved
+            )
+        sensitivity = np.vstack(blocks)
+        if np.any(sensitivity):
+            made.append(TypeB(source, effect.u, effect.unit, sensitivity))
+    return made
+
+
+def _rows(found: RateDwells, given: Input, fit: RateFit, full_scale: float) -> list[dict[str, Any]]:
+    """Residual of the best straight line in each stay, with its standard uncertainty."""
+    covariance = fit.noise**2 * fit.remainder @ fit.remainder.T
+    for effect in given.effects:
+        moved = fit.scale * effect.shift
+        part = np.diag(np.square(moved).sum(axis=1)) if effect.redrawn else moved @ moved.T
+        covariance = covariance + fit.remainder @ part @ fit.remainder.T
+    ppm = 1e6 / (abs(fit.scale) * full_scale)
+    u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    output = found.y[:, found.channels.index(f"gyro_{fit.axis}")]
+    way = {1: "below", -1: "above", 0: "rest"}
+    return [
+        {
+            "channel": f"gyro_{fit.axis}",
+            "rate_rad_s": float(found.rate[k]),
+            "output": float(output[k]),
+            "input_rad_s": float(given.x[k]),
+            "residual": float(fit.residuals[k]),
+            "u": float(u[k]),
+            "residual_ppm_of_full_scale": float(fit.residuals[k] * ppm),
+            "u_ppm_of_full_scale": float(u[k] * ppm),
+            "reached_from": way[int(direction)],
+        }
+        for k, direction in enumerate(approaches(found.rate))
+    ]
+
+
+def _plan(found: RateDwells, test: RateTest, full_scale: float) -> dict[str, Any]:
+    """The test in figures."""
+    return {
+        "name": f"rates about {test.joint}",
+        "positions": len(found.rate),
+        "joint": test.joint,
+        "full_scale_rad_s": full_scale,
+        "turns": "assumed whole" if found.assumed else "from the angles",
+    }
+
+
+def _shares(
+    settings: TurntableSettings, names: Sequence[str], found: Sequence[TypeA | TypeB]
+) -> dict[str, dict[str, float]]:
+    """Share of each error of the table, by itself, in the table's part of each term's variance."""
+    own = [
+        each for each in found if each.source in settings.chain.factors or each.source.startswith("cosine")
+    ]
+    parts = {each.source: np.diag(each.covariance) for each in own}
+    whole = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(names))
+    return {
+        name: {source: float(part[k] / whole[k]) for source, part in parts.items()}
+        for k, name in enumerate(names)
+        if whole[k] > 0.0
+    }
+
+
+def _common(record: Record, found: RateDwells, settings: TurntableSettings) -> dict[str, Any]:
+    """What every estimate of a rate test says."""
+    return {
+        "command": COMMAND,
+        "model": MODEL,
+        "conditions": {
+            "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
+            "temperature": None if settings.temperature is None else settings.temperature.text,
+            "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
+            "date": settings.traceability.get("date", ""),
+            "ranges": {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]},
+        },
+        "traceability": settings.traceability,
+        "inputs": record.sources,
+        "provenance": provenance(settings),
+        "references": REFERENCES,
+    }

@@ -1,0 +1,92 @@
+"""A simulated rate test: a gyro of known terms on a table that turns at each rate in its order."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import StudyError
+from inercal.instruments.by_angle import channel_model
+from inercal.records.record import Record
+from inercal.rigs.outputs import gravity_reference, rate_reference
+from inercal.turntable.model import channels_of, stated_values
+from inercal.turntable.rate import arc, over_turn, sensed
+from inercal.turntable.rate_calibration import check_rate_test
+from inercal.turntable.rate_fit import approaches
+from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.simulate import record_of
+from inercal.units import parse_unit
+
+Array = NDArray[np.float64]
+
+
+def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) -> Record:
+    """Turn the table at each rate of the study and record the gyros, one row for each stay.
+
+    Parameters
+    ----------
+    settings : TurntableSettings
+        The stated coefficients are the truth, those of rate tests among them (half of S_hyst is added where a rate
+        was reached from below, and taken off where from above); each error of the table is drawn by its scope.
+    rng : Generator
+
+    Returns
+    -------
+    Record
+        ``position``, ``rate`` [deg/s], angles [deg] (that of the turning joint at the start of the stay) and mean
+        outputs.
+
+    Raises
+    ------
+    StudyError
+        No rates, an instrument that is no gyro, or a true value of S_nl, which follows from the others.
+    """
+    check_rate_test(settings)
+    test, chain, instrument = settings.rate_test, settings.chain, settings.instrument
+    assert test is not None
+    assert settings.site.latitude is not None
+    if not test.rates:
+        raise StudyError("rate_test.rates", 'missing, expected rates such as ["-10 deg/s", "10 deg/s"]')
+    if any(symbol.startswith("S_nl") for symbol in instrument.coefficients):
+        raise StudyError("instrument.coefficients", "S_nl is not stated but follows, expected S2 or S3")
+    rate = np.array(test.rates)
+    n = len(rate)
+    angles = np.tile([test.at.get(joint, 0.0) for joint in chain.joints], (n, 1))
+    turning = chain.joints.index(test.joint)
+    errors = chain.draw(rng, n)
+    true_rate = rate * (1.0 + test.rate_u * rng.standard_normal())
+    turn = arc(angles[:, turning], true_rate * instrument.dwell)
+    w = sensed(chain, test.joint, rate_reference(settings.site.latitude), true_rate, angles, turn, errors)
+    f_n = -gravity_reference(settings.site.gravity)
+    f = over_turn(lambda at: f_n @ chain.attitude(at, errors), angles, turning, turn)
+    full_scale = test.full_scale or float(np.abs(rate).max())
+    y = []
+    channels = channels_of(settings)
+    for channel in channels:
+        model, axis = channel_model(instrument.kind, channel), channel[-1]
+        values = stated_values(settings, model)
+        x = w[:, "xyz".index(axis)]
+        asymmetry, second, third, hysteresis = (
+            instrument.coefficients.get(f"{symbol}_{axis}", 0.0)
+            for symbol in ("S_asym", "S2", "S3", "S_hyst")
+        )
+        bent = 0.5 * asymmetry * np.abs(x) + second * x**2 + third * x**3
+        bent = bent + 0.5 * hysteresis * full_scale * approaches(rate)
+        linear = model.linear(values)
+        y.append(model.regressors(f, w) @ linear + linear[model.symbols.index(f"S_{axis}")] * bent)
+    outputs: Array = np.stack(y, axis=-1)
+    if instrument.noise is not None:
+        outputs = outputs + rng.normal(0.0, instrument.noise, outputs.shape)
+    degrees = parse_unit("deg")
+    return record_of(
+        [
+            ("position", parse_unit("1"), np.arange(1.0, n + 1.0)),
+            ("rate", parse_unit("deg/s"), np.degrees(rate)),
+            *((name, degrees, np.degrees(angles[:, k])) for k, name in enumerate(chain.joints)),
+            *(
+                (channel, instrument.unit, outputs[:, k] / instrument.unit.factor)
+                for k, channel in enumerate(channels)
+            ),
+        ],
+        np.asarray(instrument.dwell * (np.arange(n) + 0.5)),
+    )

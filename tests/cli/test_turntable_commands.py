@@ -1,0 +1,255 @@
+"""The commands on a study of a turntable: what they print, what they write, how they end."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from inercal.cli import run
+
+STUDY = """
+[site]
+latitude = "39.1 deg"
+gravity = "9.8 m/s^2"
+[rig]
+kind = "two_axis_turntable"
+[rig.errors]
+default = { uniform = "2 arcmin" }
+[positions]
+grid = { phi1 = 6, phi2 = 6 }
+[instrument]
+unit = "deg/h"
+noise = "0.01 deg/h"
+[instrument.coefficients]
+DX_F = "50 deg/h"
+DX_X = "60 deg/h/g"
+DX_XX = "2 deg/h/g^2"
+k_x = "1"
+[design]
+positions = 14
+candidates = { phi1 = 8, phi2 = 8, offset = "none" }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("t.toml").write_text(STUDY)
+    return tmp_path
+
+
+def as_json(arguments, capsys, code=0):
+    """The one object on standard output."""
+    assert run([*arguments, "--json", "--quiet"]) == code
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return json.loads(captured.out, parse_constant=lambda text: pytest.fail(f"{text} is not JSON"))
+
+
+def refused(arguments, capsys, *words):
+    """Exit code 2, nothing on standard output, one line with the words on standard error."""
+    for more in ([], ["--json"]):
+        assert run([*arguments, *more]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert captured.err.count("\n") == 1, captured.err
+        assert captured.err.startswith("inercal: error: ")
+        for word in words:
+            assert word in captured.err
+
+
+def test_sensitivity_prints_the_contract(folder, capsys):
+    data = as_json(["sensitivity", "t.toml"], capsys)
+    assert data["command"] == "sensitivity"
+    assert data["status"]["code"] == "ok"
+    assert set(data["timing_s"]) == {"read", "solve", "total"}
+    assert data["timing_s"]["solve"] < data["timing_s"]["total"]
+    assert [source["path"] for source in data["inputs"]] == ["t.toml"]
+    found = data["result"]
+    assert set(found) >= {
+        "factors", "outputs", "positions", "mean", "weighted", "aggregate", "flagged",
+    }  # fmt: skip
+    assert len(found["positions"]["phi1"]) == 36
+    assert np.sum(found["weighted"]["total"], axis=1) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_sensitivity_for_people_and_its_maps(folder, capsys):
+    assert run(["sensitivity", "t.toml", "--out", "m.nc"]) == 0
+    captured = capsys.readouterr()
+    assert "dphi_y1" in captured.out
+    assert "positioning of the outer axis" in captured.out
+    assert "maps: m.nc" in captured.err
+    with xarray.open_dataset("m.nc", engine="scipy") as maps:
+        assert maps["second"].shape == (5, 36, 11, 11)
+    assert run(["sensitivity", "t.toml", "--out", "m.npz", "--quiet"]) == 0
+    assert np.load("m.npz")["first"].shape == (5, 36, 11)
+
+
+def test_sensitivity_rounds_samples_up_and_says_so(folder, capsys):
+    command = ["sensitivity", "t.toml", "--set", "analysis.method=sampled", "--set", "analysis.samples=5"]
+    assert run([*command, "--set", "positions={list=[['10 deg', '20 deg']]}"]) == 0
+    assert "5 samples rounded up to 8, a power of two, for Sobol points" in capsys.readouterr().err
+
+
+def test_flagged_positions_leave_the_status_ok(folder, capsys):
+    data = as_json(["sensitivity", "t.toml", "--set", 'positions.grid.offset="none"'], capsys)
+    assert data["status"]["code"] == "ok"
+    assert {"output": "az", "phi1": 0.0, "phi2": 0.0}.items() <= next(
+        flag for flag in data["result"]["flagged"] if flag["output"] == "az"
+    ).items()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["sensitivity", "no.toml"], ["no.toml", "cannot be read"]),
+        (["sensitivity", "t.toml", "--set", "site.latitude=120 deg"], ["t.toml: site.latitude", "'120 deg'"]),
+        (
+            ["sensitivity", "t.toml", "--set", "rig.erors={}"],
+            ["rig.erors: unknown key, did you mean errors?"],
+        ),
+        (["sensitivity", "t.toml", "--set", "rig.errors={}"], ["rig.errors: found no errors of the table"]),
+        (
+            ["sensitivity", "t.toml", "--set", "rig.errors.default.uniform=0 deg"],
+            ["rig.errors.default.uniform: found '0 deg'", 'left out with NAME = "none"'],
+        ),
+        (["sensitivity", "twice.toml"], ["twice.toml: line 8: default is given a second time"]),
+        (["sensitivity", "t.toml", "--out", "m.csv"], ["m.csv", "expected .nc or .npz"]),
+        (["sensitivity", "imu.toml"], ["a study for `inercal calibrate imu`"]),
+        (["calibrate", "imu", "log.csv", "--study", "t.toml"], ["a study for `inercal calibrate turntable`"]),
+        (["simulate", "turntable", "t.toml"], ["--out: missing"]),
+        (["simulate", "turntable", "t.toml", "--out", "t.toml"], ["found the suffix '.toml'"]),
+        (["simulate", "turntable", "t.toml", "--seed", "-1", "--out", "x.csv"], ["--seed: found -1"]),
+        (["design", "positions", "t.toml", "--out", "p.nc"], ["p.nc", "expected .json or .csv"]),
+        (["design", "positions", "t.toml", "--set", "design.compare=['x']"], ["design.compare.0: found 'x'"]),
+        (["design"], ["design: found no kind, expected positions"]),
+        (["simulate"], ["simulate: found no kind, expected turntable"]),
+        (["calibrate", "turntable", "no.csv", "--study", "t.toml"], ["no.csv"]),
+        (["calibrate", "turntable", "t.toml", "--study", "t.toml"], ["t.toml"]),
+    ],
+)
+def test_bad_studies_and_usage_get_one_line(arguments, words, folder, capsys):
+    again = 'default = { normal = "1 deg" }\n[positions]'
+    Path("twice.toml").write_text(STUDY.lstrip().replace("[positions]", again))
+    Path("imu.toml").write_text('[site]\nlatitude = "1 deg"\n[imu]\n')
+    before = sorted(folder.iterdir())
+    refused(arguments, capsys, *words)
+    assert sorted(folder.iterdir()) == before
+
+
+def test_the_seed_makes_the_recording(folder, capsys):
+    for seed, name in ((5, "a.csv"), (5, "b.csv"), (6, "c.csv")):
+        assert run(["simulate", "turntable", "t.toml", "--seed", str(seed), "--out", name]) == 0
+    a, b, c = (Path(name).read_text() for name in ("a.csv", "b.csv", "c.csv"))
+    assert a == b != c
+    head = a.splitlines()[0].split(",")
+    assert {"phi1 [deg]", "phi2 [deg]", "y_x [deg/h]"} <= set(head)
+    assert len(a.splitlines()) == 37
+
+
+def test_a_simulated_recording_is_calibrated_to_its_truth(folder, capsys):
+    """The true coefficients lie within five standard uncertainties; per g^2 at 9.8 m/s^2 is (9.8/9.80665)^2."""
+    assert run(["simulate", "turntable", "t.toml", "--seed", "2", "--out", "r.csv", "--quiet"]) == 0
+    capsys.readouterr()
+    data = as_json(["calibrate", "turntable", "r.csv", "--study", "t.toml", "--out", "cal.json"], capsys)
+    assert (data["command"], data["status"]["code"]) == ("calibrate turntable", "ok")
+    unit = math.radians(1.0) / 3600.0
+    true = {"DX_F": 50 * unit, "DX_X": 60 * unit * 9.8 / 9.80665, "DX_XX": 2 * unit * (9.8 / 9.80665) ** 2}
+    found = {p["name"]: p for p in data["parameters"]}
+    for name, value in true.items():
+        assert abs(found[name]["value"] - value) < 5 * found[name]["u"]
+    assert {"rank", "null_vectors", "plan", "tolerance_shares"} <= data["result"].keys()
+    assert set(data["timing_s"]) == {"read", "solve", "total"}
+    assert {source["path"] for source in data["inputs"]} == {"r.csv", "t.toml"}
+    assert json.loads(Path("cal.json").read_text())["parameters"] == data["parameters"]
+
+
+def test_people_see_the_unit_of_the_record(folder, capsys):
+    run(["simulate", "turntable", "t.toml", "--seed", "2", "--out", "r.csv", "--quiet"])
+    capsys.readouterr()
+    assert run(["calibrate", "turntable", "r.csv", "--study", "t.toml"]) == 0
+    row = next(line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("DX_F"))
+    assert row[-1] == "deg/h"
+    assert float(row[1]) == pytest.approx(50.0, abs=1.0)
+
+
+def test_an_unidentified_term_ends_unobservable_with_its_null_vector(folder, capsys):
+    """Quarter turns of both axes do not tell the products of gravity apart from nothing."""
+    plan = ["--set", "positions={plan='16-cube'}"]
+    assert run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet", *plan]) == 0
+    capsys.readouterr()
+    data = as_json(["calibrate", "turntable", "r.csv", "--study", "t.toml"], capsys, code=1)
+    assert data["status"]["code"] == "unobservable"
+    assert "DX_XY" in data["status"]["message"]
+
+
+def test_design_writes_positions_that_a_table_can_be_told(folder, capsys):
+    data = as_json(["design", "positions", "t.toml", "--out", "p.csv"], capsys)
+    found = data["result"]
+    assert set(found) >= {"positions", "rank", "condition", "d_efficiency", "predicted", "compare"}
+    assert len(found["positions"]) == 14
+    lines = Path("p.csv").read_text().splitlines()
+    assert lines[0] == "phi1 [deg],phi2 [deg]"
+    rows = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
+    np.testing.assert_allclose(np.radians(rows), found["positions"], atol=1e-9)
+    assert set(rows.ravel()) <= set(np.arange(0.0, 360.0, 45.0))
+    assert set(data["timing_s"]) == {"read", "solve", "total"}
+    assert run(["design", "positions", "t.toml", "--out", "p.json", "--quiet"]) == 0
+    assert "24-position" in capsys.readouterr().out
+    assert json.loads(Path("p.json").read_text())["result"]["positions"] == found["positions"]
+
+
+def test_new_writes_a_study_that_runs_and_a_map(folder, capsys):
+    assert run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet"]) == 0
+    capsys.readouterr()
+    data = as_json(["new", "turntable", "r.csv"], capsys)
+    assert data["result"] == {"study": "turntable.toml", "map": "turntable-map.toml"}
+    command = ["calibrate", "turntable", "r.csv", "--map", "turntable-map.toml", "--study", "turntable.toml"]
+    found = as_json([*command, "--set", "site.latitude=39.1 deg"], capsys)
+    assert found["status"]["code"] == "ok"
+    refused(["new", "turntable"], capsys, "turntable.toml: exists already")
+
+
+RATES = """
+[site]
+latitude = "39.1 deg"
+[rig]
+kind = "two_axis_turntable"
+[instrument]
+kind = "gyro"
+unit = "deg/h"
+noise = "0.1 deg/h"
+[instrument.coefficients]
+D_F_z = "5 deg/h"
+S_z = "1.001"
+[rate_test]
+rates = ["-30 deg/s", "-10 deg/s", "-3 deg/s", "3 deg/s", "10 deg/s", "30 deg/s"]
+"""
+
+
+def test_a_rate_test_is_simulated_and_calibrated(folder, capsys):
+    """The gyro along the turning axis (z of the inner one) shows its true scale factor within 5 u."""
+    Path("rates.toml").write_text(RATES)
+    assert run(["simulate", "turntable", "rates.toml", "--seed", "3", "--out", "r.csv", "--quiet"]) == 0
+    capsys.readouterr()
+    data = as_json(["calibrate", "turntable", "r.csv", "--study", "rates.toml", "--report", "r.html"], capsys)
+    found = next(p for p in data["parameters"] if p["name"] == "S_z")
+    assert abs(found["value"] - 1.001) < 5 * found["u"] < 1e-3
+    assert Path("r.html").exists()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["sensitivity", "t.toml"],
+        ["design", "positions", "t.toml"],
+        ["calibrate", "turntable", "r.csv", "--study", "t.toml"],
+    ],
+)
+def test_reports(command, folder, capsys):
+    run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet"])
+    assert run([*command, "--report", "r.html", "--quiet"]) == 0
+    assert Path("r.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
