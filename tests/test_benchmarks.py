@@ -15,6 +15,7 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
         (["imu_calibration.py", "--smoke"], "inercal, solve"),
         (["imu_coverage.py", "--runs", "2"], "all together"),
         (["sensitivity.py", "--smoke"], "inercal, exact"),
+        (["turntable_coverage.py", "--runs", "2"], "all together"),
     ],
 )
 def test_a_small_run(command, says, tmp_path):

@@ -74,18 +74,24 @@ def judge(name: str, plan: Candidates, basis: Array, prediction: Criterion) -> P
     size = np.square(unseen) @ np.diag(prediction.weights)
     lost = np.einsum("ki,ij,kj->k", unseen, prediction.weights, unseen) > _PART**2 * size
     rms = math.inf if np.any(lost) else math.sqrt(prediction.value(known.unit_covariance[:p, :p]))
-    terms = [str(k) for k in range(basis.shape[1])]
-    functions = identify(basis, terms, sizes=np.ones(len(terms)))
-    efficiency = 0.0
-    if functions.rank == len(terms):
-        efficiency = float(np.exp(np.mean(np.log(np.square(functions.singular_values) / len(basis)))))
+    condition, efficiency = in_basis(basis)
     return PlanFigures(
         name=name,
         positions=len(plan),
         rank=p - len(null),
         unidentified=tuple(in_words(v, plan.names) for v in null),
-        condition=functions.condition,
+        condition=condition,
         d_efficiency=efficiency,
         u=u,
         rms_prediction=rms,
     )
+
+
+def in_basis(basis: Array) -> tuple[float, float]:
+    """Condition number and D-efficiency of positions from orthonormal functions (N, b) there; inf and 0 where the
+    rank is not b."""
+    terms = [str(k) for k in range(basis.shape[1])]
+    known = identify(basis, terms, sizes=np.ones(len(terms)))
+    if known.rank < len(terms):
+        return math.inf, 0.0
+    return known.condition, float(np.exp(np.mean(np.log(np.square(known.singular_values) / len(basis)))))

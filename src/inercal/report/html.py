@@ -41,7 +41,8 @@ _GROUPS = {
 #: key -> plain name and unit, where the key alone does not say them
 _LABELS = {
     "dof": ("degrees of freedom", ""),
-    "condition": ("condition number of the scaled Jacobian", ""),
+    "condition": ("condition number", ""),
+    "column_condition": ("condition number of the terms, columns scaled to one length", ""),
     "residual_rms": ("root-mean-square residual |f| − g", "m/s²"),
     "residual_m_s2": ("residual |f| − g", "m/s²"),
     "scatter": ("standard deviation of |f| in a pose about the fit", "m/s²"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,28 +54,41 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
     StudyError
         Fewer readings than terms, or no value stated for terms of the earth rate that cannot be fitted.
     """
-    whole = table_model(settings, found.channels)
-    of_rate = rate_terms(whole)
-    choice = settings.instrument.earth_rate
-    model, what, findings = whole, known(whole, found.angles), list(found.findings)
-    if of_rate and (choice == "stated" or (choice is None and any(each.words for each in what))):
-        rest = table_model(settings, found.channels, of_rate)
-        without = known(rest, found.angles)
-        if choice == "stated" or leaves_rates_unknown(what, without):
-            if choice is None:
-                free = next(w for each in what for w in each.words if set(w.split()) & set(of_rate))
-                said = (
-                    f"the positions do not identify the terms of the earth rate ({free} is free): earth rate is "
-                    f"subtracted with stated {', '.join(of_rate)}"
-                )
-                findings.append(Finding("stated_earth_rate", said))
-            model, what = rest, without
-    stated = _stated(model, settings, found.angles)
+    model, what, free = choose_terms(settings, found.channels, found.angles)
+    stated, findings = _stated(model, settings, found.angles), list(found.findings)
+    if free:
+        said = (
+            f"the positions do not identify the terms of the earth rate ({free} is free): earth rate is subtracted "
+            f"with stated {', '.join(stated.symbols)}"
+        )
+        findings.append(Finding("stated_earth_rate", said))
     if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
         return Fitting(model, what, stated, None, tuple(findings))
     noise = [settings.instrument.noise] * len(found.channels)
     done = fit(model, found.angles, found.y, noise, samples=found.samples)
     return Fitting(model, what, stated, done, tuple(findings))
+
+
+def choose_terms(
+    settings: TurntableSettings, channels: Sequence[str], angles: Array
+) -> tuple[TableModel, tuple[Known, ...], str]:
+    """The terms to be fitted at these positions, and what these tell of them.
+
+    The terms of the earth rate are among them as the study says; where it says nothing, if the positions identify
+    them. Where they do not, the third is the combination that would be free, in words.
+    """
+    whole = table_model(settings, channels)
+    what, rates, choice = known(whole, angles), rate_terms(whole), settings.instrument.earth_rate
+    if not rates or choice == "fitted" or (choice is None and not any(each.words for each in what)):
+        return whole, what, ""
+    rest = table_model(settings, channels, rates)
+    without = known(rest, angles)
+    if choice == "stated":
+        return rest, without, ""
+    if not leaves_rates_unknown(what, without):
+        return whole, what, ""
+    free = next(words for each in what for words in each.words if set(words.split()) & set(rates))
+    return rest, without, free
 
 
 def leaves_rates_unknown(whole: tuple[Known, ...], without: tuple[Known, ...]) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.design.spherical import basis
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
 from inercal.instruments.polynomial import ChannelModel
@@ -137,6 +138,16 @@ def table_model(
         stated.append((rest, np.array([linear[symbol] for symbol in rest.symbols])))
     a_n = gravity_reference() if instrument.kind == "gyrowheel" else -gravity_reference(site.gravity)
     return TableModel(settings.chain, a_n, rate_reference(site.latitude), tuple(chosen), tuple(stated))
+
+
+def orthonormal(model: TableModel, angles: Array) -> Array:
+    """Functions (n, b) of the direction of gravity, orthonormal over the sphere: as many as the terms have orders.
+
+    Nine, up to second order, or four, up to first (`inercal.design.spherical.basis`).
+    """
+    quadratic = any(each.order > 1 for channel in model.channels for each in channel.monomials)
+    made = basis(gravity_reference() @ model.chain.attitude(angles))
+    return made if quadratic else made[:, :4]
 
 
 def channels_of(settings: TurntableSettings) -> tuple[str, ...]:

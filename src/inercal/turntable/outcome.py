@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.design.comparison import in_basis
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.estimate.status import Status
@@ -18,6 +19,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.fitting import Fitting, fewest_positions
+from inercal.turntable.model import orthonormal
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression
 from inercal.turntable.settings import TurntableSettings
@@ -142,7 +144,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "rank": min(ranks),
         "terms": max(len(channel.symbols) for channel in fitting.model.channels),
         "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
-        "plan": {"name": _plan_name(found, settings), "positions": len(found.y)},
+        "plan": _plan(found, fitting, settings),
         "instrument": settings.instrument.kind,
         "earth_rate": "stated" if fitting.stated.earth_rate else "fitted",
     }
@@ -230,7 +232,8 @@ def _statistics(found: Readings, fitting: Fitting) -> Mapping[str, float]:
     assert fit is not None
     return {
         "dof": float(fit.dof),
-        "condition": max(each.identifiability.condition for each in fitting.known),
+        "condition": in_basis(orthonormal(fitting.model, found.angles))[0],
+        "column_condition": max(each.identifiability.condition for each in fitting.known),
         "residual_rms": float(np.sqrt(np.mean(np.square(fit.residuals)))),
         "chi2": fit.chi2,
         "positions": float(len(found.y)),
@@ -312,13 +315,19 @@ def provenance(settings: TurntableSettings) -> dict[str, Any]:
     return {"settings": settings.given, "seed": None, "versions": versions}
 
 
-def _plan_name(found: Readings, settings: TurntableSettings) -> str:
-    """Name of the study's plan, where the record holds its positions."""
-    plan = settings.plan.angles
-    if plan.shape != found.angles.shape:
-        return "of the record"
-    apart = np.abs(np.remainder(plan - found.angles + np.pi, 2.0 * np.pi) - np.pi)
-    return settings.plan.name if apart.max() < 1e-3 else "of the record"
+def _plan(found: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:
+    """The positions in figures, and their name where the record holds those of the study's plan."""
+    plan, name = settings.plan.angles, "of the record"
+    if plan.shape == found.angles.shape:
+        apart = np.abs(np.remainder(plan - found.angles + np.pi, 2.0 * np.pi) - np.pi)
+        name = settings.plan.name if apart.max() < 1e-3 else name
+    condition, efficiency = in_basis(orthonormal(fitting.model, found.angles))
+    return {
+        "name": name,
+        "positions": len(found.y),
+        "condition": condition,
+        "d_efficiency": efficiency,
+    }
 
 
 def unit_of_term(symbol: str, output: str) -> str:

@@ -14,13 +14,12 @@ from inercal.design.candidates import Candidates
 from inercal.design.comparison import PlanFigures, judge
 from inercal.design.criteria import Criterion, D, a_criterion
 from inercal.design.exchange import exchange
-from inercal.design.spherical import basis
 from inercal.errors import StudyError
 from inercal.records.findings import Finding
-from inercal.rigs.outputs import gravity_reference, table_outputs
+from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
-from inercal.turntable.fitting import rate_terms
-from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
+from inercal.turntable.fitting import choose_terms, rate_terms
+from inercal.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
 from inercal.turntable.outcome import unit_of_term
 from inercal.turntable.regression import fit, full_inputs, known, weights
 from inercal.turntable.settings import TurntableSettings
@@ -137,7 +136,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     if len(settings.plan) != len(asked.candidates):
         plans.append(settings.plan)
     plans += [named(name) for name in asked.compare if name != settings.plan.name]
-    judged = tuple(_judged(plan, settings, model, c) for plan in plans)
+    judged = tuple(_judged(plan, settings, model) for plan in plans)
     unit = settings.instrument.unit.si
     return Designed(
         plan=plans[0],
@@ -156,56 +155,67 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     )
 
 
-def _judged(plan: Plan, settings: TurntableSettings, model: TableModel, c: Array) -> Judged:
+def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judged:
     """Figures of a plan, with table errors; the earth rate as `calibrate` would treat it there."""
-    seen, earth_rate = known(model, plan.angles), "fitted" if rate_terms(model) else "stated"
-    ranks = [each.identifiability.rank for each in seen]
-    words = tuple(text for each in seen for text in each.words)
-    used, rates = model, rate_terms(model)
-    if words and rates and settings.instrument.earth_rate is None:
-        used, earth_rate = table_model(settings, channels_of(settings), rates), "stated"
-        c = c[[symbol not in rates for symbol in model.symbols]]
+    channels = channels_of(settings)
+    whole = (
+        known(table_model(settings, channels), plan.angles)
+        if rate_terms(model)
+        else known(model, plan.angles)
+    )
+    used, seen, _ = choose_terms(settings, channels, plan.angles)
+    c = _expected(settings, used)
     candidates = _candidates(used, plan.angles, c, settings, True)
     prediction = Criterion("I", sphere_moments(used) / len(used.channels))
-    figures = judge(plan.name, candidates, functions(used, plan.angles), prediction)
+    figures = judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
     shares: Mapping[str, float] = {}
-    if not any(each.words for each in known(used, plan.angles)):
+    if not any(each.words for each in seen):
+        noise, samples = [settings.instrument.noise] * len(channels), _samples(settings, plan.angles)
         y = used.outputs(plan.angles, c)
-        shares = drift_shares(fit(used, plan.angles, y, [settings.instrument.noise] * y.shape[1], start=c))
+        shares = drift_shares(fit(used, plan.angles, y, noise, start=c, samples=samples))
     return Judged(
         plan,
-        replace(figures, rank=min(ranks), unidentified=words),
+        replace(
+            figures,
+            rank=min(each.identifiability.rank for each in whole),
+            unidentified=tuple(words for each in whole for words in each.words),
+        ),
         max(len(channel.symbols) for channel in model.channels),
         used.symbols,
-        earth_rate,
+        "fitted" if rate_terms(used) else "stated",
         shares,
     )
 
 
 def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:
     """The terms that are to be identified, their expected linear coefficients, and remarks."""
-    model = table_model(settings, channels_of(settings))
+    model, what, free = choose_terms(settings, channels_of(settings), settings.design.candidates.angles)
     findings: list[Finding] = []
-    candidates, choice = settings.design.candidates.angles, settings.instrument.earth_rate
-    rates = rate_terms(model)
-    if rates and (
-        choice == "stated" or (choice is None and any(each.words for each in known(model, candidates)))
-    ):
-        findings.append(
-            Finding("stated_earth_rate", f"{', '.join(rates)} are taken as stated and not fitted")
-        )
-        model = table_model(settings, channels_of(settings), rates)
-    lost = [words for each in known(model, candidates) for words in each.words]
+    if free:
+        said = f"no choice of positions identifies the terms of the earth rate ({free} is free): they are as stated"
+        findings.append(Finding("stated_earth_rate", said))
+    lost = [words for each in what for words in each.words]
     if lost:
-        raise StudyError("design", f"no plan on this table identifies {'; '.join(lost)}: leave terms out")
+        raise StudyError(
+            "design", f"no plan on this table identifies {'; '.join(lost)}, expected fewer terms"
+        )
     if settings.design.table_errors and not settings.instrument.coefficients:
         said = (
             "no coefficients are expected of the instrument: what the table's errors do to its readings cannot be "
             "foreseen; state them under [instrument.coefficients]"
         )
         findings.append(Finding("no_coefficients", said))
-    c = np.concatenate([channel.linear(stated_values(settings, channel)) for channel in model.channels])
-    return model, c, findings
+    return model, _expected(settings, model), findings
+
+
+def _expected(settings: TurntableSettings, model: TableModel) -> Array:
+    """Linear coefficients (p,) that the study expects of the instrument."""
+    return np.concatenate([channel.linear(stated_values(settings, channel)) for channel in model.channels])
+
+
+def _samples(settings: TurntableSettings, angles: Array) -> NDArray[np.int64]:
+    """Rows (n,) behind each reading."""
+    return np.full(len(angles), settings.instrument.samples)
 
 
 def _candidates(
@@ -214,7 +224,7 @@ def _candidates(
     """What each position tells, with the table's errors or without."""
     noise = np.full(len(model.channels), settings.instrument.noise)
     std = None if table_errors else np.zeros(len(model.chain.errors))
-    weight = weights(model, angles, c, noise, std)
+    weight = weights(model, angles, c, noise, std, _samples(settings, angles))
     return Candidates(
         model.symbols, model.rows(angles), weight.within, weight.common if table_errors else None
     )
@@ -229,13 +239,6 @@ def _criterion(name: str, model: TableModel) -> Criterion:
             np.diag(np.concatenate([full_inputs(model, channel) for channel in model.channels]))
         )
     return Criterion("I", sphere_moments(model))
-
-
-def functions(model: TableModel, angles: Array) -> Array:
-    """The orthonormal functions (n, b) of the direction of gravity: up to second order, or to first."""
-    quadratic = any(each.order > 1 for channel in model.channels for each in channel.monomials)
-    made = basis(gravity_reference() @ model.chain.attitude(angles))
-    return made if quadratic else made[:, :4]
 
 
 def _largest_index(settings: TurntableSettings) -> Array:

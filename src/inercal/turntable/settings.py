@@ -65,6 +65,11 @@ class Instrument:
     rate: float | None = None
     earth_rate: Literal["fitted", "stated"] | None = None
 
+    @property
+    def samples(self) -> int:
+        """Rows of a record behind each reading."""
+        return 1 if self.rate is None else max(1, round(self.rate * self.dwell))
+
 
 @dataclass(frozen=True)
 class Constraint:

@@ -44,7 +44,7 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
     model, c = truth(settings)
     instrument, plan = settings.instrument, settings.plan
     n = len(plan)
-    per_dwell = 1 if instrument.rate is None else max(1, round(instrument.rate * instrument.dwell))
+    per_dwell = instrument.samples
     errors = np.repeat(model.chain.draw(rng, n)[:, None, :], per_dwell, axis=1)
     for k, error in enumerate(model.chain.errors):
         if error.scope is Scope.SAMPLE:
