@@ -92,7 +92,8 @@ def exchange(
             )
         found.append(np.sort(indices[_improved(W, p, weights, first, repeats)]))
     values = np.array([criterion.value(covariance(candidates.take(chosen))) for chosen in found])
-    best = int(np.argmin(values))
+    # of determinants as such, whose logarithms may be near zero
+    best = _first_least(np.exp(values - values.min()) if criterion.weights is None else values)
     return Design(found[best], float(values[best]), values)
 
 
@@ -121,10 +122,10 @@ def _start(rows: Array, n: int, repeats: bool, rng: np.random.Generator) -> Indi
     m, _, p = rows.shape
     unseen, chosen = np.eye(p), np.zeros(0, dtype=np.intp)
     while len(unseen) and len(chosen) < n:
-        direction = rng.standard_normal(len(unseen)) @ unseen
+        direction = rng.standard_normal(p) @ unseen.T @ unseen
         seen = np.sum(np.square(rows @ direction), axis=1)
         seen[chosen] = -1.0  # nothing new
-        chosen = np.append(chosen, np.argmax(seen))
+        chosen = np.append(chosen, _first_least(-seen))
         _, s, vt = np.linalg.svd(rows[chosen].reshape(-1, p))
         unseen = vt[int(np.sum(s > _SINGULAR * s[0])) :]
     if len(unseen):
@@ -143,13 +144,19 @@ def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: 
         factor = _factors(state, int(chosen[k]))
         if not repeats:
             factor[chosen] = np.inf
-        best = int(np.argmin(factor))
+        best = _first_least(factor)
         unchanged += 1
         if factor[best] < 1.0 - _GAIN:
             chosen[k], unchanged = best, 0
             state = _state(W, p, weights, chosen)
         k = (k + 1) % n
     return chosen
+
+
+def _first_least(values: Array) -> int:
+    """Index of the first value that is least but for rounding, so that ties end alike on every machine."""
+    least = float(values.min())
+    return int(np.argmax(values <= least + _GAIN * abs(least)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,8 @@ def combine(
     -------
     covariance : (p, p)
     dof : (p,)
-        Effective degrees of freedom of each parameter (Welch-Satterthwaite, GUM G.4); inf without type A.
+        Effective degrees of freedom of each parameter (Welch-Satterthwaite, GUM G.4), at least 1; inf without
+        type A.
     budget : tuple of `BudgetItem`
         In the order of the sources; a parameter to which a source adds nothing has no share there.
     """
@@ -80,7 +81,7 @@ def combine(
             weight += np.diag(source.covariance) ** 2 / source.dof
     variance = np.diag(total)
     with np.errstate(divide="ignore", invalid="ignore"):
-        dof = np.where(weight > 0, variance**2 / weight, np.inf)
+        dof = np.where(weight > 0, np.maximum(variance**2 / weight, 1.0), np.inf)
     budget = tuple(_item(names, source, variance) for source in sources)
     return total, dof, budget
 

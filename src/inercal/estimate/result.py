@@ -144,6 +144,6 @@ def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
         places = max(0, 1 - first)
         # + 0.0 takes the sign off a zero
         return tuple(f"{round(x, 1 - first) + 0.0:.{places}f}" for x in (value, u, *others))
-    value = round(value, 1 - first)  # no digits below the last of u, also of a value smaller than u
+    value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
     digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
     return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))

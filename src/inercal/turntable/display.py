@@ -96,3 +96,27 @@ def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
             for row in changed["table_errors"]
         ]
     return changed
+
+
+def tolerances(estimate: Estimate) -> str:
+    """For each coefficient the error of the table that matters most, and what halving that would bring, as text.
+
+    Empty where the table has no errors or nothing was fitted.
+    """
+    shares, halved = estimate.result.get("tolerance_shares", {}), estimate.result.get("halved", {})
+    rows = []
+    for name, of_table in shares.items():
+        if of_table:
+            factor = max(of_table, key=lambda each: float(of_table[each]))
+            rows.append((name, factor, f"{100.0 * of_table[factor]:.0f} %", f"{halved[factor][name]:.2f}"))
+    if not rows:
+        return ""
+    head = ("", "largest error of the table", "of its part", "u x, if halved")
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(4)]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if i < 2 else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in (head, *rows)
+    )

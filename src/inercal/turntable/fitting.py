@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import StudyError
-from inercal.instruments.by_angle import channel_model
 from inercal.records.findings import Finding
-from inercal.turntable.model import TableModel, stated_values, table_model
+from inercal.turntable.model import TableModel, table_model
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Known, Regression, fit, known
 from inercal.turntable.settings import TurntableSettings
@@ -20,28 +19,16 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Stated:
-    """Terms that are taken from the study: ``symbols`` (q,), ``values`` (q,) and ``u`` (q,), in the linear form,
-    and the ``rows`` (n, c, q) by which they enter the readings; ``earth_rate`` if rates are among them."""
-
-    symbols: tuple[str, ...]
-    values: Array
-    u: Array
-    rows: Array
-    earth_rate: bool
-
-
-@dataclass(frozen=True, eq=False)
 class Fitting:
     """What a plan allows, and the fit if it allows one.
 
-    ``known`` rank and null vectors by channel, of the terms of ``model``; ``stated`` those that are not fitted and
-    matter; ``fit`` None where a term is not identified.
+    ``known`` rank and null vectors by channel, of the terms of ``model``; ``earth_rate`` whether its terms are
+    ``fitted`` or ``stated``; ``fit`` None where a term is not identified.
     """
 
     model: TableModel
     known: tuple[Known, ...]
-    stated: Stated
+    earth_rate: str
     fit: Regression | None
     findings: tuple[Finding, ...] = ()
 
@@ -52,21 +39,22 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
     Raises
     ------
     StudyError
-        Fewer readings than terms, or no value stated for terms of the earth rate that cannot be fitted.
+        No value stated for terms of the earth rate that cannot be fitted.
     """
     model, what, free = choose_terms(settings, found.channels, found.angles)
-    stated, findings = _stated(model, settings, found.angles), list(found.findings)
+    stated, findings = _stated_rates(model, settings), list(found.findings)
     if free:
         said = (
             f"the positions do not identify the terms of the earth rate ({free} is free): earth rate is subtracted "
-            f"with stated {', '.join(stated.symbols)}"
+            f"with {', '.join(stated)}"
         )
         findings.append(Finding("stated_earth_rate", said))
+    earth_rate = "stated" if stated else "fitted"
     if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
-        return Fitting(model, what, stated, None, tuple(findings))
+        return Fitting(model, what, earth_rate, None, tuple(findings))
     noise = [settings.instrument.noise] * len(found.channels)
     done = fit(model, found.angles, found.y, noise, samples=found.samples)
-    return Fitting(model, what, stated, done, tuple(findings))
+    return Fitting(model, what, earth_rate, done, tuple(findings))
 
 
 def choose_terms(
@@ -111,33 +99,27 @@ def rate_terms(model: TableModel) -> tuple[str, ...]:
     )
 
 
-def _stated(model: TableModel, settings: TurntableSettings, angles: Array) -> Stated:
-    """What the model takes as stated, in the linear form; all terms of the earth rate, others where they matter."""
-    instrument = settings.instrument
-    a, w = model.inputs(angles)
-    symbols: list[str] = []
-    values, u, rows, said = [], [], [], []
-    for k, (channel, linear) in enumerate(model.stated):
-        full = channel_model(instrument.kind, channel.channel)
-        # a misalignment enters times the scale factor, whose own small uncertainty does not matter to it
-        lead = full.gain(stated_values(settings, full))
-        regressors = channel.regressors(a, w)
-        for j, (symbol, each) in enumerate(zip(channel.symbols, channel.monomials, strict=True)):
-            own_u = instrument.coefficients_u.get(symbol, 0.0) * (lead if symbol in full.relative else 1.0)
+def _stated_rates(model: TableModel, settings: TurntableSettings) -> tuple[str, ...]:
+    """The terms of the earth rate that are not fitted, each with its value as ``k_x = 1``.
+
+    Raises
+    ------
+    StudyError
+        None of them is stated, and the output is in no unit of rate.
+    """
+    found, said = [], False
+    for part in model.stated:
+        for symbol, each, value in zip(
+            part.channel.symbols, part.channel.monomials, part.values, strict=True
+        ):
             if each.of_rate:
-                said.append(symbol in instrument.coefficients or bool(linear[j]))
-            if each.of_rate or linear[j] or own_u:
-                row = np.zeros((len(angles), len(model.channels)))
-                row[:, k] = regressors[:, j]
-                symbols.append(symbol)
-                values.append(linear[j])
-                u.append(own_u)
-                rows.append(row)
-    if said and not any(said):
+                found.append(f"{symbol} = {value:.6g}")
+                said = said or symbol in settings.instrument.coefficients or bool(value)
+    if found and not said:
+        names = ", ".join(text.partition(" ")[0] for text in found)
         raise StudyError(
             "instrument.coefficients",
-            f"none of {', '.join(symbols)} is stated, expected one or more: they are not fitted, and the output is in "
-            "no unit of rate",
+            f"none of {names} is stated, expected one or more: they are not fitted, and the output is in no unit of "
+            "rate",
         )
-    made = np.stack(rows, axis=-1) if rows else np.zeros((len(angles), len(model.channels), 0))
-    return Stated(tuple(symbols), np.array(values), np.array(u), made, bool(said))
+    return tuple(found)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from inercal.design.spherical import basis
 from inercal.errors import StudyError
+from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
 from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.chain import Chain
@@ -17,6 +18,38 @@ from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.turntable.settings import TurntableSettings
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Stated:
+    """Terms of a channel that are not estimated: ``channel`` with these alone, their linear coefficients ``values``
+    (q,) and the standard uncertainties ``u`` (q,) of these."""
+
+    channel: ChannelModel
+    values: Array
+    u: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """An input on which gravity or earth rate depends: its standard uncertainty ``u`` [``unit``], and the change
+    ``a_n``, ``w_n`` (3,) of the references in n per unit of it."""
+
+    source: str
+    u: float
+    unit: str
+    a_n: Array
+    w_n: Array
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A source of uncertainty beside noise and table: ``unit`` empty for that of the ``term`` it belongs to."""
+
+    source: str
+    u: float
+    unit: str
+    term: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +67,18 @@ class TableModel:
         Earth rate [rad/s] in n.
     channels : tuple of ChannelModel
         Their terms are those to be estimated.
-    stated : tuple of (ChannelModel, (q,) linear coefficients)
+    stated : tuple of Stated
         Of each channel what is known and not estimated; empty where there is nothing.
+    references : tuple of Reference
+        What a and w are uncertain by.
     """
 
     chain: Chain
     a_n: Array
     w_n: Array
     channels: tuple[ChannelModel, ...]
-    stated: tuple[tuple[ChannelModel, Array], ...] = ()
+    stated: tuple[Stated, ...] = ()
+    references: tuple[Reference, ...] = ()
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -75,8 +111,8 @@ class TableModel:
             channel.regressors(a, w) @ c[block]
             for channel, block in zip(self.channels, self.blocks, strict=True)
         ]
-        for k, (channel, known) in enumerate(self.stated):
-            made[k] = made[k] + channel.regressors(a, w) @ known
+        for k, known in enumerate(self.stated):
+            made[k] = made[k] + known.channel.regressors(a, w) @ known.values
         return np.stack(made, axis=-1)
 
     def by_inputs(self, angles: Array, c: Array) -> Array:
@@ -86,8 +122,8 @@ class TableModel:
             np.einsum("npi,p->ni", channel.slopes(a, w), c[block])
             for channel, block in zip(self.channels, self.blocks, strict=True)
         ]
-        for k, (channel, known) in enumerate(self.stated):
-            made[k] = made[k] + np.einsum("npi,p->ni", channel.slopes(a, w), known)
+        for k, known in enumerate(self.stated):
+            made[k] = made[k] + np.einsum("npi,p->ni", known.channel.slopes(a, w), known.values)
         return np.stack(made, axis=1)
 
     def by_errors(self, angles: Array, c: Array) -> Array:
@@ -101,6 +137,29 @@ class TableModel:
         C_nb = self.chain.attitude(angles)
         moved = np.concatenate([a_n @ C_nb, w_n @ C_nb], axis=-1)
         return np.asarray(np.einsum("nci,ni->nc", self.by_inputs(angles, c), moved))
+
+    def beside(self, angles: Array, c: Array) -> tuple[tuple[Beside, ...], Array]:
+        """Uncertain inputs beside noise and table, and the change (n, channels, q) of the outputs per unit of each.
+
+        Each has one value throughout a test.
+        """
+        found, columns = [], []
+        for reference in self.references:
+            change = self.by_references(angles, c, reference.a_n, reference.w_n)
+            if np.any(change):
+                found.append(Beside(reference.source, reference.u, reference.unit))
+                columns.append(change)
+        a, w = self.inputs(angles)
+        for k, known in enumerate(self.stated):
+            regressors = known.channel.regressors(a, w)
+            for j in np.flatnonzero(known.u):
+                column = np.zeros((len(angles), len(self.channels)))
+                column[:, k] = regressors[:, j]
+                symbol = known.channel.symbols[j]
+                found.append(Beside(f"stated {symbol}", float(known.u[j]), "", symbol))
+                columns.append(column)
+        empty = np.zeros((len(angles), len(self.channels), 0))
+        return tuple(found), np.stack(columns, axis=-1) if columns else empty
 
 
 def table_model(
@@ -133,11 +192,40 @@ def table_model(
                 "instrument.terms", f"{kept.leading} is missing, to which others of {model.channel} relate"
             )
         chosen.append(kept)
-        rest = model.without(kept.symbols)
-        linear = dict(zip(model.symbols, model.linear(stated_values(settings, model)), strict=True))
-        stated.append((rest, np.array([linear[symbol] for symbol in rest.symbols])))
+        stated.append(_stated(settings, model, model.without(kept.symbols)))
     a_n = gravity_reference() if instrument.kind == "gyrowheel" else -gravity_reference(site.gravity)
-    return TableModel(settings.chain, a_n, rate_reference(site.latitude), tuple(chosen), tuple(stated))
+    w_n = rate_reference(site.latitude)
+    return TableModel(settings.chain, a_n, w_n, tuple(chosen), tuple(stated), _references(settings))
+
+
+def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel) -> Stated:
+    """What the study states of the terms in ``rest``, of a channel whose whole ``model`` it is a part of."""
+    values = stated_values(settings, model)
+    linear, typed = model.linear(values), settings.instrument.coefficients_u
+    # a misalignment enters times the scale factor, whose own small uncertainty does not matter to it
+    lead = [model.gain(values) if symbol in model.relative else 1.0 for symbol in model.symbols]
+    places = [model.symbols.index(symbol) for symbol in rest.symbols]
+    u = np.array([typed.get(model.symbols[j], 0.0) * lead[j] for j in places])
+    return Stated(rest, linear[places], np.abs(u))
+
+
+def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
+    """What gravity and earth rate are uncertain by."""
+    site, still = settings.site, np.zeros(3)
+    assert site.latitude is not None
+    # in units of the site's gravity, gravity is one whatever its value
+    up = still if settings.instrument.kind == "gyrowheel" else np.array([0.0, 0.0, 1.0])
+    found = {
+        (each.source, each.u, each.unit): Reference(
+            each.source, each.u, each.unit, up * each.sensitivity, still
+        )
+        for each in site.inputs
+    }
+    if site.latitude_u > 0.0:
+        key = ("latitude", site.latitude_u, "rad")
+        w_n = EARTH_RATE * np.array([-np.sin(site.latitude), 0.0, np.cos(site.latitude)])
+        found[key] = Reference(*key, found[key].a_n if key in found else still, w_n)
+    return tuple(found.values())
 
 
 def orthonormal(model: TableModel, angles: Array) -> Array:

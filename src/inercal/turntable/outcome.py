@@ -14,7 +14,6 @@ from inercal.design.comparison import in_basis
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.estimate.status import Status
-from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
@@ -76,10 +75,8 @@ def terms_of(fit: Regression) -> Terms:
     return Terms(values, slope)
 
 
-def sources(fitting: Fitting, settings: TurntableSettings, terms: Terms, unit: str) -> list[TypeA | TypeB]:
+def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
     """Everything the terms are uncertain by: noise, each error of the table, the site, stated terms."""
-    fit = fitting.fit
-    assert fit is not None
     gain = np.einsum("pq,qnc->pnc", terms.slope, fit.gain)
     found: list[TypeA | TypeB] = []
     for k, channel in enumerate(fit.model.channels):
@@ -92,38 +89,12 @@ def sources(fitting: Fitting, settings: TurntableSettings, terms: Terms, unit: s
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         found.append(TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std))
-    found += _of_site(fit, settings, gain)
-    for k, symbol in enumerate(fitting.stated.symbols):
-        if fitting.stated.u[k] > 0.0:
-            by_value = -np.einsum("pnc,nc->p", gain, fitting.stated.rows[..., k])
-            found.append(
-                TypeB(f"stated {symbol}", float(fitting.stated.u[k]), unit_of_term(symbol, unit), by_value)
-            )
+    beside, columns = fit.model.beside(fit.angles, fit.c)
+    for each, column in zip(beside, np.moveaxis(columns, -1, 0), strict=True):
+        # readings made with another value than taken: the fit takes the difference for coefficients
+        by_value = np.einsum("pnc,nc->p", gain, column)
+        found.append(TypeB(each.source, each.u, each.unit or unit_of_term(each.term, unit), by_value))
     return found
-
-
-def _of_site(fit: Regression, settings: TurntableSettings, gain: Array) -> list[TypeB]:
-    """What gravity and latitude do to the terms."""
-    site, model = settings.site, fit.model
-    still = np.zeros(3)
-
-    def moved(a_n: Array, w_n: Array) -> Array:
-        change = model.by_references(fit.angles, fit.c, a_n, w_n)
-        # readings made with another reference than stated: the fit takes the difference for coefficients
-        return np.asarray(np.einsum("pnc,nc->p", gain, change))
-
-    assert site.latitude is not None
-    by_latitude = moved(still, EARTH_RATE * np.array([-np.sin(site.latitude), 0.0, np.cos(site.latitude)]))
-    # in units of the site's gravity, gravity is one whatever its value
-    of_gravity = settings.instrument.kind != "gyrowheel"
-    by_gravity = moved(np.array([0.0, 0.0, 1.0]), still) if of_gravity else np.zeros(len(fit.c))
-    effects: dict[tuple[str, float, str], Array] = {}
-    for source in site.inputs:
-        effects[source.source, source.u, source.unit] = by_gravity * source.sensitivity
-    if site.latitude_u > 0.0:
-        key = ("latitude", site.latitude_u, "rad")
-        effects[key] = effects.get(key, np.zeros(len(fit.c))) + by_latitude
-    return [TypeB(*key, sensitivity) for key, sensitivity in effects.items() if np.any(sensitivity)]
 
 
 def assemble(record: Record, found: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
@@ -146,7 +117,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
         "plan": _plan(found, fitting, settings),
         "instrument": settings.instrument.kind,
-        "earth_rate": "stated" if fitting.stated.earth_rate else "fitted",
+        "earth_rate": fitting.earth_rate,
     }
     if fitting.fit is None:
         return Estimate(
@@ -165,7 +136,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         )
     fit, terms = fitting.fit, terms_of(fitting.fit)
     names = fit.model.symbols
-    covariance, dof, budget = combine(names, sources(fitting, settings, terms, unit))
+    covariance, dof, budget = combine(names, sources(fit, terms, unit))
     status, message = _verdict(found, fitting)
     return Estimate(
         names=names,
@@ -213,10 +184,13 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
 def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings) -> str:
     """Why nothing was fitted, and what would help."""
     words = [text for each in fitting.known for text in each.words]
-    if not words:
-        fewest = fewest_positions(fitting.model, settings)
-        why = " to tell the noise too, which is not stated" if settings.instrument.noise is None else ""
-        return f"found {counted(len(found.y), 'position')}, expected at least {fewest}{why}"
+    fewest = fewest_positions(fitting.model, settings)
+    if len(found.y) < fewest:
+        why = (
+            ", of which one tells the noise, which is not stated" if settings.instrument.noise is None else ""
+        )
+        terms = max(len(channel.symbols) for channel in fitting.model.channels)
+        return f"found {counted(len(found.y), 'position')} for {terms} terms, expected at least {fewest}{why}"
     first = next(each for each in fitting.known if each.words)
     rank, terms = first.identifiability.rank, len(first.identifiability.names)
     return (

@@ -286,4 +286,8 @@ def _comparison(designed: Designed) -> list[str]:
             f"{each.plan.name:<{wide}}  {len(each.plan):9d}  {rank:>7}  {condition}  {figures.d_efficiency:12.4f}  "
             f"{each.earth_rate:>10}  {rms}"
         )
+    if len({each.earth_rate for each in designed.judged}) > 1:
+        lines.append(
+            "where the earth rate is stated, its terms are taken as known: fewer coefficients to share the readings"
+        )
     return lines

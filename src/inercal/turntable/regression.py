@@ -42,7 +42,7 @@ class Weights:
     """What the readings are uncertain by.
 
     ``within`` (n, c, c) covariance redrawn at each position, noise and table; ``common`` (n, c, q) derivatives
-    with respect to the constant errors, in their standard deviations.
+    with respect to what is constant, in its standard deviations: errors of the table, then inputs beside it.
     """
 
     within: Array
@@ -65,6 +65,7 @@ class Regression:
     noise : (c,) standard deviation of a reading that is not the table's doing
     noise_dof : (c,) its degrees of freedom; inf where it was stated
     slopes : (n, c, k) derivatives of the readings with respect to all errors of the table
+    beside : (n, c, b) change of the readings by one standard uncertainty of each input beside the table
     samples : (n,) rows behind each reading
     table : (q,) estimated constant errors [rad or m], in the order of ``constant``
     table_u : (q,) their standard uncertainties
@@ -82,6 +83,7 @@ class Regression:
     noise: Array
     noise_dof: Array
     slopes: Array
+    beside: Array
     samples: Samples
     table: Array
     table_u: Array
@@ -159,20 +161,27 @@ def weights(
     ``std`` (k,) stands in for the standard deviations of the chain's errors; ``samples`` (n,) as in `fit`.
     """
     slopes = model.by_errors(angles, c)
-    return weights_of(
-        model.chain, slopes, noise, np.ones(len(slopes), dtype=np.int64) if samples is None else samples, std
-    )
+    rows = np.ones(len(slopes), dtype=np.int64) if samples is None else samples
+    return weights_of(model.chain, slopes, _beside(model, angles, c), noise, rows, std)
+
+
+def _beside(model: TableModel, angles: Array, c: Array) -> Array:
+    """Change (n, c, b) of the readings by one standard uncertainty of each input beside the table."""
+    found, columns = model.beside(angles, c)
+    return np.asarray(columns * np.array([each.u for each in found]))
 
 
 def weights_of(
-    chain: Chain, slopes: Array, noise: Array, samples: Samples, std: Array | None = None
+    chain: Chain, slopes: Array, beside: Array, noise: Array, samples: Samples, std: Array | None = None
 ) -> Weights:
-    """As `weights`, for derivatives (n, c, k) of the readings with respect to the errors of the ``chain``."""
+    """As `weights`, for derivatives (n, c, k) of the readings with respect to the errors of the ``chain``, and their
+    changes (n, c, b) by inputs beside it."""
     scaled = averaged(chain, slopes, samples) * (chain.std if std is None else std)
     constant = np.array([error.scope.constant for error in chain.errors], dtype=bool)
     redrawn = scaled[..., ~constant]
     return Weights(
-        np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)), scaled[..., constant]
+        np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)),
+        np.concatenate([scaled[..., constant], beside], axis=-1),
     )
 
 
@@ -243,16 +252,16 @@ def fit(
     c = solve(rows, y, plain).c if start is None else start
     for _ in range(ROUNDS):
         table = weights(model, angles, c, np.zeros(channels), samples=samples)
-        scatter = [
-            _scatter(rows[:, k, block], y[:, k], table, k)
-            if each is None
-            else Scatter(max(each, 0.0), np.inf)
-            for k, (block, each) in enumerate(zip(model.blocks, noise, strict=True))
-        ]
         own = np.mean(np.diagonal(table.within, axis1=1, axis2=2), axis=0)
         # errors of the table alone may leave the covariance of two channels without an inverse
         floor = np.maximum(least, 1e-6 * np.sqrt(own))
-        sigma = np.maximum([each.std for each in scatter], floor)
+        scatter = [
+            _scatter(rows[:, k, block], y[:, k], table, k, float(floor[k]))
+            if each is None
+            else Scatter(max(each, float(floor[k])), np.inf)
+            for k, (block, each) in enumerate(zip(model.blocks, noise, strict=True))
+        ]
+        sigma = np.array([each.std for each in scatter])
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
         change, c = np.abs(solution.c - c), solution.c
         if np.all(change <= 1e-3 * np.sqrt(np.diag(solution.joint)[:p])):
@@ -271,9 +280,10 @@ def fit(
         sigma,
         np.array([each.dof for each in scatter]),
         model.by_errors(angles, c),
+        _beside(model, angles, c),
         samples,
-        solution.chi * std,
-        np.sqrt(np.diag(solution.joint)[p:]) * std,
+        solution.chi[: len(std)] * std,
+        np.sqrt(np.diag(solution.joint)[p : p + len(std)]) * std,
         constant,
     )
 
@@ -286,10 +296,10 @@ class Scatter:
     dof: float
 
 
-def _scatter(rows: Array, y: Array, table: Weights, channel: int) -> Scatter:
+def _scatter(rows: Array, y: Array, table: Weights, channel: int, floor: float) -> Scatter:
     """Noise of a reading beyond what the table explains: with it, chi2 of a channel is its degrees of freedom.
 
-    After Mandel and Paule 1970; zero where the table alone explains more than the scatter. Seen from outside the
+    After Mandel and Paule 1970; ``floor`` where the table alone explains more than the scatter. Seen from outside the
     space of the terms, ``chi2 = sum z^2 / (lambda + s^2)``, lambda the variances that the table causes there; the
     variance of s^2 is ``2 nu / (sum 1 / (lambda + s^2))^2``.
 
@@ -298,21 +308,20 @@ def _scatter(rows: Array, y: Array, table: Weights, channel: int) -> Scatter:
     rows : (n, p), y : (n,) of one channel
     table : Weights of all channels, without noise
     channel : int
+    floor : float
+        Least standard deviation that is told from none.
     """
     n, p = rows.shape
     if n <= p:
-        return Scatter(0.0, 0.0)
+        return Scatter(floor, 1.0)
     outside = np.linalg.qr(rows / np.linalg.norm(rows, axis=0), mode="complete")[0][:, p:]
     variance = (
         np.diag(table.within[:, channel, channel]) + table.common[:, channel] @ table.common[:, channel].T
     )
     own, turn = np.linalg.eigh(outside.T @ variance @ outside)
     z2 = np.square(turn.T @ (outside.T @ y))
-    high = float(np.mean(z2))
-    if not high > 0.0:
-        return Scatter(0.0, 0.0)
-    low = FLOOR**2 * high
     own = np.maximum(own, 0.0)
+    low, high = floor**2, max(float(np.mean(z2)), floor**2)
     if np.sum(z2 / (own + low)) <= n - p:
         high = low
     for _ in range(60):  # halving the logarithm

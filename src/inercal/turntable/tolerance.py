@@ -109,7 +109,7 @@ def alternatives(fit: Regression, slope: Array) -> Alternatives:
     chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
 
     def u(changed: Chain) -> Array:
-        weight = weights_of(changed, fit.slopes, fit.noise, fit.samples)
+        weight = weights_of(changed, fit.slopes, fit.beside, fit.noise, fit.samples)
         joint = solve(rows, np.zeros_like(fit.residuals), weight).joint
         return np.sqrt(np.diag(slope @ joint[:p, :p] @ slope.T))
 
