@@ -18,6 +18,7 @@ from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.outputs import rate_reference
 from inercal.rigs.plans import named
 from inercal.rigs.tables import turntable
+from inercal.turntable.figures import rate_pictures
 from inercal.turntable.rate import RateDwells, arc, gyro_input, sensed
 from inercal.turntable.rate_fit import approaches, levels
 from inercal.turntable.settings import Design, Instrument, RateTest, TurntableSettings
@@ -204,6 +205,22 @@ def test_hysteresis_is_the_difference_of_up_and_down():
     ways = [row["reached_from"] for row in made.estimate.result["rates"]]
     assert ways == ["above"] + ["below"] * (len(UP) - 1) + ["above"] * (len(UP) - 1)
     assert "S_hyst_z" not in run(study(UP)).estimate.names
+
+
+def test_hysteresis_does_not_pass_for_curvature():
+    """The ends of a run up and down are reached one way each; a cubic would take their offset for its own."""
+    bent = {"S_z": 1.001, "S_asym_z": 2e-4, "S3_z": 1e-5, "S_hyst_z": 50e-6}
+    found = run(study(instrument={"coefficients": bent}, order=3)).estimate
+    for name in ("S_asym_z", "S3_z", "S_z"):
+        assert found[name].value == pytest.approx(bent[name], rel=1e-6)
+
+
+def test_the_residuals_of_a_rate_test_are_drawn():
+    found = run(study(instrument={"coefficients": {"S_z": 1.0}, "noise": 1e-6}))
+    drawn = rate_pictures(found)
+    assert [picture.title for picture in drawn][0] == "Residual of each rate"
+    assert all(picture.svg.startswith("<svg") for picture in drawn)
+    assert rate_pictures(run(study((10,)))) == []
 
 
 def test_the_way_a_rate_was_reached_follows_from_the_order():

@@ -14,6 +14,7 @@ from inercal.report import sensitivity
 from inercal.report.figures import budget, correlation, dots, heat
 from inercal.report.html import Picture, page
 from inercal.report.positions import NUMBERED, hemispheres, plane
+from inercal.report.rates import residuals_by_rate
 from inercal.report.style import COLOURS, INK, QUIET, WIDTH, figure, plain_unit, svg
 from inercal.rigs.chain import Error
 from inercal.rigs.outputs import gravity_reference
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.turntable.analysis import Analysed
     from inercal.turntable.planning import Designed
+    from inercal.turntable.rate_calibration import RateCalibration
     from inercal.turntable.readings import Readings
     from inercal.turntable.settings import TurntableSettings
     from inercal.turntable.task import Calibration
@@ -63,6 +65,14 @@ def pictures(calibration: Calibration) -> list[Picture]:
         budget(estimate),
         *_tolerances(estimate, alone),
     ]
+
+
+def rate_pictures(calibration: RateCalibration) -> list[Picture]:
+    """Draw what there is to see of a rate test; nothing where no gyro could be fitted."""
+    estimate = calibration.shown
+    if not estimate.names:
+        return []
+    return [residuals_by_rate(estimate.result["rates"]), correlation(estimate), budget(estimate)]
 
 
 def _residuals(found: Readings, fit: Regression) -> Picture:
@@ -197,7 +207,7 @@ def sensitivity_page(analysed: Analysed, settings: TurntableSettings) -> str:
         note=analysed.note,
         facts=[
             *_rig_facts(settings),
-            ("positions", "", _plan_words(settings)),
+            ("positions", "", f"{settings.plan.name} ({counted(len(settings.plan), 'position')})"),
             ("method", "", _method_words(indices.method)),
             ("outputs", "", ", ".join(indices.outputs)),
         ],
@@ -352,11 +362,6 @@ def _rig_facts(settings: TurntableSettings) -> list[tuple[str, str, str]]:
     if site.latitude is not None:
         facts.append(("latitude", "", f"{np.degrees(site.latitude):.6g}°"))
     return facts
-
-
-def _plan_words(settings: TurntableSettings) -> str:
-    """Name and number of the positions."""
-    return f"{settings.plan.name} ({counted(len(settings.plan), 'position')})"
 
 
 def _method_words(method: Mapping[str, Any]) -> str:

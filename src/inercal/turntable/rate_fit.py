@@ -140,8 +140,10 @@ def fit_rates(
     full_scale : float
         rad/s
     """
-    rows = columns(given.x, order, asymmetry)
-    n, p = rows.shape
+    terms = columns(given.x, order, asymmetry)
+    n, p = terms.shape
+    rows = _with_hysteresis(terms, rate)
+    free = rows.shape[1]
     floor = FLOOR * float(np.sqrt(np.mean(np.square(y))) or 1.0)
     c: Array = np.asarray(np.linalg.lstsq(rows, y, rcond=None)[0], dtype=float)
     sigma = floor
@@ -150,10 +152,10 @@ def fit_rates(
         sigma = max(_scatter(rows, y, weight) if noise is None else noise, floor)
         solution = _solve(rows, y, weight, sigma)
         c = solution.c
-    line = _solve(rows[:, :2], y, weight, sigma)
-    remainder = np.eye(n) - rows[:, :2] @ line.gain[:, :, 0]
-    residuals = y - rows[:, :2] @ line.c
-    values, gain = _relative(c, solution.gain[:, :, 0])
+    line = _solve(terms[:, :2], y, weight, sigma)
+    remainder = np.eye(n) - terms[:, :2] @ line.gain[:, :, 0]
+    residuals = y - terms[:, :2] @ line.c
+    values, gain = _relative(c[:p], solution.gain[:p, :, 0])
     span = abs(float(c[1])) * full_scale
     names, extra, extra_gain = _left_over(axis, rate, residuals, remainder)
     return RateFit(
@@ -165,10 +167,20 @@ def fit_rates(
         residuals,
         remainder,
         sigma,
-        float(n - p) if noise is None else np.inf,
+        float(n - free) if noise is None else np.inf,
         solution.chi2,
-        n - p,
+        n - free,
     )
+
+
+def _with_hysteresis(terms: Array, rate: Array) -> Array:
+    """The regressors with one more for the way a rate was reached, where some rate was reached both ways.
+
+    Without it hysteresis would pass for curvature: at the ends of a run up and down it does not average out.
+    """
+    way = approaches(rate)
+    both = any(np.ptp(way[same]) == 2 for same in levels(rate))
+    return np.column_stack([terms, way]) if both and len(rate) > terms.shape[1] + 1 else terms
 
 
 def _relative(c: Array, gain: Array) -> tuple[Array, Array]:
