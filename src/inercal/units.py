@@ -124,7 +124,7 @@ class Quantity:
     text: str
 
 
-def parse_unit(text: str, where: object = "unit") -> Unit:
+def parse_unit(text: str, where: object = "unit", dimension: str | None = None) -> Unit:
     """Look a unit up by its text.
 
     Parameters
@@ -133,6 +133,8 @@ def parse_unit(text: str, where: object = "unit") -> Unit:
         For example ``m/s^2``, ``m/s²``, ``deg/h``, ``ug``, ``count``.
     where : object
         Named in the error: a file and column, or a key.
+    dimension : str, optional
+        What is measured: the error then names units of it. Units of another dimension are found all the same.
 
     Raises
     ------
@@ -143,15 +145,22 @@ def parse_unit(text: str, where: object = "unit") -> Unit:
     plain = re.sub(r"\s*([*/^()])\s*", r"\1", plain.replace("μ", "u").replace("s2", "s^2"))
     plain = re.sub(r"\s+", "*", plain)
     plain = _ALIASES.get(plain, plain)
-    for dimension, (_, factors) in _TABLE.items():
+    for measured, (_, factors) in _TABLE.items():
         if plain in factors:
-            return Unit(plain, dimension, factors[plain], _ZERO.get(plain, 0.0))
-    return _from_pint(plain, text, where)
+            return Unit(plain, measured, factors[plain], _ZERO.get(plain, 0.0))
+    return _from_pint(plain, text, where, _everyday(dimension))
 
 
-def _from_pint(plain: str, text: str, where: object) -> Unit:
-    """Ask pint, loaded only now, for a unit outside the table."""
-    expected = "expected one such as m/s^2, g, ug, rad/s, deg/h, deg, s, count"
+def _everyday(dimension: str | None) -> str:
+    """Units of a dimension, or of several, for error messages."""
+    if dimension is None:
+        return "one such as m/s^2, g, ug, rad/s, deg/h, deg, s, count"
+    return f"a unit of {dimension}: {', '.join(_TABLE[dimension][1])}"
+
+
+def _from_pint(plain: str, text: str, where: object, wanted: str) -> Unit:
+    """Ask pint, loaded only now, for a unit outside the table; ``wanted`` is for the error."""
+    expected = f"expected {wanted}"
     if len(plain) > 40 or not _FOR_PINT.fullmatch(plain):
         raise QuantityError(where, f"found the unit {shown(text)}, {expected}")
     import pint
@@ -208,7 +217,7 @@ def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
     assert isinstance(text, str)
     if match["unit"] is None and dimension != "number":
         raise QuantityError(where, f"found {shown(text)} without a unit, expected {expected}")
-    unit = parse_unit(match["unit"] or "1", where)
+    unit = parse_unit(match["unit"] or "1", where, dimension)
     if unit.dimension != dimension:
         raise QuantityError(where, f"found {shown(text)}, which is of {unit.dimension}, expected {expected}")
     value = float(match["number"] + (match["power"] or "")) * unit.factor + unit.zero

@@ -9,6 +9,8 @@ import pytest
 import xarray
 
 from inercal.cli import run
+from inercal.estimate.status import Status
+from inercal.rigs.plans import named
 
 STUDY = """
 [site]
@@ -125,6 +127,49 @@ def test_flagged_positions_leave_the_status_ok(folder, capsys):
         (["simulate", "turntable", "t.toml", "--seed", "-1", "--out", "x.csv"], ["--seed: found -1"]),
         (["design", "positions", "t.toml", "--out", "p.nc"], ["p.nc", "expected .json or .csv"]),
         (["design", "positions", "t.toml", "--set", "design.compare=['x']"], ["design.compare.0: found 'x'"]),
+        (
+            ["design", "positions", "t.toml", "--set", "design.positions=5"],
+            ["error: t.toml: design of 5 positions: found 5 positions, expected 12 or more"],
+        ),
+        (["design", "positions", "quiet.toml"], ["error: quiet.toml: instrument.noise: missing"]),
+        (
+            ["calibrate", "turntable", "volts.csv", "--study", "t.toml"],
+            ["error: t.toml: instrument.unit: noise or coefficients are stated for outputs in deg/h"],
+        ),
+        (
+            ["calibrate", "turntable", "counts.csv", "--study", "plain.toml"],
+            ["error: plain.toml: instrument.coefficients: none of k_x, k_y, k_z is stated"],
+        ),
+        (
+            [
+                "calibrate",
+                "turntable",
+                "volts.csv",
+                "--study",
+                "t.toml",
+                "--set",
+                "instrument={kind='accelerometer'}",
+            ],
+            [
+                "error: volts.csv: found position, phi1, phi2, y_x, expected one of acc_x, acc_y, acc_z of the accel"
+            ],
+        ),
+        (
+            ["calibrate", "turntable", "volts.csv"],
+            ["error: calibrate turntable: --study is missing, expected it (Study file (TOML)"],
+        ),
+        (["calibrate", "turntable", "volts.csv", "--study"], ["--study requires an argument"]),
+        (["calibrate", "turntable"], ["FILES is missing, expected it (Recordings"]),
+        (
+            ["sensitivity", "t.toml", "--set", "rig.errors.default.uniform=2 arcmn"],
+            [
+                "rig.errors.default.uniform: found the unit 'arcmn', expected a unit of angle: rad, mrad, urad, deg,"
+            ],
+        ),
+        (
+            ["simulate", "turntable", "t.toml", "--set", "positions.file=no.csv", "--out", "x.csv"],
+            ["'no.csv': no such"],
+        ),
         (["design"], ["design: found no kind, expected positions"]),
         (["simulate"], ["simulate: found no kind, expected turntable"]),
         (["calibrate", "turntable", "no.csv", "--study", "t.toml"], ["no.csv"]),
@@ -135,6 +180,12 @@ def test_bad_studies_and_usage_get_one_line(arguments, words, folder, capsys):
     again = 'default = { normal = "1 deg" }\n[positions]'
     Path("twice.toml").write_text(STUDY.lstrip().replace("[positions]", again))
     Path("imu.toml").write_text('[site]\nlatitude = "1 deg"\n[imu]\n')
+    Path("quiet.toml").write_text(STUDY.replace('noise = "0.01 deg/h"', ""))
+    Path("plain.toml").write_text(STUDY.partition("[instrument]")[0])
+    angles = np.degrees(named("24-position").angles).tolist()
+    for name, unit in (("volts.csv", "V"), ("counts.csv", "count")):
+        rows = "".join(f"{k},{a},{b},{k % 5}\n" for k, (a, b) in enumerate(angles))
+        Path(name).write_text(f"position,phi1 [deg],phi2 [deg],y_x [{unit}]\n{rows}")
     before = sorted(folder.iterdir())
     refused(arguments, capsys, *words)
     assert sorted(folder.iterdir()) == before
@@ -184,6 +235,10 @@ def test_an_unidentified_term_ends_unobservable_with_its_null_vector(folder, cap
     data = as_json(["calibrate", "turntable", "r.csv", "--study", "t.toml"], capsys, code=1)
     assert data["status"]["code"] == "unobservable"
     assert "DX_XY" in data["status"]["message"]
+    assert run(["calibrate", "turntable", "r.csv", "--study", "t.toml"]) == 1
+    shown = capsys.readouterr().out
+    assert "add positions, or leave terms out" in shown  # said once, in the message
+    assert Status.UNOBSERVABLE.advice not in shown
 
 
 def test_design_writes_positions_that_a_table_can_be_told(folder, capsys):
@@ -202,15 +257,92 @@ def test_design_writes_positions_that_a_table_can_be_told(folder, capsys):
     assert json.loads(Path("p.json").read_text())["result"]["positions"] == found["positions"]
 
 
-def test_new_writes_a_study_that_runs_and_a_map(folder, capsys):
+def test_positions_that_were_designed_are_taken(folder, capsys):
+    """design -> file -> simulate: the record stops at the angles of the file, in its order."""
+    assert run(["design", "positions", "t.toml", "--out", "p.csv", "--quiet"]) == 0
+    capsys.readouterr()
+    Path("with.toml").write_text(STUDY.replace("grid = { phi1 = 6, phi2 = 6 }", 'file = "p.csv"'))
+    for study, more in (("with.toml", []), ("t.toml", ["--set", "positions.file=p.csv"])):
+        data = as_json(["simulate", "turntable", study, "--out", "r.csv", *more], capsys)
+        assert [source["path"] for source in data["inputs"]] == [study, "p.csv"]
+        asked = np.loadtxt("p.csv", delimiter=",", skiprows=1)
+        taken = np.loadtxt("r.csv", delimiter=",", skiprows=1)[:, 2:4]
+        np.testing.assert_allclose(taken, asked, atol=1e-9)
+    data = as_json(["calibrate", "turntable", "r.csv", "--study", "with.toml"], capsys)
+    assert data["result"]["plan"]["name"] == "p.csv"
+    assert [source["path"] for source in data["inputs"]] == ["r.csv", "with.toml", "p.csv"]
+    for command in (["design", "positions"], ["simulate", "turntable"]):
+        refused([*command, "with.toml", "--out", "p.csv"], capsys, "p.csv: is an input")
+
+
+def test_a_positions_file_is_looked_for_beside_the_study(folder, capsys):
+    Path("sub").mkdir()
+    Path("sub/p.csv").write_text("phi1 [deg],phi2 [deg]\n10,20\n")
+    Path("sub/t.toml").write_text(STUDY.replace("grid = { phi1 = 6, phi2 = 6 }", 'file = "p.csv"'))
+    data = as_json(["sensitivity", "sub/t.toml"], capsys)
+    assert data["result"]["positions"]["phi1"] == pytest.approx([math.radians(10.0)])
+
+
+def test_a_record_of_dwells_needs_no_time(folder, capsys):
+    """Coefficients are the same whether or not time, or position numbers, stand beside the angles."""
+    assert run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet"]) == 0
+    rows = [line.split(",") for line in Path("r.csv").read_text().splitlines()]
+    capsys.readouterr()
+    values = []
+    for first in (0, 1, 2):  # t, position, phi1, phi2, y_x, y_y
+        Path("part.csv").write_text("\n".join(",".join(row[first:]) for row in rows) + "\n")
+        data = as_json(["calibrate", "turntable", "part.csv", "--study", "t.toml"], capsys)
+        assert data["status"]["code"] == "ok"
+        values.append([p["value"] for p in data["parameters"]])
+    assert values[0] == values[1] == values[2]
+
+
+def test_new_writes_a_study_that_runs_without_a_map_where_the_header_says_all(folder, capsys):
     assert run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet"]) == 0
     capsys.readouterr()
     data = as_json(["new", "turntable", "r.csv"], capsys)
-    assert data["result"] == {"study": "turntable.toml", "map": "turntable-map.toml"}
-    command = ["calibrate", "turntable", "r.csv", "--map", "turntable-map.toml", "--study", "turntable.toml"]
-    found = as_json([*command, "--set", "site.latitude=39.1 deg"], capsys)
-    assert found["status"]["code"] == "ok"
+    assert data["result"] == {"study": "turntable.toml", "map": None}
+    assert not Path("turntable-map.toml").exists()
+    text = Path("turntable.toml").read_text("utf-8")
+    assert "# Next: inercal calibrate turntable r.csv --study turntable.toml\n" in text
+    assert 'kind = "gyrowheel"' in text
+    assert '\nunit = "deg/h"' in text
+    command = ["calibrate", "turntable", "r.csv", "--study", "turntable.toml"]
+    assert as_json([*command, "--set", "site.latitude=39.1 deg"], capsys)["status"]["code"] == "ok"
     refused(["new", "turntable"], capsys, "turntable.toml: exists already")
+
+
+def test_new_chooses_the_instrument_of_the_record_and_guesses_a_map_where_it_must(folder, capsys):
+    """A plain header: angles stay angles, accelerometers are told by gravity, and no rate is asked for."""
+    simulated = ["--set", "instrument={kind='accelerometer',unit='m/s^2',noise='20 ug',coefficients={}}"]
+    simulated += ["--set", "positions.grid.phi1=12"]
+    assert run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet", *simulated]) == 0
+    rows = [line.split(",", 2)[2] for line in Path("r.csv").read_text().splitlines()[1:]]
+    Path("plain.csv").write_text("\n".join(["phi1_deg,phi2_deg,ax,ay,az", *rows]) + "\n")
+    capsys.readouterr()
+    data = as_json(["new", "turntable", "plain.csv"], capsys)
+    assert data["result"] == {"study": "turntable.toml", "map": "turntable-map.toml"}
+    assert '\nkind = "accelerometer"' in Path("turntable.toml").read_text("utf-8")
+    command = [
+        "calibrate",
+        "turntable",
+        "plain.csv",
+        "--map",
+        "turntable-map.toml",
+        "--study",
+        "turntable.toml",
+    ]
+    found = as_json(command, capsys)
+    assert found["status"]["code"] == "ok"
+    scale = next(p for p in found["parameters"] if p["name"] == "K1_y")
+    assert abs(scale["value"] - 1.0) < 5 * scale["u"]
+    Path("bare.csv").write_text("\n".join(rows) + "\n")
+    refused(
+        ["new", "turntable", "bare.csv", "--out", "x.toml"],
+        capsys,
+        "bare.csv",
+        "expected a header such as phi1",
+    )
 
 
 RATES = """

@@ -1,8 +1,9 @@
 """The README and every page of the documentation run as written.
 
 Python blocks run in one process per page. Console blocks run line by line in one folder: a ``$`` line is run,
-``[exit N]`` after it is the code expected (0 if none is shown), and every other line must begin a line of the
-output, or hold the same words if it is a row of a table.
+``[exit N]`` after it is the code expected (0 if none is shown), and every other line must begin a line of what is
+printed on standard output or error, or hold the same words if it is a row of a table. Studies that begin with
+their file's name as a comment lie in the folder before.
 """
 
 import os
@@ -23,12 +24,20 @@ def blocks(page: Path, kind: str) -> list[str]:
     return [text for language, text in FENCE.findall(page.read_text(encoding="utf-8")) if language == kind]
 
 
+def lay_out(page: Path, folder: Path) -> None:
+    """Write the studies of a page that say their file's name in the first line."""
+    for text in blocks(page, "toml"):
+        if found := re.match(r"# ([\w-]+\.toml)\n", text):
+            (folder / found[1]).write_text(text, encoding="utf-8")
+
+
 def name(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=name)
 def test_python_runs(page, tmp_path):
+    lay_out(page, tmp_path)
     code = "\n\n".join(blocks(page, "python"))
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120
@@ -60,6 +69,7 @@ def shown(line: str, output: str) -> bool:
 def test_commands_run_and_print_what_the_page_shows(page, tmp_path):
     lines = [line for block in blocks(page, "console") for line in block.splitlines() if line.strip()]
     assert lines[0].startswith("$ ")
+    lay_out(page, tmp_path)
     while lines:
         command = lines.pop(0).removeprefix("$ ")
         expected = []
@@ -72,7 +82,8 @@ def test_commands_run_and_print_what_the_page_shows(page, tmp_path):
         assert done.returncode == (codes[0] if codes else 0), f"{command}\n{done.stderr}"
         for line in expected:
             if not re.fullmatch(r"\[exit \d+\]", line.strip()):
-                assert shown(line, done.stdout), f"{command}\nexpected: {line}\nfound:\n{done.stdout}"
+                found = f"{done.stdout}\n{done.stderr}"
+                assert shown(line, found), f"{command}\nexpected: {line}\nfound:\n{found}"
 
 
 def test_the_studies_on_the_pages_are_studies(tmp_path):

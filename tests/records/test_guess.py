@@ -111,6 +111,33 @@ def test_a_rate_is_looked_for_in_the_lines_before_the_header(tmp_path):
         assert record.findings == ()
 
 
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("phi1_deg,phi2_deg,ax,ay,az", "deg"),
+        ("Phi 1,Phi 2,acc_x,acc_y,acc_z", "deg"),
+        ("phi1 (rad),phi2 (rad),accX,accY,accZ", "rad"),
+        ("phi1_rad,phi2_rad,ax,ay,az", "rad"),
+    ],
+)
+def test_angles_of_a_table_are_no_rates_and_need_no_time(tmp_path, header, unit):
+    angles = np.column_stack([np.arange(N) % 7, np.arange(N) % 5])
+    path = table(tmp_path / "a.csv", header, np.column_stack([angles, ACC]))
+    record_map, record = guessed(tmp_path, [path])
+    assert list(record.columns) == ["phi1", "phi2", "acc_x", "acc_y", "acc_z"]
+    assert units(record) == [unit] * 2 + ["m/s^2"] * 3
+    assert record_map.rate is None
+    np.testing.assert_array_equal(record["phi2"].values, angles[:, 1])
+
+
+def test_on_a_table_columns_without_names_are_not_guessed(tmp_path):
+    """Time, two angles and an output look like a time and a triad."""
+    path = table(tmp_path / "a.csv", "", np.column_stack([T, np.arange(N) % 7, np.arange(N) % 5, ACC[:, 0]]))
+    assert "gyro_x" in guess_map(path)
+    with pytest.raises(RecordError, match="found 4 columns, expected a header such as phi1,phi2,acc_x"):
+        guess_map(path, on_table=True)
+
+
 def test_without_time_or_rate_one_is_asked_for(tmp_path):
     path = table(tmp_path / "a.csv", "n,ax,ay,az", np.column_stack([np.arange(N), ACC]))
     with pytest.raises(InputError, match=r"time\.rate: found 'PUT THE SAMPLE RATE HERE.* expected .*100 Hz"):

@@ -136,6 +136,18 @@ def test_sign_scale_and_unit_are_applied(tmp_path):
     assert record["acc_x"].unit.symbol == "mg"
 
 
+def test_increments_of_a_test_on_a_table_need_its_time(tmp_path):
+    """Rows of a table may be counted in place of a time, but a count says nothing of how fast an angle grew."""
+    path = written(tmp_path / "a.csv", "".join(f"{i},{i % 3}\n" for i in range(9)))
+    phi = '[columns.phi1]\nfrom = 0\nunit = "deg"\n'
+    gyro = '[columns.gyro_x]\nfrom = 1\nunit = "arcsec"\nkind = "increment"\n'
+    record_map = written(tmp_path / "map.toml", phi + gyro)
+    with pytest.raises(RecordError, match="found no time column t"):
+        read(path, record_map)
+    written(record_map, phi + gyro + '[time]\nrate = "10 Hz"\n')
+    assert read(path, record_map)["gyro_x"].values[4] == pytest.approx(np.radians(1 / 3600) * 10)
+
+
 def test_increments_become_rates(tmp_path):
     data = written(tmp_path / "a.csv", "".join(f"{i / 100},{3600 * i},{i}\n" for i in range(5)))
     columns = (

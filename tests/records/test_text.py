@@ -177,6 +177,20 @@ def test_a_compressed_file_that_ends_too_soon_is_said(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "header",
+    ["position,y_x [deg/h]", "phi1 [deg],y_x [deg/h]", "phi3 [rad],y_x [V]", "rate [deg/s],gyro_z [deg/s]"],
+)
+def test_rows_of_a_test_on_a_table_are_counted_where_no_time_is_said(tmp_path, header):
+    rows = "".join(f"{k // 2},{0.5 * k}\n" for k in range(600))
+    record = read(written(tmp_path / "a.csv", f"{header}\n{rows}"))
+    first, output = record.columns.values()
+    np.testing.assert_array_equal(output.t, np.arange(600.0))
+    np.testing.assert_array_equal(output.values, 0.5 * np.arange(600))
+    assert first.t is output.t
+    assert record.findings == ()
+
+
+@pytest.mark.parametrize(
     ("content", "message"),
     [
         ("", "is empty"),

@@ -139,6 +139,17 @@ def load(tmp_path):
             HEAD + '[positions]\nplan = "24-position"\nlist = [["0 deg", "0 deg"]]',
             "positions: found plan and list, expected one of them",
         ),
+        (
+            HEAD + '[positions]\nlist = [["0 deg", "0 deg"]]\nfile = "p.csv"',
+            "positions: found list and file, expected one of them",
+        ),
+        (HEAD + '[positions]\nfile = "p.csv"', "positions.file: 'p.csv': no such file beside the study"),
+        (HEAD + '[positions]\nfile = ""', "positions.file: found ''"),
+        (HEAD + '[positions]\nfile = "\\u0000"', "positions.file: '\\x00': no such file beside the study"),
+        (
+            ERRORS + 'deps_x = { uniform = "2 arcmn" }',
+            "rig.errors.deps_x.uniform: found the unit 'arcmn', expected a unit of angle: rad, mrad, urad, deg, arcmin",
+        ),
         (HEAD + "[positions]\nlist = []", "positions.list: found []"),
         (HEAD + '[positions]\nlist = [["0 deg"]]', "positions.list.0: found 1 angles, expected phi1, phi2"),
         (HEAD + "[positions]\nlist = [[0, 1]]", "positions.list.0.0: found '0' without a unit"),
@@ -275,7 +286,7 @@ scalars = st.one_of(
     ),
 )
 keys = st.text(max_size=8) | st.sampled_from(
-    ["default", "deps_x", "d_eta", "uniform", "normal", "scope", "phi1", "phi2", "phi3", "grid", "plan", "list",
+    ["default", "deps_x", "d_eta", "uniform", "normal", "scope", "phi1", "phi2", "phi3", "grid", "plan", "list", "file",
      "outputs", "kind", "noise", "unit", "terms", "DX_F", "DX_XX", "coefficients", "joint", "candidates"]
 )  # fmt: skip
 values = st.recursive(

@@ -140,7 +140,10 @@ def test_overrides_make_tables_that_the_file_lacks(write):
         ("schema.x=5", "--set 'schema.x=5': schema is no table, expected the key of a value"),
         ("imu.method.x=5", "imu.method is no table"),
         ("imu.statc_start=5 s", "imu.statc_start: unknown key, did you mean static_start"),
-        ("imu.static_start=5\nx = 1", "imu.static_start: found the unit 'x = 1', expected one"),
+        (
+            "imu.static_start=5\nx = 1",
+            "imu.static_start: found the unit 'x = 1', expected a unit of time: s, ms",
+        ),
     ],
 )
 def test_wrong_overrides(write, override, message):

@@ -13,9 +13,22 @@ from inercal.study.load import load_imu_study
 from inercal.study.schema import json_schema
 from inercal.study.template import imu_template, turntable_template
 from inercal.study.turntable import turntable_study
+from inercal.units import parse_unit
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
 SCHEMA = json_schema()
+INSTRUMENTS = {
+    "wheel": {"y_x": parse_unit("deg/h")},
+    "wheel in counts": {"position": parse_unit("1"), "y_y": parse_unit("count")},
+    "pure numbers": {"y_x": parse_unit("1"), "y_y": parse_unit("1")},
+    "gyro": {"gyro_z": parse_unit("deg/s")},
+    "gyro in volts": {"rate": parse_unit("deg/s"), "gyro_y": parse_unit("V"), "acc_x": parse_unit("V")},
+    "accelerometers": {
+        f"{s}_{i}": parse_unit(u) for s, u in (("gyro", "deg/s"), ("acc", "g")) for i in "xyz"
+    },
+    "accelerometers guessed": dict.fromkeys(("acc_x", "acc_y", "acc_z")),
+    "accelerometer in counts": {"acc_z": parse_unit("count")},
+}
 
 
 def load(tmp_path, text):
@@ -82,11 +95,13 @@ def lines_with_keys():
 
 
 @pytest.mark.parametrize(("table", "line"), list(lines_with_keys()))
-def test_every_key_of_a_turntable_loads_when_uncommented(table, line):
+def test_every_key_of_a_turntable_loads_when_uncommented(table, line, tmp_path, monkeypatch):
     text = turntable_template().replace(line, line.removeprefix("# "))
     if table == "rate_test":
         text = text.replace("# [rate_test]", "[rate_test]")
-    if table == "positions":  # one of three
+    if table == "positions":  # one of four
+        monkeypatch.chdir(tmp_path)
+        Path("positions.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n")
         text = re.sub("(?m)^grid = .*", "", text)
     data = tomllib.loads(text)
     if 'unit = "deg/h"' not in line:
@@ -100,7 +115,7 @@ def test_every_key_of_a_turntable_loads_when_uncommented(table, line):
 def test_every_key_of_a_turntable_is_there():
     """Keys of a three-axis table are those of the rig; they are told in words."""
     text = re.sub(r"(?m)^# ((\w+) = |\[)", r"\1", turntable_template())
-    text = re.sub(r"(?m)^(plan|list) = .*", "", text)
+    text = re.sub(r"(?m)^(plan|list|file) = .*", "", text)
     whole = tomllib.loads(text)
     assert set(whole) == set(SCHEMA["$defs"]["TurntableStudyFile"]["properties"])
     for name, given in whole.items():
@@ -110,6 +125,40 @@ def test_every_key_of_a_turntable_is_there():
         assert set(given) == set(SCHEMA["$defs"][f"{title}Table"]["properties"]), name
     factors = [slot.name for slot in slots("two_axis_turntable")]
     assert list(whole["rig"]["errors"]) == ["default", *factors]
+
+
+@pytest.mark.parametrize("channels", INSTRUMENTS.values(), ids=INSTRUMENTS)
+def test_the_instrument_is_that_of_the_record_with_examples_in_its_unit(channels):
+    """Every example loads, alone and with all others; kind and unit are those of the channels."""
+    text = turntable_template(channels=channels)
+    table = text[text.index("[instrument]") : text.index("[design]")]
+    for line in table.splitlines():
+        assert len(line) <= 110
+        assert not line or re.fullmatch(r"\[[\w.]+\]  +# \S.*", line) or KEY.fullmatch(line), line
+    found = turntable_study(tomllib.loads(text), "t.toml").instrument
+    kind = {"y": "gyrowheel", "acc": "accelerometer", "gyro": "gyro"}
+    kinds = {kind.get(name.rpartition("_")[0]) for name in channels} - {None}
+    assert found.kind == (
+        "gyro" if "rate" in channels else "accelerometer" if len(kinds) > 1 else kinds.pop()
+    )
+    name = next(name for name in channels if kind.get(name.rpartition("_")[0]) == found.kind)
+    if channels[name] is not None:
+        assert found.unit == channels[name]
+    for line in [line for line in table.splitlines() if line.startswith("# ")]:
+        one = text.replace(line, line.removeprefix("# "))
+        assert one != text
+        turntable_study(tomllib.loads(one), "t.toml")
+    everything = turntable_study(tomllib.loads(text.replace(table, uncommented(table))), "t.toml").instrument
+    assert len(everything.coefficients) == 4
+    assert all(symbol.split("_")[-1][0] in (name[-1], *"XFx") for symbol in everything.coefficients)
+    assert everything.noise is not None
+
+
+def test_counts_are_told_to_state_the_response_to_earth_rate():
+    text = turntable_template(channels={"y_x": parse_unit("count")})
+    assert re.search(r'# k_x = ".* count/\(deg/h\)" +# .*; needed where it is not fitted', text)
+    assert 'or "stated", which needs k below' in text
+    assert "needed" not in turntable_template()
 
 
 def test_the_next_command_of_a_turntable():

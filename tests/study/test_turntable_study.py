@@ -15,7 +15,7 @@ from inercal.geometry.earth import gravity
 from inercal.rigs.chain import Scope
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import slots
-from inercal.study.load import load_imu_study, load_turntable_study
+from inercal.study.load import files_of, load_imu_study, load_turntable_study
 from inercal.study.turntable import turntable_study
 from inercal.units import STANDARD_GRAVITY
 
@@ -106,6 +106,84 @@ def test_the_other_ways_of_the_contract_to_give_positions(write, positions):
         "g": grid((36, 36), False).angles,
     }
     assert_allclose(found.plan.angles, expected[positions[0]])
+
+
+def test_positions_in_a_file_beside_the_study(write, tmp_path):
+    """Angles in any unit and any order of columns; columns of other names are not looked at."""
+    text = re.sub("(?m)^grid = .*", 'file = "sub/p.csv"', CONTRACT)
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub/p.csv").write_text("phi2 [deg],note,phi1 [rad]\n45,1,0.5\n-10,2,3\n")
+    found = load_turntable_study(write(text))
+    assert_allclose(found.plan.angles, [[0.5, math.pi / 4], [3.0, math.radians(-10.0)]])
+    assert found.plan.name == "p.csv"
+    path = tmp_path / "study.toml"
+    assert files_of(path, found.given) == (path, tmp_path / "sub/p.csv")
+    assert files_of(path, load_turntable_study(write(CONTRACT)).given) == (path,)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            None,
+            "positions.file: 'p.csv': no such file beside the study, expected a CSV with the header phi1 [deg],",
+        ),
+        ("phi1 [deg]\n1\n", "positions.file: 'p.csv': found phi1, expected phi1, phi2"),
+        ("phi1 [deg],phi2 [deg],phi3 [deg]\n1,2,3\n", "found phi1, phi2, phi3, expected phi1, phi2"),
+        ("phi1,phi2\n1,2\n", "p.csv: line 1: found 'phi1' without a unit"),
+        ("1,2\n3,4\n", "(its header should be phi1 [deg],phi2 [deg])"),
+        ("phi1 [deg],phi2 [m]\n1,2\n", 'phi2: found "m" (length), expected a unit of angle'),
+        ("phi1 [count],phi2 [deg]\n1,2\n", "phi1 is in count, expected physical units"),
+        ("phi1 [deg],phi2 [deg]\n1,2\n3,\n", "found no angle in row 2, expected one for each axis"),
+        ("phi1 [deg],phi2 [deg]\n", "found a header and no row after it"),
+        ("phi1 [deg],phi2 [deg]\n5,0\n95,0\n", "found position 2 (95 deg, 0 deg) beyond rig.limits"),
+    ],
+)
+def test_a_bad_file_of_positions_is_said_with_its_key(write, tmp_path, content, message):
+    if content is not None:
+        (tmp_path / "p.csv").write_text(content)
+    text = re.sub("(?m)^grid = .*", 'file = "p.csv"\n[rig.limits]\nphi1 = ["0 deg", "90 deg"]', CONTRACT)
+    with pytest.raises(StudyError, match=re.escape(message)) as caught:
+        load_turntable_study(write(text))
+    assert "study.toml: positions.file" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "start", ["grid = { phi1 = 5, phi2 = 5 }", 'plan = "6-position"', 'list = [["1 deg", "2 deg"]]']
+)
+@pytest.mark.parametrize(
+    ("override", "positions"),
+    [
+        ('positions.plan="24-position"', 24),
+        ("positions.grid={ phi1 = 3, phi2 = 4 }", 12),
+        ("positions.list=[['0 deg', '45 deg']]", 1),
+        ("positions.file=p.csv", 2),
+    ],
+)
+def test_a_way_to_give_positions_that_is_set_takes_the_place_of_the_other(
+    write, tmp_path, start, override, positions
+):
+    (tmp_path / "p.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n3,4\n")
+    path = write(re.sub("(?m)^grid = .*", start, CONTRACT))
+    assert len(load_turntable_study(path, [override]).plan) == positions
+
+
+def test_a_distribution_that_is_set_takes_the_place_of_the_other(write):
+    path = write(CONTRACT)  # deps_x is normal, the default uniform
+    chain = load_turntable_study(
+        path, ["rig.errors.deps_x.uniform=3 arcmin", "rig.errors.default.normal=4 arcmin"]
+    ).chain
+    std = dict(zip(chain.factors, chain.std, strict=True))
+    assert std["deps_x"] == pytest.approx(3 * ARCMIN / math.sqrt(3.0))
+    assert std["deps_y"] == pytest.approx(4 * ARCMIN)
+    assert next(e.scope for e in chain.errors if e.name == "deps_x") is Scope.RIG  # as the file has it
+
+
+def test_two_ways_in_one_file_are_still_refused_where_another_key_is_set(write):
+    text = CONTRACT.replace("[analysis]", 'plan = "24-position"\n[analysis]')
+    with pytest.raises(StudyError, match="positions: found grid and plan, expected one of them"):
+        load_turntable_study(write(text), ["analysis.seed=3"])
 
 
 def test_the_sampled_analysis_of_the_contract(write):

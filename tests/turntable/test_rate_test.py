@@ -218,7 +218,7 @@ def test_hysteresis_does_not_pass_for_curvature():
 def test_the_residuals_of_a_rate_test_are_drawn():
     found = run(study(instrument={"coefficients": {"S_z": 1.0}, "noise": 1e-6}))
     drawn = rate_pictures(found)
-    assert [picture.title for picture in drawn][0] == "Residual of each rate"
+    assert drawn[0].title == "Residual of each rate"
     assert all(picture.svg.startswith("<svg") for picture in drawn)
     assert rate_pictures(run(study((10,)))) == []
 

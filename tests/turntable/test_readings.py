@@ -147,7 +147,7 @@ def mixed():
 @pytest.mark.parametrize(
     ("record", "says"),
     [
-        (record_of([[0.0, 0.0]], [[1.0]], channels=("acc_x",)), "expected one of y_x, y_y of a gyrowheel"),
+        (record_of([[0.0, 0.0]], [[1.0]], channels=("acc_x",)), "expected one of y_x, y_y of the gyrowheel"),
         (mixed(), "another unit"),
         (record_of([[0.0, 0.0], [1.0, 0.0]], [1.0, 2.0], np.ones(2)), "the angles change within position 1"),
         (record_of([[np.nan, 0.0]], [1.0]), "found no rows with angles"),
@@ -163,3 +163,11 @@ def test_a_missing_joint_is_named():
     record = simulate(study(TUMBLE, table(0.0), coefficients=WHEEL_X), np.random.default_rng(1))
     with pytest.raises(RecordError, match="phi3"):
         readings(record, ("phi1", "phi2", "phi3"), "gyrowheel")
+
+
+def test_an_axis_that_the_table_does_not_have_is_refused():
+    """Three angles read for a table of two would be another attitude."""
+    record = simulate(study(TUMBLE), np.random.default_rng(1))
+    third = {"phi3": replace(record["phi2"], name="phi3")}
+    with pytest.raises(RecordError, match="found phi3, expected phi1, phi2 alone"):
+        readings(replace(record, columns=record.columns | third), JOINTS, "gyrowheel")

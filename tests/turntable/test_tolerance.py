@@ -82,7 +82,7 @@ def test_the_budget_adds_up_to_the_covariance_also_with_relative_terms():
 def test_a_share_is_the_part_of_the_variance_that_monte_carlo_gives_it():
     """One error alone is drawn, the fit being the same: its part of the variance of each coefficient.
 
-    20000 draws: relative standard error of a variance 1 %, of a normal variable.
+    2000 draws: relative standard error of a variance 3 %, of a normal variable.
     """
     chain = table()
     done = fitted(chain, channels=("y_x",))

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from inercal.cli import EXIT_BAD_VERDICT, process_age
-from inercal.cli.options import Files, MapFile, Overrides, ReportOutput, StudyFile, read_record, working
+from inercal.cli.options import (
+    Files,
+    MapFile,
+    Overrides,
+    ReportOutput,
+    StudyFile,
+    of_study,
+    read_record,
+    working,
+)
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -24,7 +33,15 @@ class Calibrated(Protocol):
         """The estimate."""
 
 
-S = TypeVar("S")
+class Settings(Protocol):
+    """What any study tells."""
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """Its keys as they were given."""
+
+
+S = TypeVar("S", bound=Settings)
 C = TypeVar("C", bound=Calibrated)
 
 
@@ -51,7 +68,7 @@ def calibrate_imu(
 
         return render(estimate, pictures(found), "Calibration of an inertial measurement unit")
 
-    return _hand_over(estimate, estimate, page, output)
+    return _hand_over(estimate, estimate, page, output, estimate.status.advice)
 
 
 def calibrate_turntable(
@@ -65,6 +82,7 @@ def calibrate_turntable(
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
     from inercal.study.load import load_turntable_study
+    from inercal.turntable.display import tolerances
     from inercal.turntable.task import Calibration, calibrate
 
     found, estimate = _solve(
@@ -74,12 +92,12 @@ def calibrate_turntable(
 
     def page() -> str:
         from inercal.report.html import render
-        from inercal.turntable.figures import pictures
+        from inercal.turntable.figures import pictures, rate_pictures
 
-        drawn = pictures(found) if isinstance(found, Calibration) else []
+        drawn = pictures(found) if isinstance(found, Calibration) else rate_pictures(found)
         return render(shown, drawn, "Calibration on a turntable")
 
-    return _hand_over(estimate, shown, page, output)
+    return _hand_over(estimate, shown, page, output, table=tolerances(estimate))
 
 
 def _solve(
@@ -92,21 +110,35 @@ def _solve(
 ) -> tuple[C, Estimate]:
     """Read study and record and calibrate; the estimate comes with its times and inputs."""
     from inercal.records.read import source_of
+    from inercal.study.load import files_of
 
     output.check((".json", ".toml"), (*files, map_file, study))
     told = settings()
+    studied = files_of(study, told.given)
+    output.spare(studied)
     clock = time.perf_counter()
     record = read_record(files, map_file, output)
     read_s = time.perf_counter() - clock
-    with working(output) as progress:
+    with of_study(study), working(output) as progress:
         found = calibrate(record, told, progress)
     estimate = found.estimate
     timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
-    return found, replace(estimate, timing=timing, inputs=(*estimate.inputs, source_of(study)))
+    return found, replace(estimate, timing=timing, inputs=(*estimate.inputs, *map(source_of, studied)))
 
 
-def _hand_over(estimate: Estimate, shown: Estimate, page: Callable[[], str], output: ReportOutput) -> int:
-    """Write what was asked for, say the verdict, and give the exit code; people see ``shown``."""
+def _hand_over(
+    estimate: Estimate,
+    shown: Estimate,
+    page: Callable[[], str],
+    output: ReportOutput,
+    advice: str = "",
+    table: str = "",
+) -> int:
+    """Write what was asked for, say the verdict, and give the exit code.
+
+    People see ``shown`` and the ``table`` below it, and with a bad verdict the ``advice``, where the message does not
+    hold it itself.
+    """
     from inercal.estimate.exchange import save, to_json
     from inercal.estimate.status import Status
 
@@ -119,9 +151,9 @@ def _hand_over(estimate: Estimate, shown: Estimate, page: Callable[[], str], out
 
         write_text(output.report, page())
         output.say(f"report: {output.report}")
-    text = f"{shown.table()}\n\n" if shown.names else ""
+    text = "".join(f"{part}\n\n" for part in (shown.table() if shown.names else "", table) if part)
     verdict = f"{estimate.status.value}: {estimate.message}"
-    if estimate.status is not Status.OK:
-        verdict += f"\n{estimate.status.advice}"
+    if estimate.status is not Status.OK and advice:
+        verdict += f"\n{advice}"
     output.emit(to_json(estimate), text + verdict)
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT

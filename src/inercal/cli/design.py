@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.cli.options import Overrides, ReportOutput, Study, envelope, working
+from inercal.cli.options import Overrides, ReportOutput, Study, envelope, of_study, working
 
 if TYPE_CHECKING:
     from inercal.turntable.settings import TurntableSettings
@@ -22,15 +22,17 @@ def design_positions(
 ) -> None:
     """Find the positions of a turntable that calibrate best."""
     from inercal.records.read import source_of
-    from inercal.study.load import load_turntable_study
+    from inercal.study.load import files_of, load_turntable_study
     from inercal.turntable.task import design
 
     output.check((".json", ".csv"), (study,))
     clock = time.perf_counter()
     settings = load_turntable_study(study, overrides or ())
+    inputs = files_of(study, settings.given)
+    output.spare(inputs)
     read_s = time.perf_counter() - clock
     clock = time.perf_counter()
-    with working(output) as progress:
+    with of_study(study), working(output) as progress:
         designed = design(settings, progress)
     timing = {"read": read_s, "solve": time.perf_counter() - clock}
     output.say_findings(designed.findings)
@@ -38,7 +40,7 @@ def design_positions(
         "design positions",
         designed.message,
         designed.result,
-        [source_of(study)],
+        map(source_of, inputs),
         designed.findings,
         timing=timing,
     )

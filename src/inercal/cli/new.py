@@ -2,52 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, envelope
 from inercal.errors import InputError
 
+if TYPE_CHECKING:
+    from inercal.units import Unit
+
 Recordings = Annotated[list[Path] | None, Parameter(help="Recordings, to guess a column map from.")]
 
 
 def new_imu(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen)
     """Write a study, and a map guessed from the recordings."""
+    from inercal.records.guess import guess_map
     from inercal.study.template import imu_template
 
-    _new("imu", files or [], output, imu_template)
+    _new("imu", files or [], output, imu_template, guess_map(files) if files else None)
 
 
 def new_turntable(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -> None:  # noqa: B008
-    """Write a study of a turntable, and a map guessed from the recordings."""
+    """Write a study of a turntable, and a map guessed from recordings whose headers do not say what they hold."""
+    from inercal.records.channels import of_a_table
+    from inercal.records.guess import guess_map
+    from inercal.records.read import canonical_units
     from inercal.study.template import turntable_template
 
-    _new("turntable", files or [], output, turntable_template)
+    channels: Mapping[str, Unit | None] = (canonical_units(files) if files else None) or {}
+    column_map = None
+    if files and not of_a_table(channels):
+        column_map = guess_map(files, on_table=True)
+        channels = dict.fromkeys(_mapped(column_map))
+    _new("turntable", files or [], output, partial(turntable_template, channels=channels), column_map)
+
+
+def _mapped(column_map: str) -> list[str]:
+    """The channels of a map."""
+    import tomllib
+
+    data = tomllib.loads(column_map)
+    parts = [data, *(part for part in data.get("file", {}).values() if isinstance(part, dict))]
+    return [name for part in parts for name in part.get("columns", ())]
 
 
 def _new(
-    kind: str, files: list[Path], output: FileOutput, template: Callable[[list[Path], Path, Path | None], str]
+    kind: str,
+    files: list[Path],
+    output: FileOutput,
+    template: Callable[[list[Path], Path, Path | None], str],
+    column_map: str | None,
 ) -> None:
-    """Write a study of that kind, and a map where there are files; nothing is overwritten."""
+    """Write a study of that kind, and the map if there is one; nothing is overwritten."""
     from inercal._files import write_text
-    from inercal.records.guess import guess_map
     from inercal.records.read import source_of
 
     output.check((".toml",), files)
     study = output.out or Path(f"{kind}.toml")
-    map_file = study.with_name(f"{study.stem}-map{study.suffix}")
-    text = guess_map(files) if files else None
-    for path in (study, map_file) if text is not None else (study,):
+    map_file = None if column_map is None else study.with_name(f"{study.stem}-map{study.suffix}")
+    written = [study] if map_file is None else [study, map_file]
+    for path in written:
         if path.exists():
             raise InputError(path, "exists already, expected a new file name (--out)")
-    written = [study]
-    write_text(study, template(files, study, None if text is None else map_file))
-    if text is not None:
-        write_text(map_file, text)
-        written.append(map_file)
-    result = {"study": str(study), "map": None if text is None else str(map_file)}
+    write_text(study, template(files, study, map_file))
+    if map_file is not None and column_map is not None:
+        write_text(map_file, column_map)
+    result = {"study": str(study), "map": None if map_file is None else str(map_file)}
     words = "\n".join(f"{path}: look it over and correct it" for path in written)
     output.emit(envelope(f"new {kind}", words, result, map(source_of, files)), words)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import process_age
-from inercal.errors import InputError
+from inercal.errors import InputError, StudyError
 
 if TYPE_CHECKING:
     from inercal.records.findings import Finding
@@ -151,6 +151,17 @@ def read_record(files: Sequence[Path], map_file: Path | None, output: FileOutput
         record = read(files, record_map, progress)
     output.spare(source.path for source in record.sources)  # a map may have named others
     return record
+
+
+@contextmanager
+def of_study(path: Path) -> Iterator[None]:
+    """Name the study where a task finds fault with one of its keys; what is wrong with a recording stays as it is."""
+    try:
+        yield
+    except InputError as error:
+        if type(error) not in (InputError, StudyError):
+            raise
+        raise StudyError(path, str(error)) from error
 
 
 @contextmanager

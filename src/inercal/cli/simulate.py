@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, Overrides, Study, envelope, reading
+from inercal.cli.options import FileOutput, Overrides, Study, envelope, of_study, reading
 from inercal.errors import InputError
 
 Seed = Annotated[int, Parameter(help="Seed of the random numbers, 0 or more; 1 if absent.")]
@@ -25,7 +25,7 @@ def simulate_turntable(
 
     from inercal.records.read import source_of
     from inercal.records.write import write_csv
-    from inercal.study.load import load_turntable_study
+    from inercal.study.load import files_of, load_turntable_study
     from inercal.turntable.task import simulate
 
     if output.out is None:
@@ -34,10 +34,13 @@ def simulate_turntable(
         raise InputError("--seed", f"found {seed}, expected 0 or more")
     output.check((".csv",), (study,))
     settings = load_turntable_study(study, overrides or ())
-    record = simulate(settings, np.random.default_rng(seed))
+    inputs = files_of(study, settings.given)
+    output.spare(inputs)
+    with of_study(study):
+        record = simulate(settings, np.random.default_rng(seed))
     with reading(output, "writing") as progress:
         write_csv(record, output.out, progress)
     rows = len(next(iter(record.columns.values())).t)
     words = f"{rows} rows written to {output.out}"
     result = {"out": str(output.out), "rows": rows, "seed": seed, "columns": list(record.columns)}
-    output.emit(envelope("simulate turntable", words, result, [source_of(study)]), words)
+    output.emit(envelope("simulate turntable", words, result, map(source_of, inputs)), words)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
 from inercal import __version__
 from inercal.errors import UsageError
@@ -22,8 +22,9 @@ COMMANDS = {
     ("new", "turntable"): (
         "inercal.cli.new:new_turntable",
         "Write a commented study of a turntable: of its sensitivity, design, simulation and calibration.\n\nGiven a "
-        "recording, also a column map guessed from it. The study goes to --out (turntable.toml if absent), the map "
-        "beside it (turntable-map.toml). Nothing that exists is overwritten.",
+        "recording, it is for the instrument in it; where the header does not say quantities and units, a column map "
+        "is guessed too. The study goes to --out (turntable.toml if absent), the map beside it (turntable-map.toml). "
+        "Nothing that exists is overwritten.",
         "inercal new turntable --out turntable.toml",
     ),
     ("inspect", ""): (
@@ -132,6 +133,17 @@ def call(arguments: list[str]) -> int | None:
         raise UsageError(f"{arguments[0]}: found no kind, expected {' or '.join(kinds)} after it")
     try:
         code: int | None = app()(arguments)
+    except MissingArgumentError as error:
+        raise UsageError(_missing(error)) from error
     except CycloptsError as error:
         raise UsageError(str(error)) from error
     return code
+
+
+def _missing(error: MissingArgumentError) -> str:
+    """What is missing: a value after an option, or the argument altogether."""
+    argument = error.argument
+    if argument is None or error.keyword is not None or argument.tokens:
+        return str(error)
+    words = (argument.parameter.help or "").rstrip(".")
+    return f"{' '.join(error.command_chain or ())}: {argument.name} is missing, expected it ({words})"

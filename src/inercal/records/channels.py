@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from inercal.units import Unit
@@ -59,6 +60,11 @@ class Channel:
 def is_channel(name: str) -> bool:
     """True for the names a record knows."""
     return any(re.fullmatch(names, name) for names, _, _ in _CHANNELS)
+
+
+def of_a_table(names: Iterable[str]) -> bool:
+    """True for the columns of a test on a table: it may have a row for each position or stay, and no time."""
+    return any(re.fullmatch(r"position|phi[123]|rate", name) for name in names)
 
 
 def nearest(name: str) -> str:

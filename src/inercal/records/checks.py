@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from inercal.records.channels import of_a_table
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Array, Column
@@ -33,7 +34,7 @@ def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
         Those of a record, by name; each time axis they share is looked at once.
     """
     clocks = {id(column.t): column for column in columns.values()}
-    sampled = not {"position", "phi1"} & columns.keys()  # other records may hold a row for each dwell
+    sampled = not of_a_table(columns)
     findings: list[Finding] = []
     with np.errstate(all="ignore"):
         for column in clocks.values():

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from inercal.errors import QuantityError, RecordError
-from inercal.records.channels import Origin, is_channel, misfit
+from inercal.records.channels import Origin, is_channel, misfit, of_a_table
 from inercal.records.read import format_of
 from inercal.records.read.table import Sample
 from inercal.records.record import Array
@@ -24,6 +24,7 @@ _SENSORS = {
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _TIME = r"t|time|timestamp|time stamp|stamp|sec|secs|seconds|time (?:s|ms|us|ns)|timestamp (?:s|ms|us|ns)"
 _LABEL = r"label|part|section|pose"
+_ANGLE = re.compile(r"phi ?([123])(?: ?(deg|rad|arcmin|arcsec))?")
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _EVERYDAY = ("s", "m/s^2", "deg/s", "deg", "degC", "1")
 
@@ -49,7 +50,7 @@ class _File:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def guess_map(paths: str | Path | Sequence[str | Path]) -> str:
+def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) -> str:
     """Guess a column map from the files themselves.
 
     Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``), arrays without a header
@@ -60,6 +61,8 @@ def guess_map(paths: str | Path | Sequence[str | Path]) -> str:
     ----------
     paths : path or sequence of paths
         The files of one record; of repeat runs the first is looked at.
+    on_table : bool
+        A test on a table: columns without names are not guessed, for angles and outputs look alike.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def guess_map(paths: str | Path | Sequence[str | Path]) -> str:
     """
     files: list[_File] = []
     for path in [paths] if isinstance(paths, str | Path) else paths:
-        file = _look(Path(path))
+        file = _look(Path(path), on_table)
         if not any(file.guesses.keys() & other.guesses.keys() - {"t"} for other in files):
             files.append(file)
     lines = [
@@ -87,12 +90,12 @@ def guess_map(paths: str | Path | Sequence[str | Path]) -> str:
             table = f"file.{name}"
             lines += ["", f"[{table}]", f"path = {_quoted(file.path.name)}", *_options(file, "")]
             lines += _columns(file, f"{table}.columns")
-    if any("t" not in file.guesses for file in files):
+    if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
         lines += _rate([line for file in files for line in file.leading])
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path) -> _File:
+def _look(path: Path, on_table: bool) -> _File:
     """Guess the channels of one file."""
     try:
         samples = sorted(format_of(path).peek(path), key=lambda sample: -len(sample.values))
@@ -102,11 +105,16 @@ def _look(path: Path) -> _File:
     for sample in samples:
         if len(sample.values) != len(samples[0].values):
             continue
-        for guess in _by_header(sample) if sample.names else _by_shape(sample, path):
+        for guess in _by_header(sample) if sample.names or on_table else _by_shape(sample, path):
             guesses.setdefault(guess.name, guess)
     if not guesses.keys() - {"t", "label"}:
         held = "; ".join(", ".join(sample.names) or f"{sample.values.shape[1]} columns" for sample in samples)
-        raise RecordError(path, f"found {held[:100]}, expected columns that look like those of an instrument")
+        wanted = (
+            "a header such as phi1,phi2,acc_x"
+            if on_table
+            else "columns that look like those of an instrument"
+        )
+        raise RecordError(path, f"found {held[:100]}, expected {wanted}")
     return _File(path, guesses, tuple(line for sample in samples for line in sample.leading))
 
 
@@ -118,6 +126,8 @@ def _by_header(sample: Sample) -> list[_Guess]:
         plain, unit = (match[1], match[2]) if match else (title, None)
         name = plain if is_channel(plain) else _named(plain)
         if name is not None:
+            angle = _ANGLE.fullmatch(_words(plain))
+            unit = unit or (angle[2] if angle else None)
             origin = title if sample.names.count(title) == 1 else index
             reason = f"the header says {_quoted(title)}"
             guesses.append(_Guess(name, origin, sample.values[:, index], unit, reason))
@@ -126,16 +136,28 @@ def _by_header(sample: Sample) -> list[_Guess]:
 
 def _named(title: str) -> str | None:
     """The channel a header's name stands for, if any."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title)
-    words = re.sub(r"[^a-z0-9]+", " ", words.lower()).strip()
+    words = _words(title)
+    if angle := _ANGLE.fullmatch(words):
+        return f"phi{angle[1]}"
     for sensor, names in _SENSORS.items():
         match = re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz]) (?:{names})", words)
         if match:
             return f"{sensor}_{match[1] or match[2]}"
-    for channel, names in (("t", _TIME), ("label", _LABEL), ("temperature", r"temp|temperature")):
+    for channel, names in (
+        ("t", _TIME),
+        ("label", _LABEL),
+        ("temperature", r"temp|temperature"),
+        ("position", "position"),
+    ):
         if re.fullmatch(rf"(?:.* )?(?:{names})", words):
             return channel
     return None
+
+
+def _words(title: str) -> str:
+    """A header's name as words in small letters."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title)
+    return re.sub(r"[^a-z0-9]+", " ", words.lower()).strip()
 
 
 def _by_shape(sample: Sample, path: Path) -> list[_Guess]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from inercal._toml import read_toml
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
 from inercal.study.imu import imu_study
+from inercal.study.positions import WAYS
+from inercal.study.rig import DISTRIBUTIONS
 from inercal.study.turntable import turntable_study
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import shown
@@ -23,6 +26,9 @@ _COMMANDS = {
     "sting": "aoa",
 }
 
+#: tables (a regular expression) that hold one of these keys: setting one takes the place of the others
+_ONE_OF = ((r"positions", WAYS), (r"rig\.errors\.\w+", DISTRIBUTIONS))
+
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
     """Read the study of ``inercal calibrate imu``.
@@ -33,7 +39,8 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
         The TOML file.
     overrides : iterable of str
         Keys to set over those of the file, ``"imu.static_start=50 s"``. A value that is TOML
-        (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text.
+        (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text. Where a table holds one of several
+        keys (``positions.grid``, ``plan``, ...), one that is set takes the place of the others.
 
     Raises
     ------
@@ -59,6 +66,12 @@ def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> Tur
         One sentence: file and key, what was found, what was expected.
     """
     return turntable_study(_read(path, overrides, "calibrate turntable"), path)
+
+
+def files_of(path: Path, given: Mapping[str, Any]) -> tuple[Path, ...]:
+    """The study of a turntable, and the files that it names; ``given`` as in its settings."""
+    name = given.get("positions", {}).get("file")
+    return (path,) if name is None else (path, path.parent / name)
 
 
 def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
@@ -94,7 +107,17 @@ def _put(data: dict[str, Any], override: str) -> None:
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
             raise StudyError(where, f"{'.'.join(keys[:depth])} is no table, expected the key of a value")
+        _make_room(table, ".".join(keys[:depth]), keys[depth])
     table[keys[-1]] = _value(text.strip())
+
+
+def _make_room(table: dict[str, Any], name: str, key: str) -> None:
+    """Take out of the table of that name what cannot stand beside the key."""
+    for names, keys in _ONE_OF:
+        if key in keys and re.fullmatch(names, name):
+            for other in keys:
+                if other != key:
+                    table.pop(other, None)
 
 
 def _value(text: str) -> Any:

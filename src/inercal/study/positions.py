@@ -1,10 +1,11 @@
-"""Positions of a table in a study: a grid, a plan by its name, or a list."""
+"""Positions of a table in a study: a grid, a plan by its name, a list, or a file."""
 
 from __future__ import annotations
 
 import difflib
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,7 +14,8 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from inercal._toml import Strict
 from inercal.design.allowed import within
-from inercal.errors import StudyError
+from inercal.errors import InputError, StudyError
+from inercal.records.read import read
 from inercal.rigs.chain import Chain
 from inercal.rigs.plans import NAMED, Plan, grid, listed, named
 from inercal.study.fields import refusal
@@ -24,6 +26,11 @@ Array = NDArray[np.float64]
 
 MOST = 200_000
 """Positions of a grid that fit into memory with all their indices."""
+
+WAYS = ("grid", "plan", "list", "file")
+"""Keys of which a study gives one."""
+
+_JOINTS = ("phi1", "phi2", "phi3")
 
 Count = Annotated[StrictInt, Field(ge=1)]
 
@@ -52,18 +59,24 @@ class GridTable(Strict):
 
 
 class PositionsTable(Strict):
-    """The positions to analyse, simulate or calibrate at: one of three."""
+    """The positions to analyse, simulate or calibrate at: one of four."""
 
     grid: GridTable | None = Field(default=None, title="Grid", description="evenly spaced angles")
     plan: PlanName | None = Field(default=None, description="a plan of a two-axis table by its name")
     list_: list[list[Angle]] | None = Field(
         default=None, alias="list", min_length=1, description="the angles of each position"
     )
+    file: str | None = Field(
+        default=None,
+        min_length=1,
+        description="a CSV beside the study with the header phi1 [deg],phi2 [deg] and a position a row",
+        examples=["positions.csv"],
+    )
 
     @model_validator(mode="after")
     def _one(self) -> PositionsTable:
         """Refuse two ways at once."""
-        ways = {"grid": self.grid, "plan": self.plan, "list": self.list_}
+        ways = dict(zip(WAYS, (self.grid, self.plan, self.list_, self.file), strict=True))
         given = [name for name, way in ways.items() if way is not None]
         if len(given) > 1:
             raise refusal(f"found {' and '.join(given)}, expected one of them")
@@ -80,19 +93,21 @@ def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) 
     Raises
     ------
     StudyError
-        A plan that is not for this table, a list that does not fit its joints, or a position beyond a limit.
+        A plan that is not for this table, a list or a file that does not fit its joints, a file that cannot be
+        read, or a position beyond a limit.
     """
     if table.plan is not None:
-        plan = _named(table.plan, chain, "positions.plan", where)
+        key, plan = f"positions.plan {table.plan}", _named(table.plan, chain, "positions.plan", where)
     elif table.list_ is not None:
-        plan = listed(_rows(table.list_, chain, where))
+        key, plan = "positions.list", listed(_rows(table.list_, chain, where))
+    elif table.file is not None:
+        key, plan = f"positions.file {shown(table.file)}", _of_file(table.file, chain, where)
     else:
         return grid_of(table.grid, chain, limits, "positions.grid", where, half=True)
     inside, angles = _reached(plan, chain, limits)
     if not inside.all():
         first = int(np.argmin(inside))
         place = ", ".join(f"{math.degrees(angle):.6g} deg" for angle in plan.angles[first])
-        key = "positions.list" if table.plan is None else f"positions.plan {table.plan}"
         raise StudyError(
             where,
             f"{key}: found position {first + 1} ({place}) beyond rig.limits, expected all within",
@@ -181,3 +196,29 @@ def _rows(rows: Sequence[Sequence[Any]], chain: Chain, where: object) -> list[li
                 f"positions.list.{k}: found {len(row)} angles, expected {', '.join(chain.joints)}",
             )
     return [[angle.value for angle in row] for row in rows]
+
+
+def _of_file(name: str, chain: Chain, where: object) -> Plan:
+    """The positions in a file, whose path is taken from the folder of the study."""
+    path = Path(str(where)).parent / name
+    key = f"positions.file: {shown(name)}"
+    head = ",".join(f"{joint} [deg]" for joint in chain.joints)
+    if not path.is_file():
+        raise StudyError(
+            where, f"{key}: no such file beside the study, expected a CSV with the header {head}"
+        )
+    try:
+        record = read(path)
+        angles = {column.name: column.si() for column in record.columns.values() if column.name in _JOINTS}
+    except InputError as error:
+        raise StudyError(where, f"positions.file: {error} (its header should be {head})") from error
+    if tuple(sorted(angles)) != chain.joints:
+        raise StudyError(
+            where, f"{key}: found {', '.join(record.columns)}, expected {', '.join(chain.joints)}"
+        )
+    if len(rows := np.stack([angles[joint] for joint in chain.joints], axis=-1)) > MOST:
+        raise StudyError(where, f"{key}: found {len(rows)} positions, expected at most {MOST}")
+    missing = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if missing.size:
+        raise StudyError(where, f"{key}: found no angle in row {missing[0] + 1}, expected one for each axis")
+    return Plan(path.name, rows)

@@ -32,7 +32,10 @@ _MAKE: Mapping[str, Callable[[float], Distribution]] = {
     "triangular": triangular,
     "two_point": two_point,
 }
-_DISTRIBUTIONS = "uniform, normal, triangular or two_point"
+DISTRIBUTIONS = tuple(_MAKE)
+"""Keys of which an error of the table gives one."""
+
+_EXPECTED = "uniform, normal, triangular or two_point"
 _LEAVE_OUT = 'an error is left out with NAME = "none"'
 
 
@@ -206,7 +209,7 @@ def chain_of(table: RigTable, where: object) -> Chain:
     usual = given.pop("default", None)
     default = None if usual is None else usual.distribution()
     if usual is not None and default is None:
-        raise StudyError(where, f"rig.errors.default: found no distribution, expected {_DISTRIBUTIONS}")
+        raise StudyError(where, f"rig.errors.default: found no distribution, expected {_EXPECTED}")
     scopes: dict[str, Scope] = {}
     if usual is not None and usual.scope is not None:
         scopes = dict.fromkeys(known, Scope(usual.scope))
@@ -221,7 +224,7 @@ def chain_of(table: RigTable, where: object) -> Chain:
             continue
         distribution = error.distribution() or (None if known[name].is_offset else default)
         if distribution is None:
-            raise StudyError(where, f"rig.errors.{name}: found no distribution, expected {_DISTRIBUTIONS}")
+            raise StudyError(where, f"rig.errors.{name}: found no distribution, expected {_EXPECTED}")
         errors[name] = distribution
         if error.scope is not None:
             scopes[name] = Scope(error.scope)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from inercal.rigs.plans import NAMED
 from inercal.rigs.tables import Slot, slots
+from inercal.study.template_instrument import instrument_lines
+from inercal.units import Unit
 
 _HEAD = """\
 # Study {what}. Replace what is not so; take the "# " from keys that you know.
@@ -57,10 +59,11 @@ default = { uniform = "2 arcmin" }  # [arcmin]; of every error below but the opt
 # phi1 = ["-90 deg", "90 deg"]      # lowest and highest outer angle [deg]
 # phi2 = ["-180 deg", "180 deg"]    # of the next axis [deg]; phi3 of the inner axis of three
 
-[positions]                         # where to stop: grid, plan or list
+[positions]                         # where to stop: grid, plan, list or file
 grid = { phi1 = 36, phi2 = 36, offset = "half" }  # numbers of angles; offset "none" starts at zero
 # plan = "24-position"              # instead: {plans}
 # list = [["0 deg", "45 deg"]]      # instead: the angles of each position
+# file = "positions.csv"            # instead: a CSV as `inercal design positions` writes it, beside the study
 
 [analysis]                          # of the sensitivity
 outputs = ["ax", "ay", "az", "wx", "wy"]  # gravity and earth rate on the instrument's axes; wz too
@@ -69,21 +72,7 @@ method = "exact"                    # or "sampled", "local" (derivatives alone)
 # samples = 1024                    # for sampled: rows at each position
 # seed = 1                          # for sampled: of the random numbers
 
-[instrument]                        # what is on the table
-kind = "gyrowheel"                  # or "gyro", "accelerometer"
-# unit = "deg/h"                    # of its outputs in a simulation; rad/s or m/s^2 if absent
-# terms = ["DX_F", "DX_X", "k_x"]   # to estimate; those usual for the kind if absent
-# noise = "0.01 deg/h"              # of a reading, or "0.001 deg/sqrt(h)"; from the scatter if absent
-# dwell = "60 s"                    # time in each position [s]
-# rate = "10 Hz"                    # of a simulated recording [Hz]; one row a position if absent
-# earth_rate = "fitted"             # or "stated": k of the table below; if absent where the plan allows
-
-[instrument.coefficients]           # true values to simulate; stated ones of what is not fitted
-# DX_F = "50 deg/h"                 # fixed drift, in the unit of the outputs
-# DX_X = "60 deg/h/g"               # per gravity along x; g is 9.80665 m/s^2
-# DX_XX = "2 deg/h/g^2"             # per square of gravity along x
-# k_x = "1.00(2)"                   # response to earth rate about x
-
+{instrument}
 [design]                            # search for positions
 positions = 24                      # how many
 criterion = "D"                     # all coefficients together; "A" their mean variance, "I" of prediction
@@ -139,16 +128,18 @@ def turntable_template(
     record_paths: Sequence[str | Path] = (),
     study_path: str | Path = "STUDY.toml",
     map_path: str | Path | None = None,
+    channels: Mapping[str, Unit | None] | None = None,
 ) -> str:
     """A study of a turntable with every key in it, each explained; arguments as for `imu_template`.
 
-    It loads as it is, with eleven errors of 2 arcmin and a latitude that stands for anywhere on Earth.
+    ``channels`` are those of the recordings with their units, where known: they tell the kind of instrument. It
+    loads as it is, with eleven errors of 2 arcmin and a latitude that stands for anywhere on Earth.
     """
     following = f"sensitivity {_words([study_path])}"
     if record_paths:
         following = f"calibrate turntable {_files(record_paths, study_path, map_path)}"
     body = _TURNTABLE.replace("{errors}", "".join(map(_error_line, slots("two_axis_turntable"))))
-    body = body.replace("{plans}", " ".join(NAMED))
+    body = body.replace("{plans}", " ".join(NAMED)).replace("{instrument}", instrument_lines(channels or {}))
     return _HEAD.format(what="of a turntable", next=following) + body + _COMMON
 
 

@@ -1,4 +1,4 @@
-"""An estimate of a turntable for people: rates and accelerations in the record's unit, small angles in arcsec."""
+"""An estimate of a turntable for people: in units of the field, readings in that of the record, angles in arcsec."""
 
 from __future__ import annotations
 
@@ -9,16 +9,29 @@ from typing import Any
 import numpy as np
 
 from inercal.estimate.result import Estimate
-from inercal.units import Unit
+from inercal.units import STANDARD_GRAVITY, Unit
 
 _ARCSEC = np.radians(1.0 / 3600.0)
 
+#: SI unit of a term -> that of the field, in which it is stated too, and how many of the old it is
+_OF_FIELD = {
+    "rad": ("arcsec", _ARCSEC),
+    "1/(m/s^2)": ("ug/g^2", 1e-6 / STANDARD_GRAVITY),
+    "1/(m/s^2)^2": ("ug/g^3", 1e-6 / STANDARD_GRAVITY**2),
+}
+
 
 def shown_unit(text: str, unit: Unit) -> tuple[str, float]:
-    """A unit with SI rate or acceleration as the record has them, and how many of the old it is.
+    """A unit of a term or reading for people, and how many of the old it is.
 
-    ``deg/h`` and 4.8e-6 for ``rad/s`` where ``unit`` is deg/h; units of anything else stay.
+    Rates and accelerations as the record has them: ``deg/h`` and 4.8e-6 for ``rad/s`` where ``unit`` is deg/h, but
+    ``ug`` where it is g or m/s^2. Angles in arcsec, terms of second and third order of an accelerometer in ug/g^2
+    and ug/g^3. Units of anything else stay.
     """
+    if text in _OF_FIELD:
+        return _OF_FIELD[text]
+    if text == "m/s^2" and unit.symbol in ("g", "m/s^2"):
+        return "ug", 1e-6 * STANDARD_GRAVITY
     if unit.factor == 1.0 or not text.startswith(unit.si):
         return text, 1.0
     return unit.symbol + text.removeprefix(unit.si), unit.factor
@@ -39,17 +52,12 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
         budget=tuple(
             replace(item, u=item.u / size, unit=text)
             for item in estimate.budget
-            for text, size in [_of_source(item.unit, unit)]
+            for text, size in [shown_unit(item.unit, unit)]
         ),
         statistics=_with_unit(estimate.statistics, "residual_rms", unit),
         conditions=_conditions(estimate.conditions, unit),
         result=_result(estimate.result, unit),
     )
-
-
-def _of_source(text: str, unit: Unit) -> tuple[str, float]:
-    """The unit of a source of the budget, for people."""
-    return ("arcsec", _ARCSEC) if text == "rad" else shown_unit(text, unit)
 
 
 def _with_unit(values: Mapping[str, float], key: str, unit: Unit) -> dict[str, float]:
@@ -106,7 +114,7 @@ def tolerances(estimate: Estimate) -> str:
     shares, halved = estimate.result.get("tolerance_shares", {}), estimate.result.get("halved", {})
     rows = []
     for name, of_table in shares.items():
-        if of_table:
+        if of_table and halved:
             factor = max(of_table, key=lambda each: float(of_table[each]))
             rows.append((name, factor, f"{100.0 * of_table[factor]:.0f} %", f"{halved[factor][name]:.2f}"))
     if not rows:

@@ -71,8 +71,13 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     if not channels:
         raise RecordError(
             where,
-            f"found {', '.join(record.columns)}, expected one of {', '.join(CHANNELS[kind])} of a {kind}",
+            f"found {', '.join(record.columns)}, expected one of {', '.join(CHANNELS[kind])} of the {kind}",
         )
+    for name in ("phi1", "phi2", "phi3"):
+        if name in record and name not in joints:
+            raise RecordError(
+                where, f"found {name}, expected {', '.join(joints)} alone: the study's table has no such axis"
+            )
     columns = [record[name] for name in channels]
     for column in columns:
         if column.unit != columns[0].unit or len(column.values) != len(columns[0].values):

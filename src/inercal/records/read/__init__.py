@@ -10,11 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from inercal.errors import MapError, RecordError
+from inercal.errors import InputError, MapError, RecordError
 from inercal.records.checks import check
 from inercal.records.read.join import FileTable, join
 from inercal.records.read.table import Format, Part
 from inercal.records.record import Record, Source
+from inercal.units import Unit
 
 if TYPE_CHECKING:
     from inercal.records.maps import RecordMap
@@ -134,6 +135,18 @@ def source_of(path: str | Path) -> Source:
             return Source(str(path), hashlib.file_digest(file, "sha256").hexdigest())
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
+
+
+def canonical_units(paths: Sequence[Path]) -> dict[str, Unit] | None:
+    """Unit of each channel that the headers of the files name; None where one of them needs a map, or is none."""
+    from inercal.records.read import text
+
+    try:
+        if any(format_of(path) is not text for path in paths):
+            return None
+        return {channel.name: channel.unit for path in paths for channel in text.header(path)}
+    except (InputError, OSError):
+        return None
 
 
 def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], None]) -> FileTable:

@@ -1,4 +1,7 @@
-"""Tables of one or several files joined into the columns of a record, each with its time axis."""
+"""Tables of one or several files joined into the columns of a record, each with its time axis.
+
+Where a test on a table states no time, rows are counted: the axis is 0, 1, 2, ...
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import MapError, RecordError
-from inercal.records.channels import Channel
+from inercal.records.channels import Channel, of_a_table
 from inercal.records.read.table import Part, Table
 from inercal.records.record import Array, Column, Source
 from inercal.units import parse_unit, shown
@@ -106,7 +109,7 @@ def _time_axis(file: FileTable, files: Sequence[FileTable], rate: float | None) 
         )
     if rate is not None:
         return np.arange(table.rows) / rate
-    if "position" in table.values:
+    if of_a_table(table.values) and not any(channel.increment for channel in table.channels):
         return np.arange(table.rows, dtype=np.float64)
     raise RecordError(
         file.path, 'found no time column t, expected one, or [time] rate = "100 Hz" (say) in a column map'

@@ -91,6 +91,13 @@ def read(
     )
 
 
+def header(path: Path) -> tuple[Channel, ...]:
+    """The channels that a canonical header names; raises `InputError` for any other file."""
+    with path.open("rb") as file:
+        lines = next(blocks(file, path)).lines
+    return _canonical(find_layout(lines, FileOptions(), path), lines, path)
+
+
 def peek(path: Path) -> list[Sample]:
     """Look at the first 2 MB of a text file; lines before the header are found out."""
     with path.open("rb") as file:
