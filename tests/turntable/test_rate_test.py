@@ -339,6 +339,21 @@ def test_intervals_cover_as_they_say():
     assert all(low <= count <= high for count in hits.values()), (hits, low, high)
 
 
+def test_a_bias_is_covered_where_the_table_scatters_more_than_the_noise():
+    """Noise that is not stated hides behind table errors of 30 arcmin: its few degrees of freedom must count."""
+    runs, level, bias = 300, 0.95, 5.0 * DEG_H
+    told = {"coefficients": {"S_z": 1.0, "D_F_z": bias}, "noise": 2.0 * DEG_H}
+    settings = study(UP_AND_DOWN, normal(30.0 / 60.0 * DEG), instrument=told)
+    unstated = replace(settings, instrument=replace(settings.instrument, noise=None))
+    rng = np.random.default_rng(20261121)
+    hits = 0
+    for _ in range(runs):
+        low, high = calibrate(simulate(settings, rng), unstated).estimate["D_F_z"].interval(level)
+        hits += low <= bias <= high
+    low, high = (stats.binom.ppf(q, runs, level) for q in (0.0005, 0.9995))
+    assert low <= hits <= high, (hits, low, high)
+
+
 def test_the_rate_of_the_table_is_uncertain_in_common():
     """It enters the scale factor in full, and no other term; gyros tested together share it."""
     told = {"coefficients": {"S_x": 1.0, "S_z": 1.0}, "noise": 0.1 * DEG_H}

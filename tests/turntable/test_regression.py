@@ -25,7 +25,8 @@ from inercal.rigs.chain import Scope
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, listed, named
 from inercal.turntable.model import table_model
-from inercal.turntable.regression import fit, known, weights
+from inercal.turntable.regression import fit, known
+from inercal.turntable.weights import weights
 
 K_X = ("k_x", "k_y", "k_z")
 K_ALL = (*K_X, "kY_x", "kY_y", "kY_z")
@@ -329,14 +330,42 @@ def test_the_noise_is_estimated_from_what_the_table_leaves_unexplained(half_widt
         assert np.mean(dof) < 24.0
 
 
-def test_chi2_of_each_channel_is_its_degrees_of_freedom_where_the_noise_is_estimated():
+def restricted(rows, y, weight, sigma):
+    """Minus twice the logarithm of the restricted likelihood, from matrices written out in full."""
+    n, c, p = rows.shape
+    X, r = rows.reshape(n * c, p), y.reshape(n * c)
+    V = np.zeros((n * c, n * c))
+    for k in range(n):
+        V[k * c : k * c + c, k * c : k * c + c] = weight.within[k] + np.diag(sigma**2)
+    common = weight.common.reshape(n * c, -1)
+    V += common @ common.T
+    X = X / np.linalg.norm(X, axis=0)
+    inverse = np.linalg.inv(V / V[0, 0]) / V[0, 0]
+    M = X.T @ inverse @ X
+    rest = r - X @ np.linalg.solve(M, X.T @ inverse @ r)
+    logarithm = np.linalg.slogdet(V / V[0, 0])[1] + n * c * np.log(V[0, 0]) + np.linalg.slogdet(M)[1]
+    return logarithm + rest @ inverse @ rest
+
+
+@pytest.mark.parametrize("sizes", [(0.1, 0.05), (0.02, 0.2)])
+def test_the_noise_that_is_not_stated_is_the_most_likely_one(sizes):
+    """Of both channels together, outside the space of the terms (Patterson and Thompson 1971)."""
     chain, rng = table(), np.random.default_rng(3)
-    model = model_of(FULL_RANK, chain=chain)
-    y = model.outputs(FULL_RANK.angles, true_c(model), chain.draw(rng, 36))
-    y = y + rng.normal(0.0, 0.1 * DEG_H, (36, 1))
-    found = fit(model, FULL_RANK.angles, y, [None])
-    assert found.chi2 == pytest.approx(24.0, rel=1e-3)
-    assert found.noise_dof[0] <= 24.0
+    model = table_model(study(FULL_RANK, chain), ("y_x", "y_y"))
+    c = np.concatenate([channel.linear([WHEEL[s] for s in channel.symbols]) for channel in model.channels])
+    angles = FULL_RANK.angles
+    y = model.outputs(angles, c, chain.draw(rng, 36)) + rng.normal(0.0, np.array(sizes) * DEG_H, (36, 2))
+    found = fit(model, angles, y, [None, None])
+    rows, weight = model.rows(angles), weights(model, angles, found.c, np.zeros(2))
+    best = restricted(rows, y, weight, found.noise)
+    for k in range(2):
+        for step in (-0.02, 0.02):
+            other = found.noise * np.exp(np.where(np.arange(2) == k, step, 0.0))
+            assert restricted(rows, y, weight, other) > best
+    # near the truth, as its degrees of freedom have it: five standard deviations of the logarithm
+    apart = np.abs(np.log(found.noise / (np.array(sizes) * DEG_H)))
+    assert np.all(apart < 5.0 / np.sqrt(2.0 * found.noise_dof))
+    assert np.all(found.noise_dof < 36.0)
 
 
 def test_a_table_that_explains_more_than_the_scatter_leaves_no_noise():

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inercal.design.candidates import Candidates
 from inercal.errors import InputError
-from inercal.estimate.identifiability import identify, in_words
+from inercal.estimate.identifiability import few_terms, identify, in_words
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -100,7 +100,7 @@ def require(candidates: Candidates, allowed: Mask, n: int, repeats: bool, where:
         raise InputError(where, f"found {remain} of {m} candidates that remain, expected {n} or more")
     known = identify(candidates.whitened[allowed, :, :p].reshape(-1, p), candidates.names)
     if known.rank < p:
-        unknown = "; ".join(in_words(v, candidates.names) for v in known.null_vectors)
+        unknown = "; ".join(in_words(v, candidates.names) for v in few_terms(known.null_vectors))
         raise InputError(
             where,
             f"found that the {remain} of {m} candidates that remain identify {known.rank} of {p} coefficients, "

@@ -100,3 +100,18 @@ def in_words(direction: Array, names: Sequence[str], smallest: float = 0.3) -> s
     kept = [k for k in order if abs(direction[k]) >= smallest * abs(top)]
     signed = [f"{direction[k] / top:+.2f} {names[k]}" for k in kept[1:]]
     return " ".join([names[kept[0]], *signed]).replace("+", "+ ").replace("-", "- ")
+
+
+def few_terms(vectors: Array) -> Array:
+    """Null vectors (k, p) that span the same space with as few terms as they can have: reduced row echelon form,
+    largest pivots first."""
+    rows = vectors.copy()
+    for k in range(len(rows)):
+        j = int(np.argmax(np.abs(rows[k:]).max(axis=0)))
+        i = k + int(np.argmax(np.abs(rows[k:, j])))
+        rows[[k, i]] = rows[[i, k]]
+        rows[k] /= rows[k, j]
+        others = np.arange(len(rows)) != k
+        rows[others] -= rows[others, j][:, None] * rows[k]
+    rows[np.abs(rows) < 1e-9] = 0.0
+    return rows

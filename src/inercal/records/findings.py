@@ -35,6 +35,7 @@ CODES: dict[str, str] = {
     "stated_earth_rate": "earth rate is subtracted and its terms are not fitted",
     "whole_turns": "the angle of a turning axis is not known, and whole turns are taken for granted",
     "weak_term": "a term is hardly known",
+    "large_errors": "errors of the table are so large that their squares matter",
     "no_coefficients": "nothing is known of the instrument by which table errors act",
 }
 

@@ -20,7 +20,8 @@ from inercal.rigs.chain import Error
 from inercal.rigs.outputs import gravity_reference
 from inercal.turntable.analysis import result as analysis_result
 from inercal.turntable.display import shown_unit
-from inercal.turntable.regression import Regression, weights
+from inercal.turntable.regression import Regression
+from inercal.turntable.weights import weights
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate

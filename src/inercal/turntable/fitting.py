@@ -49,7 +49,7 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
             f"with {', '.join(stated)}"
         )
         findings.append(Finding("stated_earth_rate", said))
-    earth_rate = "stated" if stated else "fitted"
+    earth_rate = earth_rate_of(model)
     if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
         return Fitting(model, what, earth_rate, None, tuple(findings))
     noise = [settings.instrument.noise] * len(found.channels)
@@ -77,6 +77,12 @@ def choose_terms(
         return whole, what, ""
     free = next(words for each in what for words in each.words if set(words.split()) & set(rates))
     return rest, without, free
+
+
+def earth_rate_of(model: TableModel) -> str:
+    """``stated`` if terms of the earth rate are taken as known, else ``fitted``."""
+    stated = any(each.of_rate for part in model.stated for each in part.channel.monomials)
+    return "stated" if stated else "fitted"
 
 
 def leaves_rates_unknown(whole: tuple[Known, ...], without: tuple[Known, ...]) -> bool:

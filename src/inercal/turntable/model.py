@@ -202,9 +202,15 @@ def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel
     """What the study states of the terms in ``rest``, of a channel whose whole ``model`` it is a part of."""
     values = stated_values(settings, model)
     linear, typed = model.linear(values), settings.instrument.coefficients_u
-    # a misalignment enters times the scale factor, whose own small uncertainty does not matter to it
+    # a relative term enters times the stated scale factor: what is fitted of that changes it to second order
     lead = [model.gain(values) if symbol in model.relative else 1.0 for symbol in model.symbols]
     places = [model.symbols.index(symbol) for symbol in rest.symbols]
+    lost = [s for s in rest.symbols if s in model.relative and settings.instrument.coefficients.get(s)]
+    if lost and not model.gain(values):
+        raise StudyError(
+            "instrument.coefficients",
+            f"{', '.join(lost)} relate to {model.leading}, expected a value of {model.leading} too, or to fit them",
+        )
     u = np.array([typed.get(model.symbols[j], 0.0) * lead[j] for j in places])
     return Stated(rest, linear[places], np.abs(u))
 

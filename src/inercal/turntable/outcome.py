@@ -15,14 +15,16 @@ from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.estimate.status import Status
 from inercal.instruments.terms import TERMS
+from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.fitting import Fitting, fewest_positions
 from inercal.turntable.model import orthonormal
 from inercal.turntable.readings import Readings
-from inercal.turntable.regression import Regression
+from inercal.turntable.regression import Regression, worst_rank
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import alternatives, coefficient_shares, drift_shares, shifts
+from inercal.turntable.weights import weights
 
 Array = NDArray[np.float64]
 
@@ -54,8 +56,8 @@ REFERENCES = (
     "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
     "Zhao et al., Error sensitivity analysis of a turntable-gyrowheel calibration system, Journal of Ordnance "
     "Equipment Engineering 44(1) (2023)",
-    "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
-    "Chemistry 42 (1970) 1194",
+    "H. D. Patterson, R. Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58 "
+    "(1971) 545",
 )
 
 
@@ -110,10 +112,10 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "references": REFERENCES,
     }
     findings = [*record.findings, *fitting.findings]
-    ranks = [each.identifiability.rank for each in fitting.known]
+    rank, terms_asked = worst_rank(fitting.known)
     result: dict[str, Any] = {
-        "rank": min(ranks),
-        "terms": max(len(channel.symbols) for channel in fitting.model.channels),
+        "rank": rank,
+        "terms": terms_asked,
         "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
         "plan": _plan(found, fitting, settings),
         "instrument": settings.instrument.kind,
@@ -138,6 +140,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     names = fit.model.symbols
     covariance, dof, budget = combine(names, sources(fit, terms, unit))
     status, message = _verdict(found, fitting)
+    findings += _too_large(fit)
     return Estimate(
         names=names,
         units=tuple(unit_of_term(name, unit) for name in names),
@@ -179,6 +182,28 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
         f"{counted(len(fit.c), 'coefficient')} from {counted(len(found.y), 'position')} of "
         f"{counted(len(found.channels), 'channel')}"
     )
+
+
+def _too_large(fit: Regression) -> list[Finding]:
+    """What is to be said where errors of the table bend the readings by more than their noise."""
+    chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
+    weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
+    spread = np.einsum("ncc->nc", weight.within) + np.square(weight.common).sum(axis=-1)
+    # where no noise is left, squares a thousand times below the rest do not matter either
+    limit = np.maximum(fit.noise, 1e-3 * np.sqrt(spread.mean(axis=0)))
+    bent = []
+    for error, step in zip(chain.errors, np.diag(chain.std), strict=True):
+        ends = [fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0)]
+        curvature = 0.5 * (ends[0] + ends[1]) - straight
+        if np.any(np.sqrt(np.mean(np.square(curvature), axis=0)) > limit):
+            bent.append(error.name)
+    if not bent:
+        return []
+    said = (
+        f"{', '.join(bent)} may be so large that their squares bend the readings by more than the noise: the "
+        "uncertainties hold for small errors"
+    )
+    return [Finding("large_errors", said)]
 
 
 def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings) -> str:

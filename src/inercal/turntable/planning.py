@@ -18,12 +18,13 @@ from inercal.errors import StudyError
 from inercal.records.findings import Finding
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
-from inercal.turntable.fitting import choose_terms, rate_terms
+from inercal.turntable.fitting import choose_terms, earth_rate_of, rate_terms
 from inercal.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
 from inercal.turntable.outcome import unit_of_term
-from inercal.turntable.regression import fit, full_inputs, known, weights
+from inercal.turntable.regression import fit, full_inputs, known, worst_rank
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import drift_shares, sphere_moments
+from inercal.turntable.weights import weights
 from inercal.units import Unit
 
 Array = NDArray[np.float64]
@@ -164,7 +165,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
         else known(model, plan.angles)
     )
     used, seen, _ = choose_terms(settings, channels, plan.angles)
-    c = _expected(settings, used)
+    c, (rank, terms) = _expected(settings, used), worst_rank(whole)
     candidates = _candidates(used, plan.angles, c, settings, True)
     prediction = Criterion("I", sphere_moments(used) / len(used.channels))
     figures = judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
@@ -177,12 +178,12 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
         plan,
         replace(
             figures,
-            rank=min(each.identifiability.rank for each in whole),
+            rank=rank,
             unidentified=tuple(words for each in whole for words in each.words),
         ),
-        max(len(channel.symbols) for channel in model.channels),
+        terms,
         used.symbols,
-        "fitted" if rate_terms(used) else "stated",
+        earth_rate_of(used),
         shares,
     )
 

@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.identifiability import Identifiability, identify
+from inercal.turntable.noise import scatter
 from inercal.turntable.rate import Effect, Input
-from inercal.turntable.regression import FLOOR, Solution, Weights, solve
+from inercal.turntable.regression import FLOOR, Solution, solve
+from inercal.turntable.weights import Weights
 
 Array = NDArray[np.float64]
 
@@ -149,7 +151,8 @@ def fit_rates(
     sigma = floor
     for _ in range(ROUNDS):
         weight = _weights(given.effects, float(c[1]), n)
-        sigma = max(_scatter(rows, y, weight) if noise is None else noise, floor)
+        found = scatter(rows[:, None, :], y[:, None], weight, [noise], np.array([floor]))
+        sigma = float(found.std[0])
         solution = _solve(rows, y, weight, sigma)
         c = solution.c
     line = _solve(terms[:, :2], y, weight, sigma)
@@ -167,7 +170,7 @@ def fit_rates(
         residuals,
         remainder,
         sigma,
-        float(n - free) if noise is None else np.inf,
+        float(found.dof[0]),
         solution.chi2,
         n - free,
     )
@@ -229,22 +232,3 @@ def _weights(effects: Sequence[Effect], scale: float, n: int) -> Weights:
 def _solve(rows: Array, y: Array, weight: Weights, sigma: float) -> Solution:
     """The weighted fit with that noise."""
     return solve(rows[:, None, :], y[:, None], Weights(weight.within + sigma**2, weight.common))
-
-
-def _scatter(rows: Array, y: Array, weight: Weights) -> float:
-    """Noise with which chi2 is its degrees of freedom (Mandel and Paule 1970); 0 where the table explains it all."""
-    from scipy.optimize import brentq
-
-    dof = len(y) - rows.shape[1]
-    rest = y - rows @ np.linalg.lstsq(rows, y, rcond=None)[0]
-    low, high = FLOOR**2 * float(np.mean(np.square(y))), float(rest @ rest) / dof
-    if high <= low:
-        return 0.0
-
-    def excess(log_variance: float) -> float:
-        return float(_solve(rows, y, weight, np.exp(0.5 * log_variance)).chi2 - dof)
-
-    bottom, top = float(np.log(low)), float(np.log(2.0 * high))
-    if excess(bottom) <= 0.0:
-        return 0.0
-    return float(np.exp(0.5 * brentq(excess, bottom, top, xtol=1e-6)))

@@ -33,8 +33,8 @@ MODEL = (
 REFERENCES = (
     "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
     "IEEE Std 952, Specification format guide and test procedure for single-axis interferometric fiber optic gyros",
-    "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
-    "Chemistry 42 (1970) 1194",
+    "H. D. Patterson, R. Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58 "
+    "(1971) 545",
 )
 
 

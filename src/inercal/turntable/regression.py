@@ -13,40 +13,25 @@ so that the fit is repeated until c rests.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.identifiability import Identifiability, identify, in_words
+from inercal.estimate.identifiability import Identifiability, few_terms, identify, in_words
 from inercal.instruments.polynomial import ChannelModel
-from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
+from inercal.turntable.noise import scatter
+from inercal.turntable.weights import Samples, Weights, beside_inputs, weights
 
 Array = NDArray[np.float64]
-Samples: TypeAlias = NDArray[np.int64]
-"""Rows behind each reading (n,)."""
 
 ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
 
 FLOOR = 1e-12
 """Least standard deviation of a reading, over the rms of the readings: that of a simulation without noise."""
-
-
-@dataclass(frozen=True, eq=False)
-class Weights:
-    """What the readings are uncertain by.
-
-    ``within`` (n, c, c) covariance redrawn at each position, noise and table; ``common`` (n, c, q) derivatives
-    with respect to what is constant, in its standard deviations: errors of the table, then inputs beside it.
-    """
-
-    within: Array
-    common: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +104,12 @@ def known(model: TableModel, angles: Array) -> tuple[Known, ...]:
     return tuple(found)
 
 
+def worst_rank(seen: Sequence[Known]) -> tuple[int, int]:
+    """Rank and number of terms of the channel that lacks most; of the largest one where none lacks any."""
+    pairs = [(each.identifiability.rank, len(each.identifiability.names)) for each in seen]
+    return max(pairs, key=lambda pair: (pair[1] - pair[0], pair[1]))
+
+
 def full_inputs(model: TableModel, channel: ChannelModel) -> Array:
     """Size (p,) of the monomials of a channel when the whole of a and of earth rate acts."""
     a, w = float(np.linalg.norm(model.a_n)), float(np.linalg.norm(model.w_n))
@@ -130,68 +121,8 @@ def _null_words(own: Identifiability, sizes: Array) -> tuple[str, ...]:
     if not len(own.null_vectors):
         return ()
     return tuple(
-        in_words(vector, own.names, 1e-9) for vector in _few_terms(own.null_vectors / own.scale * sizes)
+        in_words(vector, own.names, 1e-9) for vector in few_terms(own.null_vectors / own.scale * sizes)
     )
-
-
-def _few_terms(vectors: Array) -> Array:
-    """The same space in reduced row echelon form, largest pivots first."""
-    rows = vectors.copy()
-    for k in range(len(rows)):
-        j = int(np.argmax(np.abs(rows[k:]).max(axis=0)))
-        i = k + int(np.argmax(np.abs(rows[k:, j])))
-        rows[[k, i]] = rows[[i, k]]
-        rows[k] /= rows[k, j]
-        others = np.arange(len(rows)) != k
-        rows[others] -= rows[others, j][:, None] * rows[k]
-    rows[np.abs(rows) < 1e-9] = 0.0
-    return rows
-
-
-def weights(
-    model: TableModel,
-    angles: Array,
-    c: Array,
-    noise: Array,
-    std: Array | None = None,
-    samples: Samples | None = None,
-) -> Weights:
-    """Covariance of the readings for coefficients ``c``, noise (c,) and errors of the table.
-
-    ``std`` (k,) stands in for the standard deviations of the chain's errors; ``samples`` (n,) as in `fit`.
-    """
-    slopes = model.by_errors(angles, c)
-    rows = np.ones(len(slopes), dtype=np.int64) if samples is None else samples
-    return weights_of(model.chain, slopes, _beside(model, angles, c), noise, rows, std)
-
-
-def _beside(model: TableModel, angles: Array, c: Array) -> Array:
-    """Change (n, c, b) of the readings by one standard uncertainty of each input beside the table."""
-    found, columns = model.beside(angles, c)
-    return np.asarray(columns * np.array([each.u for each in found]))
-
-
-def weights_of(
-    chain: Chain, slopes: Array, beside: Array, noise: Array, samples: Samples, std: Array | None = None
-) -> Weights:
-    """As `weights`, for derivatives (n, c, k) of the readings with respect to the errors of the ``chain``, and their
-    changes (n, c, b) by inputs beside it."""
-    scaled = averaged(chain, slopes, samples) * (chain.std if std is None else std)
-    constant = np.array([error.scope.constant for error in chain.errors], dtype=bool)
-    redrawn = scaled[..., ~constant]
-    return Weights(
-        np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)),
-        np.concatenate([scaled[..., constant], beside], axis=-1),
-    )
-
-
-def averaged(chain: Chain, slopes: Array, samples: Samples) -> Array:
-    """Derivatives (n, c, k) as one standard deviation of an error moves a mean over so many samples.
-
-    Errors of scope ``sample`` average out with the root of their number, the others do not.
-    """
-    each = np.array([error.scope is Scope.SAMPLE for error in chain.errors], dtype=bool)
-    return np.where(each, slopes / np.sqrt(samples)[:, None, None], slopes)
 
 
 def solve(rows: Array, y: Array, weight: Weights) -> Solution:
@@ -255,13 +186,8 @@ def fit(
         own = np.mean(np.diagonal(table.within, axis1=1, axis2=2), axis=0)
         # errors of the table alone may leave the covariance of two channels without an inverse
         floor = np.maximum(least, 1e-6 * np.sqrt(own))
-        scatter = [
-            _scatter(rows[:, k, block], y[:, k], table, k, float(floor[k]))
-            if each is None
-            else Scatter(max(each, float(floor[k])), np.inf)
-            for k, (block, each) in enumerate(zip(model.blocks, noise, strict=True))
-        ]
-        sigma = np.array([each.std for each in scatter])
+        found = scatter(rows, y, table, noise, floor)
+        sigma = found.std
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
         change, c = np.abs(solution.c - c), solution.c
         if np.all(change <= 1e-3 * np.sqrt(np.diag(solution.joint)[:p])):
@@ -278,54 +204,11 @@ def fit(
         solution.chi2,
         n * channels - p,
         sigma,
-        np.array([each.dof for each in scatter]),
+        found.dof,
         model.by_errors(angles, c),
-        _beside(model, angles, c),
+        beside_inputs(model, angles, c),
         samples,
         solution.chi[: len(std)] * std,
         np.sqrt(np.diag(solution.joint)[p : p + len(std)]) * std,
         constant,
     )
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Noise of a reading: standard deviation ``std``, and its degrees of freedom ``dof``, inf where it is stated."""
-
-    std: float
-    dof: float
-
-
-def _scatter(rows: Array, y: Array, table: Weights, channel: int, floor: float) -> Scatter:
-    """Noise of a reading beyond what the table explains: with it, chi2 of a channel is its degrees of freedom.
-
-    After Mandel and Paule 1970; ``floor`` where the table alone explains more than the scatter. Seen from outside the
-    space of the terms, ``chi2 = sum z^2 / (lambda + s^2)``, lambda the variances that the table causes there; the
-    variance of s^2 is ``2 nu / (sum 1 / (lambda + s^2))^2``.
-
-    Parameters
-    ----------
-    rows : (n, p), y : (n,) of one channel
-    table : Weights of all channels, without noise
-    channel : int
-    floor : float
-        Least standard deviation that is told from none.
-    """
-    n, p = rows.shape
-    if n <= p:
-        return Scatter(floor, 1.0)
-    outside = np.linalg.qr(rows / np.linalg.norm(rows, axis=0), mode="complete")[0][:, p:]
-    variance = (
-        np.diag(table.within[:, channel, channel]) + table.common[:, channel] @ table.common[:, channel].T
-    )
-    own, turn = np.linalg.eigh(outside.T @ variance @ outside)
-    z2 = np.square(turn.T @ (outside.T @ y))
-    own = np.maximum(own, 0.0)
-    low, high = floor**2, max(float(np.mean(z2)), floor**2)
-    if np.sum(z2 / (own + low)) <= n - p:
-        high = low
-    for _ in range(60):  # halving the logarithm
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if np.sum(z2 / (own + middle)) > n - p else (low, middle)
-    dof = np.sum(high / (own + high)) ** 2 / (n - p)
-    return Scatter(math.sqrt(high), float(dof))

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
-from inercal.turntable.regression import Regression, averaged, solve, weights_of
+from inercal.turntable.regression import Regression, solve
+from inercal.turntable.weights import averaged, weights_of
 
 Array = NDArray[np.float64]
 
