@@ -135,6 +135,12 @@ class Estimate:
         )
 
 
+def without_parameters(command: str, status: Status, message: str, **other: Any) -> Estimate:
+    """An estimate that says why nothing was estimated; ``other`` fields of `Estimate` by name."""
+    none = np.zeros(0)
+    return Estimate(command, (), (), none, np.zeros((0, 0)), none, none, status, message, **other)
+
+
 def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
     """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6)."""
     if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:

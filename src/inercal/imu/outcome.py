@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import combine
-from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.result import Estimate, coverage_factor, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
@@ -213,16 +213,10 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
             f"{spread_words(np.array([dwell.of(y).mean(axis=0) for dwell in dwells]))}): hold each side up, and the "
             "edges between"
         )
-    return Estimate(
-        command=COMMAND,
-        names=(),
-        units=(),
-        values=np.zeros(0),
-        covariance=np.zeros((0, 0)),
-        dof=np.zeros(0),
-        k=np.zeros(0),
-        status=status,
-        message=message,
+    return without_parameters(
+        COMMAND,
+        status,
+        message,
         findings=record.findings,
         statistics={"intervals": float(len(dwells)), "threshold": best},
         model=MODEL,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inercal.design.comparison import in_basis
 from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.result import Estimate, coverage_factor, without_parameters
 from inercal.estimate.status import Status
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
@@ -103,7 +103,6 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     """Put the estimate together."""
     unit = found.unit.si
     common: dict[str, Any] = {
-        "command": COMMAND,
         "model": MODELS[settings.instrument.kind],
         "conditions": _conditions(found, settings),
         "traceability": settings.traceability,
@@ -122,15 +121,10 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "earth_rate": fitting.earth_rate,
     }
     if fitting.fit is None:
-        return Estimate(
-            names=(),
-            units=(),
-            values=np.zeros(0),
-            covariance=np.zeros((0, 0)),
-            dof=np.zeros(0),
-            k=np.zeros(0),
-            status=Status.UNOBSERVABLE,
-            message=_unobservable(found, fitting, settings),
+        return without_parameters(
+            COMMAND,
+            Status.UNOBSERVABLE,
+            _unobservable(found, fitting, settings),
             findings=tuple(findings),
             statistics={"positions": float(len(found.y))},
             result=result | {"tolerance_shares": {}},
@@ -142,6 +136,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     status, message = _verdict(found, fitting)
     findings += _too_large(fit)
     return Estimate(
+        command=COMMAND,
         names=names,
         units=tuple(unit_of_term(name, unit) for name in names),
         values=terms.values,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inercal.design.allowed import insensitive, within
 from inercal.design.candidates import Candidates
 from inercal.design.comparison import PlanFigures, judge
-from inercal.design.criteria import Criterion, D, a_criterion
+from inercal.design.criteria import Criterion, D, a_criterion, i_criterion
 from inercal.design.exchange import exchange
 from inercal.errors import StudyError
 from inercal.records.findings import Finding
@@ -23,7 +23,7 @@ from inercal.turntable.model import TableModel, channels_of, orthonormal, stated
 from inercal.turntable.outcome import unit_of_term
 from inercal.turntable.regression import fit, full_inputs, known, worst_rank
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.tolerance import drift_shares, sphere_moments
+from inercal.turntable.tolerance import drift_shares, sphere_rows
 from inercal.turntable.weights import weights
 from inercal.units import Unit
 
@@ -167,7 +167,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
     used, seen, _ = choose_terms(settings, channels, plan.angles)
     c, (rank, terms) = _expected(settings, used), worst_rank(whole)
     candidates = _candidates(used, plan.angles, c, settings, True)
-    prediction = Criterion("I", sphere_moments(used) / len(used.channels))
+    prediction = i_criterion(sphere_rows(used) / np.sqrt(len(used.channels)))
     figures = judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
     shares: Mapping[str, float] = {}
     if not any(each.words for each in seen):
@@ -239,7 +239,7 @@ def _criterion(name: str, model: TableModel) -> Criterion:
         return a_criterion(
             np.diag(np.concatenate([full_inputs(model, channel) for channel in model.channels]))
         )
-    return Criterion("I", sphere_moments(model))
+    return i_criterion(sphere_rows(model))
 
 
 def _largest_index(settings: TurntableSettings) -> Array:

@@ -221,12 +221,10 @@ class Effect:
 @dataclass(frozen=True, eq=False)
 class Input:
     """Rate about a gyro's axis: ``x`` (n,) [rad/s] its mean, earth and misalignment included; ``gain`` the cosine
-    (n,) of axis and turning axis, ``cosine_loss`` (n,) what misalignment takes from it on average; ``effects``
-    what x is uncertain by."""
+    (n,) of axis and turning axis; ``effects`` what x is uncertain by."""
 
     x: Array
     gain: Array
-    cosine_loss: Array
     effects: tuple[Effect, ...]
 
 
@@ -272,7 +270,7 @@ def gyro_input(found: RateDwells, settings: TurntableSettings, axis: int) -> Inp
         moved = mean(lambda at: by_latitude @ chain.attitude(at) @ v)
         effects.append(Effect("latitude", latitude_u, "rad", (moved * latitude_u)[:, None]))
     ideal = sensed(chain, test.joint, w_n, found.rate, found.angles, found.turn) @ v
-    return Input(ideal - found.rate * loss, gain, loss, tuple(effects))
+    return Input(ideal - found.rate * loss, gain, tuple(effects))
 
 
 def _gain(after: Chain, angles: Array, e: Array, v: Array) -> tuple[Array, Array, Array]:

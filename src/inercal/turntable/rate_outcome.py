@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.identifiability import Identifiability
-from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.result import Estimate, coverage_factor, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted
@@ -69,6 +69,7 @@ def assemble(
     test = settings.rate_test
     assert test is not None
     return Estimate(
+        command=COMMAND,
         names=names,
         units=tuple(unit_of_term(name, unit) for name in names),
         values=values,
@@ -114,15 +115,10 @@ def unobservable(
     """An estimate without terms."""
     test = settings.rate_test
     assert test is not None
-    return Estimate(
-        names=(),
-        units=(),
-        values=np.zeros(0),
-        covariance=np.zeros((0, 0)),
-        dof=np.zeros(0),
-        k=np.zeros(0),
-        status=Status.UNOBSERVABLE,
-        message=said,
+    return without_parameters(
+        COMMAND,
+        Status.UNOBSERVABLE,
+        said,
         findings=tuple(findings),
         statistics={"stays": float(len(found.rate))},
         result={
@@ -230,7 +226,6 @@ def _shares(
 def _common(record: Record, found: RateDwells, settings: TurntableSettings) -> dict[str, Any]:
     """What every estimate of a rate test says."""
     return {
-        "command": COMMAND,
         "model": MODEL,
         "conditions": {
             "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",

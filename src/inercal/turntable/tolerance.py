@@ -66,10 +66,22 @@ def _shares(chain: Chain, parts: Array) -> dict[str, float]:
 
 
 def sphere_moments(model: TableModel) -> Array:
-    """Mean products (p, p) of the monomials over all directions of a; zero where a rate takes part.
+    """Mean products (p, p) of the regressors over all directions of a; zero where a rate takes part.
 
     ``c^T B c`` is the mean square over the sphere, summed over the channels, of the output that coefficients c
-    predict. Gauss-Legendre in the height times even steps in longitude integrates polynomials up to order 6
+    predict.
+    """
+    rows = sphere_rows(model)
+    flat = rows.reshape(-1, len(model.symbols))
+    return np.asarray(flat.T @ flat / len(rows))
+
+
+def sphere_rows(model: TableModel) -> Array:
+    """Regressors (r, channels, p) at directions of a, each times the root of its weight, the mean of which is one.
+
+    Terms of rates have zeros.
+
+    Gauss-Legendre in the height times even steps in longitude integrates products of polynomials up to order 15
     exactly; only the magnitude in Koq is not one, and is good to a few per mille.
     """
     height, weight = np.polynomial.legendre.leggauss(8)
@@ -79,13 +91,11 @@ def sphere_moments(model: TableModel) -> Array:
         np.broadcast_arrays(ring * np.cos(longitude), ring * np.sin(longitude), height[:, None]), axis=-1
     )
     a = directions.reshape(-1, 3) * np.linalg.norm(model.a_n)
-    mass = np.repeat(0.5 * weight / 16, 16)
-    p = len(model.symbols)
-    B = np.zeros((p, p))
-    for channel, block in zip(model.channels, model.blocks, strict=True):
-        rows = channel.regressors(a, np.zeros(3)) * _without_rate(channel)
-        B[block, block] = np.einsum("n,np,nq->pq", mass, rows, rows)
-    return B
+    root = np.sqrt(np.repeat(0.5 * weight * len(weight), 16))[:, None]
+    rows = np.zeros((len(a), len(model.channels), len(model.symbols)))
+    for k, (channel, block) in enumerate(zip(model.channels, model.blocks, strict=True)):
+        rows[:, k, block] = root * channel.regressors(a, np.zeros(3)) * _without_rate(channel)
+    return rows
 
 
 def _without_rate(channel: ChannelModel) -> Array:
