@@ -427,7 +427,7 @@ def test_a_study_is_for_its_own_commands(write, tmp_path):
         load_imu_study(write(CONTRACT))
     other = tmp_path / "other.toml"
     other.write_text('[site]\nlatitude = "1 deg"\n[imu]\nmethod = "multiposition"\n')
-    with pytest.raises(StudyError, match="a study for `inercal calibrate imu`, expected one for"):
+    with pytest.raises(StudyError, match="a study for `inercal calibrate imu`, expected one of a turntable"):
         load_turntable_study(other)
     other.write_text(Path(tmp_path / "study.toml").read_text().replace("two_axis_turntable", "sting"))
     with pytest.raises(

@@ -178,3 +178,9 @@ def test_what_was_not_computed_is_not_in_the_file(tmp_path):
     write_maps(analyse(one), tmp_path / "m.nc")
     with xarray.open_dataset(tmp_path / "m.nc", engine="scipy") as maps:
         assert {"shapley", "second", "other_factor"}.isdisjoint(maps.variables)
+
+
+def test_errors_that_move_nothing_lead_nothing():
+    """An offset of the axes leaves every attitude alone."""
+    rig = {"kind": "two_axis_turntable", "errors": {"d_eta": {"normal": "10 um"}}}
+    assert analyse(settings(rig=rig)).message.endswith("these errors do not move these outputs there")

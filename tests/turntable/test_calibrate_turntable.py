@@ -483,3 +483,13 @@ def test_a_relative_term_without_its_gain_is_refused():
     told = replace(settings, instrument=replace(settings.instrument, coefficients={"K2_x": 1e-5}))
     with pytest.raises(StudyError, match="K2_x relate to K1_x, expected a value of K1_x too"):
         calibrate(record, told)
+
+
+def test_a_reading_that_does_not_belong_is_named():
+    record = simulate(study(FULL_RANK, noise=NOISE), np.random.default_rng(1))
+    y = record["y_x"].values.copy()
+    y[6] += 100.0 * NOISE / DEG_H
+    wrong = replace(record, columns=record.columns | {"y_x": replace(record["y_x"], values=y)})
+    found = calibrate(wrong, study(FULL_RANK, noise=NOISE)).estimate
+    assert found.status is Status.INCONSISTENT
+    assert "most at position 7 of y_x" in found.message

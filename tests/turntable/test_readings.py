@@ -171,3 +171,21 @@ def test_an_axis_that_the_table_does_not_have_is_refused():
     third = {"phi3": replace(record["phi2"], name="phi3")}
     with pytest.raises(RecordError, match="found phi3, expected phi1, phi2 alone"):
         readings(replace(record, columns=record.columns | third), JOINTS, "gyrowheel")
+
+
+def test_a_rate_test_is_not_taken_for_positions():
+    """A turning table has no attitude to average over."""
+    record = simulate(study(TUMBLE), np.random.default_rng(1))
+    rate = {"rate": replace(record["phi2"], name="rate", unit=parse_unit("deg/s"))}
+    with pytest.raises(RecordError, match="found the channel rate, that of a rate test"):
+        readings(replace(record, columns=record.columns | rate), JOINTS, "gyrowheel")
+
+
+def test_readings_without_an_angle_are_left_out_and_said():
+    record = simulate(study(TUMBLE), np.random.default_rng(1))
+    angle = record["phi2"].values.copy()
+    angle[[2, 16]] = np.nan
+    changed = {"phi2": replace(record["phi2"], values=angle)}
+    found = readings(replace(record, columns=record.columns | changed), JOINTS, "gyrowheel")
+    assert len(found.y) == 22
+    assert [(finding.code, finding.where) for finding in found.findings] == [("nan", "rows 3, 17")]

@@ -44,13 +44,15 @@ def estimate(names, output, values):
     ("kind", "unit"), [("accelerometer", "m/s^2"), ("accelerometer", "g"), ("gyrowheel", "deg/h")]
 )
 def test_what_is_shown_may_be_typed_back_into_a_study(kind, unit):
-    """Text of value and unit, read as a stated coefficient, is the value in SI again."""
+    """Text of value and unit, read as a stated coefficient, is the value in SI again; drift is per unit g there."""
     names = tuple(s for channel in CHANNELS[kind] for s in channel_model(kind, channel).symbols)
     values = np.random.default_rng(5).uniform(1e-6, 2e-6, len(names))
-    seen = displayed(estimate(names, parse_unit(unit).si, values), parse_unit(unit))
+    site = {"site": {"gravity_m_s2": 9.78, "latitude_rad": 0.0}}
+    made = replace(estimate(names, parse_unit(unit).si, values), conditions=site)
+    seen = displayed(made, parse_unit(unit))
     typed = {p.name: f"{p.value:.12f} {p.unit}".removesuffix(" 1") for p in seen.parameters.values()}
     study = {
-        "site": {"latitude": "39.1 deg"},
+        "site": {"latitude": "0 deg", "gravity": "9.78 m/s^2"},
         "rig": {"kind": "two_axis_turntable"},
         "instrument": {"kind": kind, "unit": unit, "coefficients": typed},
     }

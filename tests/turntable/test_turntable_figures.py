@@ -140,8 +140,10 @@ def test_what_people_see_is_the_same_in_other_units():
     assert seen.values / seen.u == pytest.approx(si.values / si.u)
     assert seen.correlation == pytest.approx(si.correlation)
     for name, p in seen.parameters.items():
-        unit = parse_unit(p.unit)
-        assert p.value * unit.factor == pytest.approx(si[name].value)
+        text, per_g, power = p.unit.partition("/g")
+        # per unit g for people, per gravity of the site inside
+        size = (9.8 / 9.80665) ** int(power.removeprefix("^") or 1) if per_g else 1.0
+        assert p.value * parse_unit(text).factor * size == pytest.approx(si[name].value)
     for a, b in zip(seen.budget, si.budget, strict=True):
         assert a.u * parse_unit(a.unit).factor == pytest.approx(b.u)
         assert a.share == b.share

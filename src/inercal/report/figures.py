@@ -57,7 +57,7 @@ def correlation(estimate: Estimate) -> Picture:
         axes.set_aspect("equal")
         for spine in axes.spines.values():
             spine.set_visible(False)
-        page.colorbar(mesh, ax=axes, shrink=0.6, label="correlation coefficient")
+        page.colorbar(mesh, ax=axes, shrink=0.6, label="correlation")
         drawn = svg(page)
     return Picture(
         "Correlation of the coefficients",

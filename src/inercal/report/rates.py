@@ -26,6 +26,8 @@ def residuals_by_rate(rows: Sequence[Mapping[str, Any]]) -> Picture:
             own = [row for row in rows if row["channel"] == channel]
             for way, (mark, label) in _MARKS.items():
                 here = [row for row in own if row["reached_from"] == way]
+                if not here:
+                    continue
                 axes.errorbar(
                     np.degrees([row["rate_rad_s"] for row in here]),
                     [row["residual_ppm_of_full_scale"] for row in here],

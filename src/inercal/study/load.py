@@ -88,7 +88,7 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
         )
     if rig is None and "imu" in data and command != "calibrate imu":
         raise StudyError(
-            path, f"found a study for `inercal calibrate imu`, expected one for `inercal {command}`"
+            path, "found a study for `inercal calibrate imu`, expected one of a turntable, with a table [rig]"
         )
     for override in overrides:
         _put(data, override)

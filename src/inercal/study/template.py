@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -140,6 +141,8 @@ def turntable_template(
         following = f"calibrate turntable {_files(record_paths, study_path, map_path)}"
     body = _TURNTABLE.replace("{errors}", "".join(map(_error_line, slots("two_axis_turntable"))))
     body = body.replace("{plans}", " ".join(NAMED)).replace("{instrument}", instrument_lines(channels or {}))
+    if "rate" in (channels or {}):
+        body = re.sub(r"# \[rate_test\] .*", f"{'[rate_test]':35s} # the table turns at rates", body)
     return _HEAD.format(what="of a turntable", next=following) + body + _COMMON
 
 

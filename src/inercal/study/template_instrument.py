@@ -16,7 +16,7 @@ _EXAMPLES = {
         ("{D}_F", '"50 deg/h"', '"50{u}"', "fixed drift, in the unit of the outputs"),
         ("{D}_X", '"60 deg/h/g"', '"60{u}/g"', "per gravity along x; g is 9.80665 m/s^2"),
         ("{D}_XX", '"2 deg/h/g^2"', '"2{u}/g^2"', "per square of gravity along x"),
-        ("{k}_x", '"1.00(2)"', '"2.50(2){u}/(deg/h)"', "response to earth rate about x{need}"),
+        ("{k}_x", '"1.000(2)"', '"2.50(2){u}/(deg/h)"', "response to earth rate about x{need}"),
     ),
     "gyro": (
         ("terms", '["D_F_{x}", "S_{x}"]', "", "to estimate; those usual for the kind if absent"),
@@ -45,7 +45,8 @@ def instrument_lines(channels: Mapping[str, Unit | None]) -> str:
     Parameters
     ----------
     channels : mapping
-        Those of a record, which tell the kind, a gyrowheel where they do not; with their units, where known.
+        Those of a record, which tell the kind, a gyrowheel where they do not; with their units, where known. Where
+        there is no record, the examples are in force, so that there is something to simulate and to design for.
     """
     kind = _kind(channels)
     name = next((name for name in CHANNELS[kind] if name in channels), CHANNELS[kind][0])
@@ -64,15 +65,16 @@ def instrument_lines(channels: Mapping[str, Unit | None]) -> str:
         (key.format(**words), ((other if raw else "") or value).format(**words), comment.format(**words))
         for key, value, other, comment in _EXAMPLES[kind]
     )
+    example = _example if channels else _line
     others = ", ".join(f'"{other}"' for other in CHANNELS if other != kind)
     lines = [
         f"{'[instrument]':35s} # what is on the table",
         _line("kind", f'"{kind}"', f"or {others}"),
-        _line("# unit", f'"{_USUAL_UNIT[kind]}"', "of its outputs in a simulation; rad/s or m/s^2 if absent")
+        example("unit", f'"{_USUAL_UNIT[kind]}"', "of its outputs in a simulation; rad/s or m/s^2 if absent")
         if unit is None
         else _line("unit", f'"{unit.symbol}"', "of its outputs, as the record has it"),
         _example(*terms),
-        _example(*noise) if not raw else _example(*noise[:2], "of a reading; from the scatter if absent"),
+        example(*noise) if not raw else _example(*noise[:2], "of a reading; from the scatter if absent"),
         _example("dwell", '"60 s"', "time in each position [s]"),
         _example("rate", '"10 Hz"', "of a simulated recording [Hz]; one row a position if absent"),
     ]
@@ -85,7 +87,7 @@ def instrument_lines(channels: Mapping[str, Unit | None]) -> str:
     lines += [
         "",
         f"{'[instrument.coefficients]':35s} # true values to simulate; stated ones of what is not fitted",
-        *(_example(*each) for each in coefficients),
+        *(example(*each) for each in coefficients),
     ]
     return "\n".join(lines) + "\n"
 

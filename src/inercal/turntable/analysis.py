@@ -61,12 +61,14 @@ class Analysed:
     def message(self) -> str:
         """What was found, in a sentence."""
         found = self.indices
-        top = [found.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
-        head = (
+        size = (
             f"{counted(len(found.factors), 'error')}, {counted(len(found.outputs), 'output')}, "
-            f"{counted(len(found.angles), 'position')}; "
-            f"the largest shares are those of {', '.join(top)}"
+            f"{counted(len(found.angles), 'position')}"
         )
+        if not np.any(found.variance > 0.0):
+            return f"{size}; these errors do not move these outputs there"
+        top = [found.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
+        head = f"{size}; the largest shares are those of {', '.join(top)}"
         if not self.flagged:
             return head
         places = len({flag.angles for flag in self.flagged})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -40,9 +41,14 @@ def shown_unit(text: str, unit: Unit) -> tuple[str, float]:
 def displayed(estimate: Estimate, unit: Unit) -> Estimate:
     """The estimate with coefficients, budget, noise and residuals in the ``unit`` of the record.
 
-    Scopes and the like in ``result`` stay in SI; keys of statistics and ranges then name their unit.
+    Drift per gravity is per unit g, as a study states it, and not per gravity of the site. Scopes and the like in
+    ``result`` stay in SI; keys of statistics and ranges then name their unit.
     """
-    shown = [shown_unit(text, unit) for text in estimate.units]
+    gravity = float(estimate.conditions.get("site", {}).get("gravity_m_s2", STANDARD_GRAVITY))
+    shown = [
+        _per_g(name, *shown_unit(text, unit), gravity)
+        for name, text in zip(estimate.names, estimate.units, strict=True)
+    ]
     factor = np.array([size for _, size in shown])
     return replace(
         estimate,
@@ -58,6 +64,15 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
         conditions=_conditions(estimate.conditions, unit),
         result=_result(estimate.result, unit),
     )
+
+
+def _per_g(name: str, text: str, size: float, gravity: float) -> tuple[str, float]:
+    """Unit and size of a term whose value is per power of the site's ``gravity`` [m/s^2], per power of g instead."""
+    match = re.fullmatch("D[XY]_([XYZ]+)", name)
+    if match is None:
+        return text, size
+    order = len(match[1])
+    return f"{text}/g" + (f"^{order}" if order > 1 else ""), size * (gravity / STANDARD_GRAVITY) ** order
 
 
 def _with_unit(values: Mapping[str, float], key: str, unit: Unit) -> dict[str, float]:

@@ -170,13 +170,22 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
     stated = np.isinf(fit.noise_dof).all()
     if stated and fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < SURPRISE:
         return Status.INCONSISTENT, (
-            f"the readings miss the model by {np.sqrt(fit.chi2 / fit.dof):.1f} times what the stated noise and table "
-            "errors explain: check both, signs and units, or fit more terms"
+            f"the readings miss the model by {np.sqrt(fit.chi2 / fit.dof):.2g} times what the stated noise and table "
+            f"errors explain, most at {_farthest(found, fit)}: check it, both of these, signs and units, or fit more "
+            "terms"
         )
     return Status.OK, (
         f"{counted(len(fit.c), 'coefficient')} from {counted(len(found.y), 'position')} of "
         f"{counted(len(found.channels), 'channel')}"
     )
+
+
+def _farthest(found: Readings, fit: Regression) -> str:
+    """The reading with the largest residual for its uncertainty."""
+    weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
+    spread = np.einsum("ncc->nc", weight.within) + np.square(weight.common).sum(axis=-1)
+    k, c = np.unravel_index(int(np.argmax(np.abs(fit.residuals) / np.sqrt(spread))), fit.residuals.shape)
+    return f"position {k + 1} of {found.channels[c]}"
 
 
 def _too_large(fit: Regression) -> list[Finding]:

@@ -93,8 +93,8 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
         words = [in_words(vector / known.scale, known.names) for vector in known.null_vectors]
         return nothing(
             known.rank,
-            f"{counted(stays, 'stay')} identify {known.rank} of {terms} terms: the readings do not change along "
-            f"{'; '.join(words)} (by rad/s); add rates",
+            f"the rates of {counted(stays, 'stay')} identify {known.rank} of {terms} terms: the readings do not change "
+            f"along {'; '.join(words)} (by rad/s); add rates",
             words,
         )
     if stays == terms and instrument.noise is None:

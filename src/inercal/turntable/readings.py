@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError
 from inercal.instruments.by_angle import CHANNELS
 from inercal.records.findings import Finding
-from inercal.records.places import counted
+from inercal.records.places import counted, places
 from inercal.records.record import Record
 from inercal.units import Unit
 
@@ -78,6 +78,10 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
             raise RecordError(
                 where, f"found {name}, expected {', '.join(joints)} alone: the study's table has no such axis"
             )
+    if "rate" in record:
+        raise RecordError(
+            where, "found the channel rate, that of a rate test, expected [rate_test] in the study"
+        )
     columns = [record[name] for name in channels]
     for column in columns:
         if column.unit != columns[0].unit or len(column.values) != len(columns[0].values):
@@ -92,7 +96,18 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     groups = _by_number(record, angles, where) if "position" in record else _by_angle(angles)
     if not groups:
         raise RecordError(where, "found no rows with angles, expected one or more for each position")
-    return _averaged(angles, values, groups, channels, columns[0].unit, where)
+    found = _averaged(angles, values, groups, channels, columns[0].unit, where)
+    nowhere = np.flatnonzero(~np.isfinite(_places(record, angles)) & np.isfinite(values).any(axis=1)) + 1
+    if not len(nowhere):
+        return found
+    said = f"{counted(len(nowhere), 'row')} without an angle or a position number: the readings there are left out"
+    return replace(found, findings=(*found.findings, Finding("nan", said, places("row", nowhere))))
+
+
+def _places(record: Record, angles: Array) -> Array:
+    """A number (n,) for each row that says where it is; NaN where it does not."""
+    known = angles.sum(axis=1)
+    return np.asarray(known + record["position"].values if "position" in record else known)
 
 
 def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int64]]:
