@@ -108,7 +108,7 @@ def test_the_intersection_offset_moves_the_load_only():
 
 
 def test_wobble_is_redrawn_and_mounting_is_not():
-    """The scopes of the specification: positioning and wobble each position, mounting and axes constant."""
+    """The usual scopes: positioning and wobble each position, mounting and axes constant."""
     for kind in TABLES:
         for slot in slots(kind):
             moves = slot.name.startswith(("dphi", "dalpha"))

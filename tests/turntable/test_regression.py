@@ -229,7 +229,7 @@ def test_the_covariance_of_the_table_is_that_of_a_monte_carlo(plan, left_out):
 
 
 def test_two_arcmin_act_like_four_hundredths_of_a_degree_per_hour():
-    """The specification's coefficients; all eleven errors, root of the mean variance of a reading."""
+    """Typical coefficients; all eleven errors, root of the mean variance of a reading."""
     coefficients = {s: v for s, v in WHEEL_X.items() if s[0] == "D"} | {"k_x": 0.0}
     model = model_of(TUMBLE, left_out=K_X, chain=table(), coefficients=coefficients)
     S = weights(model, TUMBLE.angles, true_c(model), np.zeros(1))

@@ -69,7 +69,7 @@ def test_the_drift_terms_of_a_gyrowheel_take_gravity_with_a_minus_sign():
     assert at_zero("gyrowheel", {"DX_XX": 2.0, "DX_F": 3.0})["y_x"] == pytest.approx(3.0)
 
 
-def test_outputs_with_errors_follow_the_specification_s_chain():
+def test_outputs_with_errors_follow_the_chain_written_out():
     """Against the chain written out by components, at large errors too: nothing is linearised."""
     rng = np.random.default_rng(8)
     settings = study(chain=table())

@@ -27,7 +27,7 @@ def column(record, name):
 
 
 def test_without_errors_and_noise_the_readings_are_the_model_s():
-    """Against the specification written out; outputs and angles in the units of the record."""
+    """Against the chain written out; outputs and angles in the units of the record."""
     record = simulate(study(), np.random.default_rng(1))
     a, w = references(FULL_RANK.angles, {})
     for axis in "xy":

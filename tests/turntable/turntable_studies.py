@@ -1,4 +1,4 @@
-"""Studies of a turntable for the tests, and the table of spec and paper written out once more by hand."""
+"""Studies of a turntable for the tests, and the table of the paper written out once more by hand."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ ARCMIN = np.radians(1.0 / 60.0)
 DEG_H = parse_unit("deg/h").factor
 GRAVITY, LATITUDE = 9.8, np.radians(39.1)
 
-#: drift of a gyrowheel [deg/h] as the specification has it for axis X, and another for Y
+#: typical drift of a gyrowheel [deg/h] for axis X, and another for Y
 DRIFT_X = {"F": 50.0, "X": 60.0, "Y": 40.0, "Z": 8.0, "XX": 2.0, "YY": 1.5, "XY": 1.0, "XZ": 3.0, "YZ": 2.5}
 DRIFT_Y = {
     "F": -20.0,
@@ -78,7 +78,7 @@ def rotated(row, axis, angle):
     return c * x + s * y, c * y - s * x, z
 
 
-#: the two-axis table by the specification: joints by their number, errors by their name
+#: the two-axis table of Zhao et al. 2023: joints by their number, errors by their name
 CHAIN = (
     ("y", 0),
     ("y", "dphi_y1"),
@@ -97,7 +97,7 @@ CHAIN = (
 
 
 def references(angles, errors, latitude=LATITUDE):
-    """a (unit gravity) and w [rad/s] on the instrument's axes, each three arrays, by the specification's chain."""
+    """a (unit gravity) and w [rad/s] on the instrument's axes, each three arrays, by that chain."""
     a = (0.0, 0.0, -1.0)
     w = (EARTH_RATE * np.cos(latitude), 0.0, EARTH_RATE * np.sin(latitude))
     for axis, what in CHAIN:
