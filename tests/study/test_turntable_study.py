@@ -204,6 +204,9 @@ def test_what_is_absent():
     assert (found.rate_test, found.temperature, found.instrument.noise) == (None, None, None)
     assert found.instrument.unit.symbol == "rad/s"
     assert study(instrument={"kind": "accelerometer"}).instrument.unit.symbol == "m/s^2"
+    # people who state the noise in a unit want their outputs in it
+    assert study(instrument={"noise": "0.01 deg/h"}).instrument.unit.symbol == "deg/h"
+    assert study(instrument={"noise": "0.01 deg/sqrt(h)"}).instrument.unit.symbol == "rad/s"
 
 
 def test_gravity_follows_from_latitude_and_height():

@@ -42,7 +42,7 @@ class InstrumentTable(Strict):
     )
     unit: str | None = Field(
         default=None,
-        description="of its outputs where no record says it; rad/s or m/s^2 if absent",
+        description="of its outputs where no record says it; that of the noise, rad/s or m/s^2 if absent",
         examples=["deg/h"],
     )
     terms: list[str] | None = Field(
@@ -124,8 +124,10 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
 
 def _unit(table: InstrumentTable, where: object) -> Unit:
     """Unit of the outputs: one that the channels of a record may have."""
+    if table.unit is None:
+        return _unit_of_noise(table)
     try:
-        unit = parse_unit(table.unit or _USUAL_UNIT[table.kind])
+        unit = parse_unit(table.unit)
     except QuantityError as error:
         raise StudyError(where, f"instrument.unit: {error.message}") from error
     wrong = misfit(CHANNELS[table.kind][0], unit)
@@ -217,6 +219,15 @@ def _parse(text: object, form: _Form) -> tuple[Quantity, float] | None:
         return parse_quantity(above, form.above, "above"), 1.0 if unit is None else unit.factor
     except QuantityError:
         return None
+
+
+def _unit_of_noise(table: InstrumentTable) -> Unit:
+    """The unit in which the noise of a reading is stated, or the SI unit of rate or acceleration."""
+    usual = parse_unit(_USUAL_UNIT[table.kind])
+    try:
+        return usual if table.noise is None else parse_quantity(table.noise, usual.dimension, "noise").unit
+    except QuantityError:  # a random walk, or something that is refused where the noise is read
+        return usual
 
 
 def _noise(text: str, unit: Unit, dwell: float, where: object) -> float:

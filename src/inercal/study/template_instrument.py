@@ -70,7 +70,9 @@ def instrument_lines(channels: Mapping[str, Unit | None]) -> str:
     lines = [
         f"{'[instrument]':35s} # what is on the table",
         _line("kind", f'"{kind}"', f"or {others}"),
-        example("unit", f'"{_USUAL_UNIT[kind]}"', "of its outputs in a simulation; rad/s or m/s^2 if absent")
+        example(
+            "unit", f'"{_USUAL_UNIT[kind]}"', "of its outputs in a simulation; that of the noise if absent"
+        )
         if unit is None
         else _line("unit", f'"{unit.symbol}"', "of its outputs, as the record has it"),
         _example(*terms),
