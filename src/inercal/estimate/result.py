@@ -135,6 +135,16 @@ class Estimate:
         )
 
 
+def provenance(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What a repetition of a calibration needs beside its inputs: the keys ``given``; nothing in it is random."""
+    import platform
+
+    import scipy
+
+    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+    return {"settings": given, "seed": None, "versions": versions}
+
+
 def without_parameters(command: str, status: Status, message: str, **other: Any) -> Estimate:
     """An estimate that says why nothing was estimated; ``other`` fields of `Estimate` by name."""
     none = np.zeros(0)

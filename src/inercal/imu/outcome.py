@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import combine
-from inercal.estimate.result import Estimate, coverage_factor, without_parameters
+from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
@@ -99,7 +97,7 @@ def assemble(
         conditions=_conditions(recording, poses, settings),
         traceability=settings.traceability,
         inputs=record.sources,
-        provenance=_provenance(settings),
+        provenance=provenance(settings.given),
         result={
             "method": "multiposition",
             "intervals": _interval_table(recording, poses),
@@ -110,12 +108,6 @@ def assemble(
         },
         references=REFERENCES,
     )
-
-
-def _provenance(settings: ImuSettings) -> dict[str, Any]:
-    """What a repetition needs beside the inputs; nothing here is random."""
-    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
-    return {"settings": settings.given, "seed": None, "versions": versions}
 
 
 def _triads(recording: Recording) -> list[Triad]:
@@ -222,7 +214,7 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
         model=MODEL,
         traceability=settings.traceability,
         inputs=record.sources,
-        provenance=_provenance(settings),
+        provenance=provenance(settings.given),
         result={"method": "multiposition", "intervals": [], "turns": []},
         references=REFERENCES,
     )

@@ -81,8 +81,7 @@ def _residuals(found: Readings, fit: Regression) -> Picture:
     factor, n = found.unit.factor, len(found.y)
     few = n <= NUMBERED
     weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
-    variance = np.einsum("ncc->nc", weight.within) + np.square(weight.common).sum(axis=-1)
-    band = np.sqrt(variance) / factor
+    band = weight.std / factor
     numbers = np.arange(1, n + 1)
     with figure(WIDTH, 0.5 + 1.5 * len(found.channels)) as drawing:
         panels = drawing.subplots(len(found.channels), 1, sharex=True, squeeze=False)[:, 0]

@@ -22,13 +22,12 @@ Array = NDArray[np.float64]
 class Fitting:
     """What a plan allows, and the fit if it allows one.
 
-    ``known`` rank and null vectors by channel, of the terms of ``model``; ``earth_rate`` whether its terms are
-    ``fitted`` or ``stated``; ``fit`` None where a term is not identified.
+    ``known`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
+    identified.
     """
 
     model: TableModel
     known: tuple[Known, ...]
-    earth_rate: str
     fit: Regression | None
     findings: tuple[Finding, ...] = ()
 
@@ -49,12 +48,11 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
             f"with {', '.join(stated)}"
         )
         findings.append(Finding("stated_earth_rate", said))
-    earth_rate = earth_rate_of(model)
     if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
-        return Fitting(model, what, earth_rate, None, tuple(findings))
+        return Fitting(model, what, None, tuple(findings))
     noise = [settings.instrument.noise] * len(found.channels)
     done = fit(model, found.angles, found.y, noise, samples=found.samples)
-    return Fitting(model, what, earth_rate, done, tuple(findings))
+    return Fitting(model, what, done, tuple(findings))
 
 
 def choose_terms(

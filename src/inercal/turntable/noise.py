@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.turntable.weights import Weights
+from inercal.turntable.weights import Weights, whitened
 
 Array = NDArray[np.float64]
 
@@ -54,14 +54,14 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
     rows : (n, c, p) regressors
     y : (n, c) readings
     table : Weights without noise
-    noise : (c,) standard deviations that are stated, None where it is not; not below the floor
+    noise : (c,) standard deviations that are stated, None where they are not
     floor : (c,)
-        Least standard deviation that is told from none.
+        Least standard deviation that is told from none; a stated one below it counts as that.
     """
     free = np.array([each is None for each in noise])
     low = 2.0 * np.log(floor)
     stated = np.array([1.0 if each is None else each for each in noise])
-    start = np.maximum(2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), stated), floor)), low)
+    start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), stated), floor))
     dof = np.full(len(free), np.inf)
     if not free.any():
         return Scatter(np.exp(0.5 * start), dof)
@@ -101,20 +101,13 @@ def _spread(rows: Array, y: Array) -> Array:
 
 def _likelihood(rows: Array, y: Array, table: Weights, variance: Array) -> _Likelihood:
     """Restricted likelihood of the readings, for variances (c,) of the noise."""
-    n, c, p = rows.shape
-    root = np.linalg.cholesky(table.within + np.diag(variance))
-    inverse = np.linalg.inv(root)
-    left = (inverse @ np.concatenate([rows, table.common], axis=-1)).reshape(n * c, -1)
-    right = (inverse @ y[..., None]).reshape(n * c)
-    q = left.shape[1] - p
-    whole = np.vstack([left, np.hstack([np.zeros((q, p)), np.eye(q)])])
-    length = np.linalg.norm(whole, axis=0)
-    length[length == 0.0] = 1.0
-    Q, R = np.linalg.qr(whole / length)
+    n, c, _ = rows.shape
+    white = whitened(rows, y, Weights(table.within + np.diag(variance), table.common))
+    Q, R = np.linalg.qr(white.rows)
     B = Q[: n * c]
-    misfit = right - B @ (B.T @ right)
-    back = np.swapaxes(inverse, 1, 2)
-    W = back @ inverse
+    misfit = white.right - B @ (B.T @ white.right)
+    back = np.swapaxes(white.inverse, 1, 2)
+    W = back @ white.inverse
     B_back = back @ B.reshape(n, c, -1)
     residual = (back @ misfit.reshape(n, c, 1))[..., 0]
     squares = np.einsum("nck,ncl->ckl", B_back, B_back)
@@ -124,7 +117,5 @@ def _likelihood(rows: Array, y: Array, table: Weights, variance: Array) -> _Like
         - 2.0 * np.einsum("ncd,nck,ndk->cd", W, B_back, B_back)
         + np.einsum("ckl,dkl->cd", squares, squares)
     )
-    logarithm = (
-        2.0 * np.log(np.einsum("ncc->nc", root)).sum() + 2.0 * np.log(np.abs(np.diag(R)) * length).sum()
-    )
-    return _Likelihood(-0.5 * float(logarithm + right @ misfit), 0.5 * slope, 0.5 * information)
+    size = np.log(np.abs(np.diag(R)) * white.length).sum() - np.log(np.einsum("ncc->nc", white.inverse)).sum()
+    return _Likelihood(-float(size) - 0.5 * float(white.right @ misfit), 0.5 * slope, 0.5 * information)

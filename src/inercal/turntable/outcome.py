@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,13 +11,13 @@ from numpy.typing import NDArray
 
 from inercal.design.comparison import in_basis
 from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.result import Estimate, coverage_factor, without_parameters
+from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.turntable.fitting import Fitting, fewest_positions
+from inercal.turntable.fitting import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.model import orthonormal
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression, worst_rank
@@ -107,7 +106,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "conditions": _conditions(found, settings),
         "traceability": settings.traceability,
         "inputs": record.sources,
-        "provenance": provenance(settings),
+        "provenance": provenance(settings.given),
         "references": REFERENCES,
     }
     findings = [*record.findings, *fitting.findings]
@@ -118,7 +117,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
         "plan": _plan(found, fitting, settings),
         "instrument": settings.instrument.kind,
-        "earth_rate": fitting.earth_rate,
+        "earth_rate": earth_rate_of(fitting.model),
     }
     if fitting.fit is None:
         return without_parameters(
@@ -146,7 +145,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         status=status,
         message=message,
         findings=tuple(findings),
-        statistics=_statistics(found, fitting),
+        statistics=_statistics(found, fitting, result["plan"]["condition"]),
         budget=budget,
         result=result
         | _shares(fit, terms)
@@ -182,19 +181,17 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
 
 def _farthest(found: Readings, fit: Regression) -> str:
     """The reading with the largest residual for its uncertainty."""
-    weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
-    spread = np.einsum("ncc->nc", weight.within) + np.square(weight.common).sum(axis=-1)
-    k, c = np.unravel_index(int(np.argmax(np.abs(fit.residuals) / np.sqrt(spread))), fit.residuals.shape)
+    std = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).std
+    k, c = np.unravel_index(int(np.argmax(np.abs(fit.residuals) / std)), fit.residuals.shape)
     return f"position {k + 1} of {found.channels[c]}"
 
 
 def _too_large(fit: Regression) -> list[Finding]:
     """What is to be said where errors of the table bend the readings by more than their noise."""
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
-    weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
-    spread = np.einsum("ncc->nc", weight.within) + np.square(weight.common).sum(axis=-1)
+    std = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).std
     # where no noise is left, squares a thousand times below the rest do not matter either
-    limit = np.maximum(fit.noise, 1e-3 * np.sqrt(spread.mean(axis=0)))
+    limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.square(std).mean(axis=0)))
     bent = []
     for error, step in zip(chain.errors, np.diag(chain.std), strict=True):
         ends = [fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0)]
@@ -229,13 +226,13 @@ def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings
     )
 
 
-def _statistics(found: Readings, fitting: Fitting) -> Mapping[str, float]:
-    """Figures of the fit."""
+def _statistics(found: Readings, fitting: Fitting, condition: float) -> Mapping[str, float]:
+    """Figures of the fit, and the condition number of its plan."""
     fit = fitting.fit
     assert fit is not None
     return {
         "dof": float(fit.dof),
-        "condition": in_basis(orthonormal(fitting.model, found.angles))[0],
+        "condition": condition,
         "column_condition": max(each.identifiability.condition for each in fitting.known),
         "residual_rms": float(np.sqrt(np.mean(np.square(fit.residuals)))),
         "chi2": fit.chi2,
@@ -308,14 +305,6 @@ def _conditions(found: Readings, settings: TurntableSettings) -> dict[str, Any]:
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,
     }
-
-
-def provenance(settings: TurntableSettings) -> dict[str, Any]:
-    """What a repetition needs beside the inputs."""
-    import scipy
-
-    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
-    return {"settings": settings.given, "seed": None, "versions": versions}
 
 
 def _plan(found: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:

@@ -198,7 +198,9 @@ def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding
     lost = [words for each in what for words in each.words]
     if lost:
         raise StudyError(
-            "design", f"no plan on this table identifies {'; '.join(lost)}, expected fewer terms"
+            "design",
+            f"no choice among the {len(settings.design.candidates)} candidates identifies {'; '.join(lost)}, expected "
+            "more candidates or fewer terms",
         )
     if settings.design.table_errors and not settings.instrument.coefficients:
         said = (

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.identifiability import Identifiability
-from inercal.estimate.result import Estimate, coverage_factor, without_parameters
+from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.turntable.outcome import COMMAND, WORST_CONDITION, provenance, unit_of_term
+from inercal.turntable.outcome import COMMAND, WORST_CONDITION, unit_of_term
 from inercal.turntable.rate import Input, RateDwells
 from inercal.turntable.rate_fit import RateFit, approaches
 from inercal.turntable.settings import RateTest, TurntableSettings
@@ -236,6 +236,6 @@ def _common(record: Record, found: RateDwells, settings: TurntableSettings) -> d
         },
         "traceability": settings.traceability,
         "inputs": record.sources,
-        "provenance": provenance(settings),
+        "provenance": provenance(settings.given),
         "references": REFERENCES,
     }

@@ -14,7 +14,7 @@ so that the fit is repeated until c rests.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from inercal.estimate.identifiability import Identifiability, few_terms, identif
 from inercal.instruments.polynomial import ChannelModel
 from inercal.turntable.model import TableModel
 from inercal.turntable.noise import scatter
-from inercal.turntable.weights import Samples, Weights, beside_inputs, weights
+from inercal.turntable.weights import Samples, Weights, beside_inputs, weights, whitened
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Regression:
     angles : (n, joints) rad
     c : (p,) linear coefficients [output per monomial]
     covariance : (p, p) of them
-    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``
+    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less what is stated
     residuals : (n, c) readings minus model at the nominal attitudes
     chi2, dof : weighted sum of squares, prior of the constant errors included, and its degrees of freedom
     noise : (c,) standard deviation of a reading that is not the table's doing
@@ -91,7 +91,7 @@ class Known:
     """What the plan lets a channel say: rank and null vectors of its terms, ``words`` for each null vector."""
 
     identifiability: Identifiability
-    words: tuple[str, ...] = field(default=())
+    words: tuple[str, ...]
 
 
 def known(model: TableModel, angles: Array) -> tuple[Known, ...]:
@@ -135,22 +135,16 @@ def solve(rows: Array, y: Array, weight: Weights) -> Solution:
     weight : Weights
     """
     n, channels, p = rows.shape
-    factor = np.linalg.cholesky(weight.within)
-    left = np.linalg.solve(factor, np.concatenate([rows, weight.common], axis=-1)).reshape(n * channels, -1)
-    right = np.linalg.solve(factor, y[..., None]).reshape(n * channels)
-    q = left.shape[1] - p
-    whole = np.vstack([left, np.hstack([np.zeros((q, p)), np.eye(q)])])
-    length = np.linalg.norm(whole, axis=0)
-    length[length == 0.0] = 1.0
-    u, s, vt = np.linalg.svd(whole / length, full_matrices=False)
-    inverse = (vt.T / s) @ u.T / length[:, None]
-    joint = inverse @ inverse.T
-    solution = inverse[:, : n * channels] @ right
-    misfit = np.concatenate([right - left @ solution, solution[p:]])
+    white = whitened(rows, y, weight)
+    u, s, vt = np.linalg.svd(white.rows, full_matrices=False)
+    inverse = (vt.T / s) @ u.T / white.length[:, None]
+    solution = inverse[:, : n * channels] @ white.right
+    misfit = np.concatenate([white.right, np.zeros(len(solution) - p)]) - white.rows @ (
+        solution * white.length
+    )
     # c = inverse L^-1 y, with L block diagonal
-    whitened = inverse[:p, : n * channels].reshape(p, n, channels)
-    gain = np.einsum("pnd,ndc->pnc", whitened, np.linalg.inv(factor))
-    return Solution(solution[:p], joint, gain, solution[p:], float(misfit @ misfit))
+    gain = np.einsum("pnd,ndc->pnc", inverse[:p, : n * channels].reshape(p, n, channels), white.inverse)
+    return Solution(solution[:p], inverse @ inverse.T, gain, solution[p:], float(misfit @ misfit))
 
 
 def fit(

@@ -27,6 +27,38 @@ class Weights:
     within: Array
     common: Array
 
+    @property
+    def std(self) -> Array:
+        """Standard deviation (n, c) of each reading by all of it."""
+        return np.asarray(np.sqrt(np.einsum("ncc->nc", self.within) + np.square(self.common).sum(axis=-1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """A regression in readings of unit covariance, with the prior of what is constant as rows of its own.
+
+    ``inverse`` (n, c, c) of the roots of ``within``, by which the readings are multiplied; ``right`` (n c,) the
+    readings; ``rows`` (n c + q, p + q) the regressors and columns of ``common``, each over its ``length`` (p + q,).
+    """
+
+    inverse: Array
+    right: Array
+    rows: Array
+    length: Array
+
+
+def whitened(rows: Array, y: Array, weight: Weights) -> Whitened:
+    """Whiten regressors ``rows`` (n, c, p) and readings ``y`` (n, c); raises LinAlgError where ``within`` of a
+    position is not positive definite."""
+    n, c, p = rows.shape
+    inverse = np.linalg.inv(np.linalg.cholesky(weight.within))
+    left = (inverse @ np.concatenate([rows, weight.common], axis=-1)).reshape(n * c, -1)
+    q = left.shape[1] - p
+    whole = np.vstack([left, np.hstack([np.zeros((q, p)), np.eye(q)])])
+    length = np.linalg.norm(whole, axis=0)
+    length[length == 0.0] = 1.0
+    return Whitened(inverse, (inverse @ y[..., None]).reshape(n * c), whole / length, length)
+
 
 def weights(
     model: TableModel,
