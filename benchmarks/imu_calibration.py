@@ -55,9 +55,9 @@ def passes(calibration) -> dict:
     start, out = np.array([1.0, 0.0, 0.0, 0.0]), np.empty((len(intervals) + 1, 4))
     kernels.integrate(start, omega, intervals, out)  # compiles or loads
     return {
-        "one pass of the turns": lambda: carried(turns, up, gyro.model, gyro.g_sensitivity),
+        "one pass of the turns": lambda: carried(turns, up, gyro.model, gyro.drift),
         "the same with derivatives": lambda: carried_with_derivatives(
-            turns, up, gyro.model, gyro.g_sensitivity
+            turns, up, gyro.model, gyro.drift
         ),
         "as many intervals, compiled": lambda: kernels.integrate(start, omega, intervals, out),
     }

@@ -46,6 +46,32 @@ def test_without_noise_the_truth_comes_back(g_sensitivity):
         assert relative < (1e-5 if name[0] in "KM" else 2e-5), name
 
 
+@pytest.mark.parametrize("g_sensitivity", [0.0, 2e-4])
+def test_a_bias_that_drifts_is_followed(g_sensitivity):
+    """A ramp of 0.2 mrad/s over the recording comes back, D_F is the bias in the middle, nothing else moves."""
+    record, truth = recording(seed=30, poses=24, quiet=True, g_sensitivity=g_sensitivity)
+    t, acc, gyro = arrays(record)
+    ramp = np.array([1.0, -0.5, 0.25]) / t[-1]  # counts a second
+    drifting = record_of(t, acc, gyro + t[:, None] * ramp)
+    asked = replace(SETTINGS, g_sensitivity=g_sensitivity > 0, bias_drift=True)
+    found = calibrate(drifting, asked).estimate
+    assert found.status is Status.OK
+    middle = found.result["bias_time_s"]
+    true = truth.values()
+    for axis, slope in zip("xyz", ramp, strict=True):
+        assert found[f"D_R_{axis}"].value == pytest.approx(slope, abs=2e-5)
+        assert found[f"D_R_{axis}"].unit == "count/s"
+        assert found[f"D_F_{axis}"].value == pytest.approx(true[f"D_F_{axis}"] + slope * middle, abs=1e-3)
+        assert found[f"S_{axis}"].value == pytest.approx(true[f"S_{axis}"], rel=2e-6)
+    assert not any(finding.code == "bias_drift" for finding in found.findings)
+
+
+def test_the_drift_of_a_steady_bias_is_nothing_within_its_uncertainty():
+    record, _ = recording(seed=31, poses=24)
+    found = calibrate(record, replace(SETTINGS, bias_drift=True)).estimate
+    assert all(abs(found[f"D_R_{axis}"].value) < 4.5 * found[f"D_R_{axis}"].u for axis in "xyz")
+
+
 def test_every_coefficient_within_five_standard_uncertainties():
     record, truth = recording(seed=2, poses=30, g_sensitivity=2e-4)
     estimate = calibrate(record, replace(SETTINGS, g_sensitivity=True)).estimate

@@ -83,7 +83,7 @@ def vertical_output(verticals: Array, model: TriadModel, earth: EarthRate) -> Ar
 
 
 def unknown_rates(
-    turns: Turns, verticals: Array, model: TriadModel, g: Array, earth: EarthRate
+    turns: Turns, verticals: Array, model: TriadModel, drift: Array, earth: EarthRate
 ) -> UnknownRates:
     """Carry horizontal axes from the first pose through the turns, as far as these connect.
 
@@ -92,7 +92,7 @@ def unknown_rates(
     A rate h fixed to the Earth adds ``-h dt`` to every rotation vector, in the frame of the turn's start
     ``-h tau`` in all, and so moves the carried vertical by ``-tau R^T (n x h)``.
     """
-    R = attitudes(increments(turns, model, g))[-1]
+    R = attitudes(increments(turns, model, drift))[-1]
     runs = [k for k in range(len(turns)) if k == 0 or turns.first[k] != turns.last[k - 1]]
     q = 1 + 2 * len(runs)
     at_rest, in_turns = np.zeros((len(verticals), 3, q)), np.zeros((len(turns), 3, q))

@@ -2,7 +2,8 @@
 
 Two kinds of data, fitted together: in every turn the vertical of one pose, carried through the gyro's
 output, must meet the vertical of the next (Tedaldi, Pretto, Menegatti, ICRA 2014, eqs. (13) to (16)); in
-every pose the mean output is the bias, plus what earth rate and, if asked for, the g-sensitive drift make.
+every pose the mean output is the bias, plus what earth rate and, if asked for, drift with specific force and time
+make.
 All scatter is estimated from the data: that of the pose means about their own regression, that of the turns
 as a variance that grows with the duration of the turn, on top of what the accelerometers' scatter makes of
 the verticals.
@@ -18,9 +19,10 @@ from numpy.typing import NDArray
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.imu.drivers import Drivers
 from inercal.imu.earth_rate import EarthRate, UnknownRates, unknown_rates, vertical_output
 from inercal.imu.turns import Turns, carried, carried_with_derivatives, thin
-from inercal.instruments.terms import GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.instruments.terms import GYRO_TRIAD
 from inercal.instruments.triad import TriadModel
 
 Array = NDArray[np.float64]
@@ -33,7 +35,7 @@ _OFF_DIAGONAL = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
 @dataclass(frozen=True)
 class StaticRegression:
-    """Mean gyro outputs in the poses, regressed on a constant and, if asked for, the specific force.
+    """Mean gyro outputs in the poses, regressed on a constant and the drivers, if any.
 
     ``coefficients`` (c, 3), ``unit_covariance`` (c, c), ``scatter`` (3,) standard deviation of a pose mean
     about the regression [output], ``dof``, ``residuals`` (n, 3).
@@ -64,7 +66,7 @@ def regress_static(means: Array, regressors: Array) -> StaticRegression:
 
 @dataclass(frozen=True)
 class GyroFit:
-    """The triad ``model``, ``g_sensitivity`` (3, 3) [output/(m/s^2)], and how they came about.
+    """The triad ``model``, ``drift`` (3, q) [output/driver], and how they came about.
 
     ``x`` (p,) are the parameters ``names``; ``geometry`` tells what turns and poses can tell of them, whatever
     the noise. ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain``
@@ -78,7 +80,7 @@ class GyroFit:
 
     names: tuple[str, ...]
     model: TriadModel
-    g_sensitivity: Array
+    drift: Array
     x: Array
     converged: bool
     message: str
@@ -101,10 +103,10 @@ def fit_gyro(
     force_error: Array,
     scatter: float,
     start: TriadModel,
-    with_g_sensitivity: bool,
+    drivers: Drivers,
     earth: EarthRate,
 ) -> GyroFit:
-    """Fit bias, scale, misalignment and, if asked for, g-sensitivity.
+    """Fit bias, scale, misalignment and, if asked for, drift with specific force and time.
 
     Parameters
     ----------
@@ -121,30 +123,28 @@ def fit_gyro(
         Standard deviation of those independent errors [m/s^2].
     start : TriadModel
         First guess (see `first_guess`).
-    with_g_sensitivity : bool
-        Fit the nine g-sensitive drift coefficients too.
+    drivers : Drivers
+        What the bias may depend on, in the poses; the same as in ``turns``.
     earth : EarthRate
         What is known of earth rate at the site.
     """
-    names = GYRO_TRIAD + (GYRO_G_SENSITIVITY if with_g_sensitivity else ())
+    names = GYRO_TRIAD + drivers.names
     p = len(names)
     size = np.linalg.norm(f, axis=1, keepdims=True)
     verticals = f / size
-    regressors = f if with_g_sensitivity else np.empty((len(f), 0))
     by_earth = vertical_output(verticals, start, earth)
-    static = regress_static(means - by_earth, regressors)
-    design = _static_design(f, p)
+    static = regress_static(means - by_earth, drivers.at_rest)
+    design = _static_design(drivers.at_rest, p)
     finest = 1e-12 * np.max(start.scale)
 
     theta = np.concatenate(
         [static.coefficients[0], start.scale, [start.misalignment[i, j] for i, j in _OFF_DIAGONAL]]
     )
-    if with_g_sensitivity:
-        theta = np.concatenate([theta, static.coefficients[1:].T.ravel()])
-    # a bias that turns the instrument by one radian in a turn, and a g-sensitivity that does so at 1 g
+    theta = np.concatenate([theta, static.coefficients[1:].T.ravel()])
+    # a bias that turns the instrument by one radian in a turn, and a drift that does so at the largest driver
     turning = np.max(start.scale) / float(np.median(turns.durations))
     typical = np.concatenate([np.full(3, turning), start.scale, np.ones(6)])
-    typical = np.concatenate([typical, np.full(p - 12, turning / float(np.mean(size)))])
+    typical = np.concatenate([typical, np.tile(turning / np.max(np.abs(drivers.at_rest), axis=0), 3)])
 
     durations = np.repeat(turns.durations, 3)
     walk2 = 0.01**2 / float(np.median(turns.durations))
@@ -164,10 +164,10 @@ def fit_gyro(
         sizes = np.concatenate([typical, unknown.sizes])
         fit = solve(problem.residuals, problem.jacobian, x, (*names, *unknown.names), sizes)
         x = fit.x
-        model, g = unpack(x[:p])
+        model, drift = unpack(x[:p])
         left = problem.miss(x)
         by_earth = unknown.output(model, x[p:])
-        static = regress_static(means - by_earth, regressors)
+        static = regress_static(means - by_earth, drivers.at_rest)
         dof = max(1.0, 2.0 * len(turns) - _absorbed(fit, len(weigh)))
         walk2 = _excess(left, known, durations, dof)
 
@@ -177,11 +177,11 @@ def fit_gyro(
     return GyroFit(
         names,
         model,
-        g,
+        drift,
         x[:p],
         fit.converged,
         fit.message,
-        _geometry(turns, verticals, model, g, design, typical, names),
+        _geometry(turns, verticals, model, drift, design, typical, names),
         np.hstack([by_miss, by_output]),
         # a prior observation of each unknown rate, in units of its size, has an error of one
         -by_rate,
@@ -208,14 +208,14 @@ class _Problem:
     unknown: UnknownRates
 
     def _split(self, x: Array) -> tuple[TriadModel, Array, Array]:
-        """Triad, g-sensitivity and rates."""
+        """Triad, drift and rates."""
         p = self.design.shape[1]
         return *unpack(x[:p]), x[p:]
 
     def miss(self, x: Array) -> Array:
         """(3 m,) carried minus measured verticals [rad]."""
-        model, g, rates = self._split(x)
-        miss = carried(self.turns, self.verticals, model, g) - self.verticals[self.turns.last]
+        model, drift, rates = self._split(x)
+        miss = carried(self.turns, self.verticals, model, drift) - self.verticals[self.turns.last]
         return np.asarray(miss.ravel() + self.unknown.in_turns @ rates)
 
     def residuals(self, x: Array) -> Array:
@@ -228,9 +228,9 @@ class _Problem:
 
     def jacobian(self, x: Array) -> Array:
         """(3 m + 3 n + q, p + q)."""
-        model, g, rates = self._split(x)
+        model, drift, rates = self._split(x)
         p, q = self.design.shape[1], len(rates)
-        turn = carried_with_derivatives(self.turns, self.verticals, model, g)[1][..., :p].reshape(-1, p)
+        turn = carried_with_derivatives(self.turns, self.verticals, model, drift)[1].reshape(-1, p)
         rest = self.design + self.unknown.output_sensitivity(model, rates, p)
         by_rate = np.einsum("ij,njk->nik", model.gain, self.unknown.at_rest).reshape(len(self.spread), q)
         return np.block(
@@ -246,34 +246,33 @@ def _geometry(
     turns: Turns,
     verticals: Array,
     model: TriadModel,
-    g: Array,
+    drift: Array,
     design: Array,
     typical: Array,
     names: tuple[str, ...],
 ) -> Identifiability:
     """What the turns and poses can tell whatever the noise: misses in radians, rates at rest in radians a turn."""
-    by_parameter = carried_with_derivatives(turns, verticals, model, g)[1][..., : len(names)]
+    by_parameter = carried_with_derivatives(turns, verticals, model, drift)[1]
     per_turn = float(np.median(turns.durations)) / np.tile(model.scale, len(verticals))
     J = np.concatenate([by_parameter.reshape(-1, len(names)), design * per_turn[:, None]])
     return identify(J, names, typical)
 
 
 def unpack(theta: Array) -> tuple[TriadModel, Array]:
-    """Triad and g-sensitivity (3, 3) of parameters (12,) or (21,) in the order of the term table."""
+    """Triad and drift (3, q) of parameters (12 + 3 q,): those of the term table, then the rows of the drift."""
     misalignment = np.eye(3)
     for value, (i, j) in zip(theta[6:12], _OFF_DIAGONAL, strict=True):
         misalignment[i, j] = value
-    g = theta[12:].reshape(3, 3) if len(theta) > 12 else np.zeros((3, 3))
-    return TriadModel(theta[3:6], misalignment, theta[:3]), g
+    return TriadModel(theta[3:6], misalignment, theta[:3]), theta[12:].reshape(3, (len(theta) - 12) // 3)
 
 
-def _static_design(f: Array, parameters: int) -> Array:
+def _static_design(drivers: Array, parameters: int) -> Array:
     """(3 n, p): pose means as a linear function of the parameters."""
-    design = np.zeros((len(f), 3, parameters))
+    n, q = drivers.shape
+    design = np.zeros((n, 3, parameters))
     design[:, range(3), range(3)] = 1.0
-    if parameters > 12:
-        for j in range(3):
-            design[:, j, 12 + 3 * j : 15 + 3 * j] = f
+    for j in range(3):
+        design[:, j, 12 + q * j : 12 + q * (j + 1)] = drivers
     return design.reshape(-1, parameters)
 
 
@@ -346,10 +345,11 @@ def first_guess(
     raw = coarse.outputs - coarse.intervals[..., None] * bias
     swept = max(float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0))), 1e-300)
     channels = np.eye(3) if axes is None else axes
+    no_drift = np.zeros((3, coarse.drivers.shape[2]))
     best = (1.0, np.inf)
     for scale in swept / np.geomspace(0.1, 12.0, 62):
         model = TriadModel(np.full(3, scale), channels, bias)
-        miss = carried(coarse, verticals, model, np.zeros((3, 3))) - verticals[coarse.last]
+        miss = carried(coarse, verticals, model, no_drift) - verticals[coarse.last]
         size = float(np.sqrt(np.mean(np.sum(miss**2, axis=-1))))
         if size < best[1]:
             best = (float(scale), size)

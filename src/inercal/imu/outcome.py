@@ -28,8 +28,8 @@ COMMAND = "calibrate imu"
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "
     "frame axis j); accelerometers: K1, M upper-triangular, K0, with |f| = g in every static pose; gyro: S, T full, "
-    "D_F, and + G f where g-sensitivity is estimated. Frame: x along accelerometer x, y in the plane of "
-    "accelerometers x and y."
+    "D_F, and + G f where g-sensitivity, + D_R (t - t0) where the drift of the bias is estimated. Frame: x along "
+    "accelerometer x, y in the plane of accelerometers x and y."
 )
 
 FRAME = "b, of the instrument: x along accelerometer x, y in the plane of accelerometers x and y"
@@ -105,6 +105,7 @@ def assemble(
             "u_residual": _named(joint.names, np.sqrt(np.diag(residual))),
             "u_noise": _named(joint.names, np.sqrt(np.diag(noise))),
             "unit": {triad.sensor: triad.unit.symbol for triad in _triads(recording)},
+            "bias_time_s": float(poses.times.mean()),
         },
         references=REFERENCES,
     )

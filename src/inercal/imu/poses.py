@@ -32,13 +32,14 @@ SAME_POSE = 5e-3
 class Poses:
     """Static poses at one threshold, and the accelerometer fit to them.
 
-    ``means`` (n, 3) mean outputs, ``noise_variance`` (n,) the variance [(m/s^2)^2] of each pose's |f| that
-    the sensors' noise explains, with ``noise_dof`` degrees of freedom.
+    ``times`` (n,) [s] their middles, ``means`` (n, 3) mean outputs, ``noise_variance`` (n,) the variance
+    [(m/s^2)^2] of each pose's |f| that the sensors' noise explains, with ``noise_dof`` degrees of freedom.
     """
 
     dwells: tuple[Dwell, ...]
     multiple: float
     with_gyro: bool
+    times: Array
     means: Array
     accelerometer: AccelerometerFit
     noise_variance: Array
@@ -104,7 +105,8 @@ def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
             noise = recording.noise["acc"]
             variance = np.sum(found.output_gradient() ** 2 * noise.variance(lengths), axis=1)
             dof = 3.0 * noise.dof(float(np.median(lengths)))
-            yield Poses(dwells, multiple, with_gyro, means, found, variance, dof)
+            times = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in dwells])
+            yield Poses(dwells, multiple, with_gyro, times, means, found, variance, dof)
 
 
 def choose(candidates: list[Poses]) -> Poses:

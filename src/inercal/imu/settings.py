@@ -22,6 +22,8 @@ class ImuSettings:
         Length of the still period at the start [s]; None: to be found.
     g_sensitivity : bool
         Also estimate the g-sensitive drift of the gyro.
+    bias_drift : bool
+        Also estimate how the bias of the gyro drifts with time.
     time_base_u : float
         Relative standard uncertainty of the record's clock.
     traceability : mapping
@@ -35,6 +37,7 @@ class ImuSettings:
     site: Site
     static_start: float | None = None
     g_sensitivity: bool = False
+    bias_drift: bool = False
     time_base_u: float = 0.0
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None

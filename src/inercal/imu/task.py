@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.result import Estimate
+from inercal.imu.drivers import drivers_of
 from inercal.imu.earth_rate import earth_rate_at
 from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
 from inercal.imu.joint import Scatter, force_error, join
@@ -31,7 +32,7 @@ from inercal.instruments.triad import TriadModel
 from inercal.records.checks import saturated
 from inercal.records.findings import Finding
 from inercal.records.places import counted
-from inercal.records.record import Record, Triad
+from inercal.records.record import Record
 
 Array = NDArray[np.float64]
 
@@ -133,7 +134,7 @@ def _gyro_means(recording: Recording, poses: Poses) -> Array:
     return np.array([part.mean(axis=0) if len(part) else np.full(3, np.nan) for part in parts])
 
 
-def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns | None, list[Finding]]:
+def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | None, list[Finding]]:
     """The turns between neighbouring poses that can be integrated, and what is said of the others."""
     gyro = recording.gyro
     assert gyro is not None
@@ -141,13 +142,12 @@ def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns 
     clipped = np.zeros(len(gyro.t), dtype=bool)
     for values in gyro.values.T:
         clipped[saturated(values)] = True
-    force = _force_on(gyro, recording.accelerometer, poses, with_force)
     spans, left_out = [], []
     for k, (here, there) in enumerate(itertools.pairwise(poses.dwells)):
         start, stop = _gyro_index(recording, here.stop - 1), _gyro_index(recording, there.start)
         part = slice(start, stop + 1)
         steps = np.diff(gyro.t[part])
-        if not (np.isfinite(gyro.values[part]).all() and np.isfinite(force[part]).all()):
+        if not (np.isfinite(gyro.values[part]).all() and np.isfinite(drivers[part]).all()):
             why = "samples are missing"
         elif len(steps) == 0 or not np.all((steps >= 0) & (steps <= longest)):
             why = "the time axis breaks"
@@ -167,15 +167,7 @@ def _turns(recording: Recording, poses: Poses, with_force: bool) -> tuple[Turns 
             )
         )
         return None, left_out
-    return cut_turns(gyro.t, gyro.values, force, spans), left_out
-
-
-def _force_on(gyro: Triad, acc: Triad, poses: Poses, wanted: bool) -> Array:
-    """Specific force (n, 3) [m/s^2] at the gyro's samples; zeros where it is not wanted."""
-    if not wanted:
-        return np.zeros_like(gyro.values)
-    f = poses.accelerometer.model.correct(acc.values)
-    return f if gyro.t is acc.t else np.column_stack([np.interp(gyro.t, acc.t, column) for column in f.T])
+    return cut_turns(gyro.t, gyro.values, drivers, spans), left_out
 
 
 def _calibrate_gyro(
@@ -189,7 +181,8 @@ def _calibrate_gyro(
     if not poses.with_gyro:
         said = "the gyro is so restless in most holds that the poses were found by the accelerometers alone"
         findings.append(Finding("gyro_restless", said))
-    turns, skipped = _turns(recording, poses, settings.g_sensitivity)
+    drivers = drivers_of(recording, poses, settings)
+    turns, skipped = _turns(recording, poses, drivers.at_samples)
     findings += skipped
     if turns is None:
         return None, findings
@@ -202,7 +195,7 @@ def _calibrate_gyro(
     error, earth = force_error(acc), earth_rate_at(settings.site)
     gyro = None
     if miss < WORST_START:
-        gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, settings.g_sensitivity, earth)
+        gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, drivers, earth)
         miss = rms_miss(gyro)
     if gyro is None or not gyro.converged or miss > WORST_MISS:
         said = (
@@ -211,8 +204,5 @@ def _calibrate_gyro(
         )
         axes = axis_findings(turns, acc.directions, means[0])
         return None, [*findings, Finding("contradiction", said), *axes]
-    middles = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in poses.dwells])
-    findings += gyro_findings(
-        middles, means - gyro.by_earth, acc.f, gyro, recording.gyro.unit.symbol, recording.resolution["gyro"]
-    )
+    findings += gyro_findings(poses, drivers, means - gyro.by_earth, recording)
     return gyro, findings

@@ -1,8 +1,9 @@
 """Turns between poses: the direction of gravity carried through the gyro's output, with its derivatives.
 
-Over one sample interval the rotation vector is ``phi = gain^-1 (Y - b dt - G F)``, with Y and F the
-trapezoidal integrals of gyro output and specific force. The attitude is the exact product of exp(phi); a
-vertical n, known in the first pose, appears in the last as ``R^T n`` with ``R = exp(phi_1) exp(phi_2) ...``.
+Over one sample interval the rotation vector is ``phi = gain^-1 (Y - b dt - D X)``, with Y and X the
+trapezoidal integrals of the gyro output and of what its bias goes with (the drivers: specific force, time). The
+attitude is the exact product of exp(phi); a vertical n, known in the first pose, appears in the last as ``R^T n``
+with ``R = exp(phi_1) exp(phi_2) ...``.
 NumPy over all turns at once is fast enough here; compiling would cost more than it saves.
 """
 
@@ -24,12 +25,12 @@ Array = NDArray[np.float64]
 class Turns:
     """Raw increments of m turns, padded with zeros to the longest (L intervals).
 
-    ``outputs`` (L, m, 3) [output s], ``forces`` (L, m, 3) [m/s], ``intervals`` (L, m) [s]; ``first`` and
+    ``outputs`` (L, m, 3) [output s], ``drivers`` (L, m, q) [driver s], ``intervals`` (L, m) [s]; ``first`` and
     ``last`` (m,) are the poses that each turn joins.
     """
 
     outputs: Array
-    forces: Array
+    drivers: Array
     intervals: Array
     first: NDArray[np.int64]
     last: NDArray[np.int64]
@@ -47,14 +48,14 @@ class Turns:
         """Some of the turns."""
         return Turns(
             self.outputs[:, rows],
-            self.forces[:, rows],
+            self.drivers[:, rows],
             self.intervals[:, rows],
             self.first[rows],
             self.last[rows],
         )
 
 
-def cut_turns(t: Array, gyro: Array, force: Array, spans: Sequence[tuple[int, int, int]]) -> Turns:
+def cut_turns(t: Array, gyro: Array, drivers: Array, spans: Sequence[tuple[int, int, int]]) -> Turns:
     """Cut turns out of a recording.
 
     Parameters
@@ -63,38 +64,40 @@ def cut_turns(t: Array, gyro: Array, force: Array, spans: Sequence[tuple[int, in
         Time [s], increasing within each turn.
     gyro : (n, 3)
         Gyro output.
-    force : (n, 3)
-        Specific force [m/s^2] on the gyro's time axis (zeros where g-sensitivity is not asked for).
+    drivers : (n, q)
+        What the bias depends on, at the gyro's samples: specific force [m/s^2] for g-sensitivity, time [s] for
+        drift; q is 0 where neither is asked for.
     spans : sequence of (pose, start, stop)
         Turn from ``pose`` to the next, between the samples ``start`` and ``stop`` (both included).
     """
     longest = max(stop - start for _, start, stop in spans)
     m = len(spans)
-    outputs, forces = np.zeros((longest, m, 3)), np.zeros((longest, m, 3))
+    outputs, driven = np.zeros((longest, m, 3)), np.zeros((longest, m, drivers.shape[1]))
     intervals = np.zeros((longest, m))
     for k, (_, start, stop) in enumerate(spans):
         dt = np.diff(t[start : stop + 1])
         count = stop - start
         intervals[:count, k] = dt
-        for padded, x in ((outputs, gyro), (forces, force)):
+        for padded, x in ((outputs, gyro), (driven, drivers)):
             padded[:count, k] = 0.5 * (x[start:stop] + x[start + 1 : stop + 1]) * dt[:, None]
     first = np.array([pose for pose, _, _ in spans])
-    return Turns(outputs, forces, intervals, first, first + 1)
+    return Turns(outputs, driven, intervals, first, first + 1)
 
 
 def thin(turns: Turns, samples: int) -> Turns:
     """The same turns in intervals ``samples`` times as long: coarse, for a first guess."""
     pad = -len(turns.intervals) % samples
+    count = (len(turns.intervals) + pad) // samples
     blocks = [
-        np.pad(x, [(0, pad)] + [(0, 0)] * (x.ndim - 1)).reshape(-1, samples, *x.shape[1:]).sum(axis=1)
-        for x in (turns.outputs, turns.forces, turns.intervals)
+        np.pad(x, [(0, pad)] + [(0, 0)] * (x.ndim - 1)).reshape(count, samples, *x.shape[1:]).sum(axis=1)
+        for x in (turns.outputs, turns.drivers, turns.intervals)
     ]
     return Turns(blocks[0], blocks[1], blocks[2], turns.first, turns.last)
 
 
-def increments(turns: Turns, model: TriadModel, g_sensitivity: Array) -> Array:
-    """Rotation vectors (L, m, 3) [rad] of the intervals; ``g_sensitivity`` (3, 3) [output/(m/s^2)]."""
-    raw = turns.outputs - turns.intervals[..., None] * model.bias - turns.forces @ g_sensitivity.T
+def increments(turns: Turns, model: TriadModel, drift: Array) -> Array:
+    """Rotation vectors (L, m, 3) [rad] of the intervals; ``drift`` (3, q) [output/driver]."""
+    raw = turns.outputs - turns.intervals[..., None] * model.bias - turns.drivers @ drift.T
     return np.asarray(raw @ np.linalg.inv(model.gain).T)
 
 
@@ -125,23 +128,23 @@ def _polynomial(phi: Array, one: Array | float, first: Array | float, second: Ar
     return np.asarray(out)
 
 
-def carried(turns: Turns, verticals: Array, model: TriadModel, g_sensitivity: Array) -> Array:
+def carried(turns: Turns, verticals: Array, model: TriadModel, drift: Array) -> Array:
     """The vertical (m, 3) at the end of each turn, from ``verticals`` (poses, 3) at its start."""
-    R = attitudes(increments(turns, model, g_sensitivity))[-1]
+    R = attitudes(increments(turns, model, drift))[-1]
     return np.asarray(np.einsum("mji,mj->mi", R, verticals[turns.first]))
 
 
 def carried_with_derivatives(
-    turns: Turns, verticals: Array, model: TriadModel, g_sensitivity: Array
+    turns: Turns, verticals: Array, model: TriadModel, drift: Array
 ) -> tuple[Array, Array, Array]:
     """As `carried`, with derivatives.
 
     Returns
     -------
     end : (m, 3)
-    by_parameter : (m, 3, 21)
-        Derivative with respect to bias (3), scale (3), the six misalignments and nine g-sensitivities in the
-        order of the term table.
+    by_parameter : (m, 3, 12 + 3 q)
+        Derivative with respect to bias (3), scale (3), the six misalignments in the order of the term table, and
+        the rows of ``drift``.
     by_vertical : (m, 3, 3)
         Derivative with respect to the vertical at the start, R^T.
 
@@ -149,23 +152,23 @@ def carried_with_derivatives(
     -----
     A change d of the rotation vector of interval i moves the end by ``R^T [n x] R_i Jl(phi_i) d``, with R_i
     the attitude before the interval and Jl the left Jacobian of the rotation group (Sola, Deray, Atchuthan,
-    arXiv:1812.01537). So only the sums over the turn of ``R_i Jl`` times dt, phi and F are needed.
+    arXiv:1812.01537). So only the sums over the turn of ``R_i Jl`` times dt, phi and X are needed.
     """
-    phi = increments(turns, model, g_sensitivity)
+    phi = increments(turns, model, drift)
     R = attitudes(phi)
     # left Jacobian to third order, I + K/2 + K^2/6: the angle of one sample interval is small
     RJ = R[:-1] @ _polynomial(phi, 1.0 - np.sum(phi**2, axis=-1) / 6.0, 0.5, 1.0 / 6.0)
     over_time = np.einsum("lmij,lm->mij", RJ, turns.intervals)
     over_angle = np.einsum("lmij,lmk->mkij", RJ, phi)
-    over_force = np.einsum("lmij,lmk->mkij", RJ, turns.forces)
+    over_driver = np.einsum("lmij,lmk->mkij", RJ, turns.drivers)
 
     A = np.linalg.inv(model.gain)
     columns = [-over_time @ A[:, j] for j in range(3)]
     by_rate = over_angle @ A  # [m, k, :, j]: rate about k seen by gyro j
     columns += [-np.einsum("k,mki->mi", model.misalignment[j], by_rate[..., j]) for j in range(3)]
     columns += [-model.scale[j] * by_rate[:, k, :, j] for j in range(3) for k in range(3) if k != j]
-    by_force = over_force @ A
-    columns += [-by_force[:, k, :, j] for j in range(3) for k in range(3)]
+    by_driver = over_driver @ A
+    columns += [-by_driver[:, k, :, j] for j in range(3) for k in range(drift.shape[1])]
     moved = np.stack(columns, axis=-1)
 
     start = verticals[turns.first]

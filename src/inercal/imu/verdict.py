@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from inercal.estimate.result import rounded
 from inercal.estimate.status import Status
 from inercal.imu.accelerometer import AccelerometerFit
+from inercal.imu.drivers import Drivers
 from inercal.imu.gyro import GyroFit, first_guess, regress_static
 from inercal.imu.joint import Scatter
 from inercal.imu.poses import Poses
@@ -157,13 +158,14 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
         )
 
 
-def gyro_findings(
-    times: Array, means: Array, f: Array, gyro: GyroFit, unit: str, resolution: Array
-) -> Iterator[Finding]:
+def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recording) -> Iterator[Finding]:
     """Findings about the gyro's output at rest: its steps, drift with time, change with the pose.
 
-    ``resolution`` (3,) is the step of outputs too coarse for their noise, else 0.
+    ``means`` (n, 3) are the mean outputs in the poses, less what earth rate makes; what the fit has as a driver is
+    not looked for again.
     """
+    assert recording.gyro is not None
+    unit, resolution = recording.gyro.unit.symbol, recording.resolution["gyro"]
     if np.any(resolution > 0):
         words = ", ".join(
             f"{axis} {step:.3g}" for axis, step in zip("xyz", resolution, strict=True) if step > 0
@@ -174,23 +176,22 @@ def gyro_findings(
             "does not help: D_F is no better known than step/sqrt(12)",
         )
         return
-    with_g = len(gyro.names) > 12
-    base = f if with_g else np.empty((len(f), 0))
-    span = times - times.mean()
-    p, fitted = _f_test(means, base, span[:, None])
-    if p < SIGNIFICANCE:
-        total = fitted[-1] * (times[-1] - times[0])
-        words = ", ".join(f"{axis} {d:+.3g}" for axis, d in zip("xyz", total, strict=True))
-        yield Finding(
-            "bias_drift",
-            f"the gyro bias drifts over the recording by {words} {unit}; D_F is its mean, and the scatter of "
-            "the poses is in its uncertainty",
-        )
-    if with_g or len(f) < 8:
+    if "D_R_x" not in drivers.names:
+        p, fitted = _f_test(means, drivers.at_rest, poses.times[:, None])
+        if p < SIGNIFICANCE:
+            total = fitted[-1] * np.ptp(poses.times)
+            words = ", ".join(f"{axis} {d:+.3g}" for axis, d in zip("xyz", total, strict=True))
+            yield Finding(
+                "bias_drift",
+                f"the gyro bias drifts over the recording by {words} {unit}; D_F is its mean, and the scatter of "
+                "the poses is in its uncertainty: set imu.bias_drift = true to estimate the drift",
+            )
+    f = poses.accelerometer.f
+    if "G_xx" in drivers.names or len(f) < 8:
         return
-    p, fitted = _f_test(means, base, f)
+    p, fitted = _f_test(means, drivers.at_rest, f)
     if p < SIGNIFICANCE:
-        size = float(np.max(np.linalg.norm(fitted[1:4], axis=0)) * np.mean(np.linalg.norm(f, axis=1)))
+        size = float(np.max(np.linalg.norm(fitted[-3:], axis=0)) * np.mean(np.linalg.norm(f, axis=1)))
         yield Finding(
             "g_sensitivity",
             f"the gyro output at rest changes with the pose by up to {size:.3g} {unit} per g: "

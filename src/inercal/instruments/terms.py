@@ -51,6 +51,10 @@ _GYRO = (
         for i in _AXES
         for j in _AXES
     ),
+    *(
+        Term(f"D_R_{i}", f"gyro {i} bias drift: change of its bias per time (ramp)", "output/s")
+        for i in _AXES
+    ),
 )
 
 _RATE_TEST = tuple(
@@ -117,8 +121,52 @@ TERMS: dict[str, Term] = {
 ACCELEROMETER_TRIAD = tuple(term.symbol for term in _ACCELEROMETER)
 """K0, K1 and the upper-triangular M of an accelerometer triad that defines the frame."""
 
-GYRO_TRIAD = tuple(term.symbol for term in _GYRO if not term.symbol.startswith("G_"))
+GYRO_TRIAD = tuple(term.symbol for term in _GYRO if not term.symbol.startswith(("G_", "D_R_")))
 """D_F, S and the six T of a gyro triad."""
 
 GYRO_G_SENSITIVITY = tuple(term.symbol for term in _GYRO if term.symbol.startswith("G_"))
 """The nine g-sensitive drift coefficients of a gyro triad, row i the gyro axis."""
+
+NOISE_TERMS: dict[str, Term] = {
+    term.symbol: term
+    for term in (
+        Term("N", "angle or velocity random walk: white noise", "output*sqrt(s)"),
+        Term("B", "bias instability: flicker noise, with a floor of 0.664 B", "output"),
+        Term("K", "rate or acceleration random walk", "output/sqrt(s)"),
+        Term("R", "ramp: a steady change", "output/s"),
+        Term("Q", "quantisation noise", "output*s"),
+    )
+}
+"""Noise of one channel, in the order results list it; names of parameters end in the channel: ``N_gyro_x``."""
+
+#: SI unit of a channel -> {symbol: (SI unit of the coefficient, the unit people use)}
+_NOISE_UNITS = {
+    "rad/s": {
+        "N": ("rad/sqrt(s)", "deg/sqrt(h)"),
+        "B": ("rad/s", "deg/h"),
+        "K": ("rad/s/sqrt(s)", "deg/h/sqrt(h)"),
+        "R": ("rad/s^2", "deg/h/h"),
+        "Q": ("rad", "arcsec"),
+    },
+    "m/s^2": {
+        "N": ("m/s/sqrt(s)", "ug/sqrt(Hz)"),
+        "B": ("m/s^2", "ug"),
+        "K": ("m/s^2/sqrt(s)", "ug/sqrt(h)"),
+        "R": ("m/s^3", "ug/h"),
+        "Q": ("m/s", "ug*s"),
+    },
+}
+
+
+def noise_term(symbol: str, channel_unit: str) -> str:
+    """Unit of N, B, K, R or Q of a channel in ``channel_unit``, such as ``rad/sqrt(s)`` for N of ``rad/s``."""
+    if channel_unit in _NOISE_UNITS:
+        return _NOISE_UNITS[channel_unit][symbol][0]
+    return NOISE_TERMS[symbol].unit_for(channel_unit)
+
+
+def noise_shown(symbol: str, channel_unit: str) -> str:
+    """The unit in which people quote that coefficient, such as ``deg/sqrt(h)``; `noise_term` where none is known."""
+    if channel_unit in _NOISE_UNITS:
+        return _NOISE_UNITS[channel_unit][symbol][1]
+    return noise_term(symbol, channel_unit)

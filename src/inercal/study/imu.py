@@ -36,6 +36,9 @@ class ImuTable(Strict):
     g_sensitivity: StrictBool = Field(
         default=False, description="also estimate how the gyro's drift depends on specific force"
     )
+    bias_drift: StrictBool = Field(
+        default=False, description="also estimate how the gyro's bias drifts with time"
+    )
     time_base: RelativeUncertainty | None = Field(
         default=None, description="relative standard uncertainty of the record's clock; 0 if absent"
     )
@@ -75,6 +78,7 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         site=site_of(file.site, path),
         static_start=None if file.imu.static_start is None else file.imu.static_start.value,
         g_sensitivity=file.imu.g_sensitivity,
+        bias_drift=file.imu.bias_drift,
         time_base_u=0.0 if file.imu.time_base is None else file.imu.time_base.value,
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,

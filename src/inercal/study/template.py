@@ -32,6 +32,7 @@ height = "0(300) m"                 # above sea level [m]; replace it: this is m
 method = "multiposition"            # many poses held still by hand, no turntable
 # static_start = "50 s"             # length of the still period at the start [s]; found if absent
 # g_sensitivity = true              # also estimate how gyro drift depends on specific force [true, false]
+# bias_drift = true                 # also estimate how the gyro's bias drifts with time [true, false]
 # time_base = "20 ppm"              # relative standard uncertainty of the record's clock; 0 if absent
 """
 
