@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal._files import write_text
 from inercal.errors import InputError
@@ -17,6 +18,8 @@ from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.record import Source
+
+Array = NDArray[np.float64]
 
 
 def to_json(estimate: Estimate) -> dict[str, Any]:
@@ -32,7 +35,11 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
         "command": estimate.command,
         "status": {"code": estimate.status.value, "message": estimate.message},
         "parameters": parameters,
-        "covariance": {"names": list(estimate.names), "matrix": estimate.covariance},
+        "covariance": {
+            "names": list(estimate.names),
+            "matrix": estimate.covariance,
+            **({} if estimate.type_b is None else {"type_b": estimate.type_b}),
+        },
         "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in estimate.findings],
         "statistics": estimate.statistics,
         "budget": [
@@ -84,7 +91,7 @@ def from_json(data: Mapping[str, Any]) -> Estimate:
         names=names,
         units=tuple(str(p["unit"]) for p in parameters),
         values=np.array([_number(p["value"]) for p in parameters]),
-        covariance=np.array(covariance["matrix"], dtype=float).reshape(len(names), len(names)),
+        covariance=_square(covariance["matrix"], len(names)),
         dof=np.array([math.inf if p.get("dof") is None else float(p["dof"]) for p in parameters]),
         k=np.array([_number(p.get("k", 2.0)) for p in parameters]),
         status=Status(data["status"]["code"]),
@@ -103,7 +110,13 @@ def from_json(data: Mapping[str, Any]) -> Estimate:
         timing=dict(data.get("timing_s", {})),
         result=dict(data.get("result", {})),
         references=tuple(data.get("references", ())),
+        type_b=None if "type_b" not in covariance else _square(covariance["type_b"], len(names)),
     )
+
+
+def _square(rows: Any, size: int) -> Array:
+    """A square matrix of that size; None is NaN."""
+    return np.array(rows, dtype=float).reshape(size, size)
 
 
 def _number(value: Any) -> float:

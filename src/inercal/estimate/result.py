@@ -60,6 +60,8 @@ class Estimate:
 
     ``values`` (p,), ``covariance`` (p, p), ``dof`` and ``k`` (p,) belong to ``names`` and ``units``. The
     other fields are the keys of the JSON result of the same names; ``result`` is the command's own part.
+    ``type_b`` (p, p) is the part of the covariance that comes from elsewhere (gravity, the clock, a table) and is
+    the same in repeat runs; None where it was not told apart.
     """
 
     command: str
@@ -82,6 +84,7 @@ class Estimate:
     timing: Mapping[str, float] = field(default_factory=dict)
     result: Mapping[str, Any] = field(default_factory=dict)
     references: tuple[str, ...] = ()
+    type_b: Array | None = None
 
     @property
     def u(self) -> Array:

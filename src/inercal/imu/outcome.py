@@ -108,6 +108,7 @@ def assemble(
             "bias_time_s": float(poses.times.mean()),
         },
         references=REFERENCES,
+        type_b=sum((source.covariance for source in known), np.zeros_like(covariance)),
     )
 
 

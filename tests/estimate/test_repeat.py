@@ -1,0 +1,175 @@
+"""Repeat runs: what averages out, what does not, and what changes in between."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inercal.errors import InputError
+from inercal.estimate.budget import BudgetItem
+from inercal.estimate.exchange import from_json, to_json
+from inercal.estimate.repeat import combine_runs, mandel_paule
+from inercal.estimate.result import Estimate, without_parameters
+from inercal.estimate.status import Status
+from inercal.records.findings import Finding
+from inercal.records.record import Source
+
+
+def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:
+    """A run with independent type A variances (p,) and a type B covariance (p, p)."""
+    p = len(values)
+    type_b = np.zeros((p, p)) if elsewhere is None else np.asarray(elsewhere, dtype=float)
+    names = ("K0_x", "K0_y", "K1_x")[:p]
+    return Estimate(
+        "calibrate imu", names, ("count",) * p, np.asarray(values, dtype=float), np.diag(own) + type_b,
+        np.full(p, dof), np.full(p, 2.0), Status.OK, "", type_b=type_b, **more,
+    )  # fmt: skip
+
+
+def test_the_rule_of_mandel_and_paule_against_its_definition():
+    """With the variance found, the weighted sum of squares equals its degrees of freedom."""
+    x, variances = np.array([1.0, 1.3, 0.7, 1.9]), np.array([0.01, 0.02, 0.01, 0.05])
+    found = mandel_paule(x, variances)
+    weights = 1.0 / (variances + found.between)
+    mean = weights @ x / weights.sum()
+    assert weights @ (x - mean) ** 2 == pytest.approx(3.0, rel=1e-8)
+    np.testing.assert_allclose(found.weights, weights / weights.sum(), rtol=1e-8)
+
+
+def test_equal_variances_have_a_closed_form():
+    """s^2 - sigma^2: the variance of the values less that of each."""
+    x = np.array([1.0, 2.0, 4.0, 4.5, 7.0])
+    found = mandel_paule(x, np.full(5, 0.25))
+    assert found.between == pytest.approx(np.var(x, ddof=1) - 0.25, rel=1e-8)
+    np.testing.assert_allclose(found.weights, 0.2, rtol=1e-8)
+
+
+def test_runs_that_agree_are_averaged_by_their_weights():
+    """Values apart by less than their u: the weighted mean and its u of textbooks, no change between runs."""
+    found = combine_runs([run_of([1.00], [0.04]), run_of([1.02], [0.01]), run_of([0.99], [0.04])])
+    weights = np.array([25.0, 100.0, 25.0])
+    assert found["K0_x"].value == pytest.approx(weights @ [1.0, 1.02, 0.99] / 150.0)
+    assert found["K0_x"].u == pytest.approx(1.0 / np.sqrt(150.0))
+    assert found.result["between"]["K0_x"]["s"] == 0.0
+    assert found["K0_x"].dof > 30
+    assert found.status is Status.OK
+    assert found.findings == ()
+
+
+def test_what_comes_from_elsewhere_does_not_average_out():
+    """Gravity is the same error in all runs; the scatter goes down with their number."""
+    elsewhere = np.array([[4.0, 2.0], [2.0, 1.0]])
+    runs = [run_of([0.0, 0.0], [1.0, 1.0], elsewhere) for _ in range(4)]
+    found = combine_runs(runs)
+    np.testing.assert_allclose(found.covariance, elsewhere + np.eye(2) / 4.0, rtol=1e-9)
+    np.testing.assert_allclose(found.type_b, elsewhere)
+
+
+def test_a_coefficient_that_changes_between_runs_says_so_and_has_few_degrees_of_freedom():
+    steady, turned_on = [5.0, 5.01, 4.99], [1.0, 2.0, 4.0]
+    runs = [run_of([a, b], [1e-4, 1e-4]) for a, b in zip(steady, turned_on, strict=True)]
+    found = combine_runs(runs)
+    assert found["K0_y"].u == pytest.approx(np.std(turned_on, ddof=1) / np.sqrt(3.0), rel=1e-3)
+    assert found["K0_y"].dof == pytest.approx(2.0)
+    assert found["K0_x"].dof > 10
+    (finding,) = found.findings
+    assert finding.code == "between_runs"
+    assert finding.message.startswith("K0_y changes from run to run, standard deviation 1.5")
+
+
+@given(st.permutations(range(4)), st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_the_order_of_runs_does_not_matter(order, seed):
+    rng = np.random.default_rng(seed)
+    runs = [run_of(rng.normal(0, 1, 2), rng.uniform(0.1, 2.0, 2)) for _ in range(4)]
+    a, b = combine_runs(runs), combine_runs([runs[k] for k in order])
+    np.testing.assert_allclose(a.values, b.values, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(a.dof, b.dof, rtol=1e-5)
+
+
+@given(st.floats(1e-6, 1e6), st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_another_unit_scales_values_and_uncertainties(factor, seed):
+    rng = np.random.default_rng(seed)
+    x, v = rng.normal(0, 1, (3, 1)), rng.uniform(0.1, 2.0, (3, 1))
+    a = combine_runs([run_of(x[k], v[k]) for k in range(3)])
+    b = combine_runs([run_of(factor * x[k], factor**2 * v[k]) for k in range(3)])
+    assert b["K0_x"].value == pytest.approx(factor * a["K0_x"].value, rel=1e-6, abs=1e-9 * factor)
+    assert b["K0_x"].u == pytest.approx(factor * a["K0_x"].u, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "low", "high"), [(0.0, 0.93, 0.985), (1.0, 0.90, 0.97), (5.0, 0.92, 0.97)]
+)
+def test_intervals_of_four_runs_cover_the_truth(change, low, high):
+    """2000 sets of four runs with a common error from elsewhere; limits hold 95 % and the docstring's band with
+    4.5 standard deviations of the count (0.005 each)."""
+    rng = np.random.default_rng(20261121)
+    hits = 0
+    for _ in range(2000):
+        own = rng.uniform(0.5, 2.0, 4)
+        common = rng.normal(0.0, 0.3)
+        x = common + rng.normal(0.0, np.sqrt(own + change**2))
+        stated = own * rng.chisquare(30, 4) / 30
+        found = combine_runs([run_of([x[k]], [stated[k]], [[0.09]]) for k in range(4)])
+        inside = found["K0_x"].interval(0.95)
+        hits += inside[0] < 0.0 < inside[1]
+    assert low < hits / 2000 < high
+
+
+def test_exact_runs_have_no_within_run_scatter_and_stay_finite():
+    same = combine_runs([run_of([1.0], [0.0]), run_of([1.0], [0.0])])
+    assert same["K0_x"].value == 1.0
+    assert same["K0_x"].u == pytest.approx(0.0, abs=1e-12)
+    apart = combine_runs([run_of([1.0], [0.0]), run_of([3.0], [0.0])])
+    assert apart["K0_x"].u == pytest.approx(1.0, rel=1e-6)
+    assert np.isfinite(apart.dof).all()
+
+
+def test_a_bad_run_is_left_out_and_gives_the_verdict():
+    bad = without_parameters(
+        "calibrate imu", Status.TOO_FEW_INTERVALS, "found 3", inputs=(Source("b.csv", "0"),)
+    )
+    found = combine_runs([run_of([1.0], [0.01]), bad, run_of([1.2], [0.01])])
+    assert found["K0_x"].value == pytest.approx(1.1)
+    assert found.status is Status.TOO_FEW_INTERVALS
+    assert found.message == "1 coefficients from 2 runs; run 2 (b.csv) is left out: found 3"
+    alone = combine_runs([run_of([1.0], [0.01]), bad])
+    assert alone.status is Status.TOO_FEW_INTERVALS
+    assert alone.message.startswith("run 2 (b.csv): found 3")
+
+
+def test_runs_of_another_kind_are_refused():
+    with pytest.raises(InputError, match=r"run 2: found 2 coefficients, .* expected 1 coefficients"):
+        combine_runs([run_of([1.0], [1.0]), run_of([1.0, 2.0], [1.0, 1.0])])
+
+
+def test_findings_and_results_that_runs_share_are_said_once():
+    shared, own = Finding("gap", "t: 1 gap", "row 5"), Finding("nan", "acc_x: 2 missing values", "rows 3, 9")
+    result = {"unit": {"acc": "count"}, "intervals": 3}
+    a = run_of([1.0], [1.0], findings=(shared,), result=result)
+    b = run_of([1.0], [1.0], findings=(shared, own), result=result | {"intervals": 4})
+    found = combine_runs([a, b])
+    assert found.findings == (shared, replace(own, where="run 2, rows 3, 9"))
+    assert found.result["unit"] == {"acc": "count"}
+    assert "intervals" not in found.result
+    assert [row["status"] for row in found.result["runs"]] == ["ok", "ok"]
+
+
+def test_the_budget_adds_up():
+    item = BudgetItem("gravity", "B", 0.3, "m/s^2", {"K0_x": 0.09 / 1.09})
+    runs = [run_of([x], [1.0], [[0.09]], budget=(item,)) for x in (0.0, 3.0, 5.0)]
+    found = combine_runs(runs)
+    assert sum(part.share.get("K0_x", 0.0) for part in found.budget) == pytest.approx(1.0)
+    assert [part.source for part in found.budget] == [
+        "scatter within the runs", "changes between the runs", "gravity",
+    ]  # fmt: skip
+
+
+def test_the_part_from_elsewhere_survives_the_file():
+    found = combine_runs([run_of([1.0], [1.0], [[0.25]]), run_of([2.0], [1.0], [[0.25]])])
+    again = from_json(to_json(found))
+    np.testing.assert_array_equal(again.type_b, found.type_b)
