@@ -13,6 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
 from recordings import shipped
 
+from inercal.convert.other_tools import to_tool
 from inercal.estimate.status import Status
 from inercal.imu.poses import choose, sweep
 from inercal.imu.recording import prepare
@@ -73,6 +74,23 @@ def test_accelerometer_scales_and_misalignments_agree_with_both_programs(xsens, 
         assert abs(ours.value - theirs) <= max(1.5e-4 * theirs, ours.u)
     for ours, u, theirs in zip(*correction(xsens), peer["T"], strict=True):
         assert abs(ours - theirs) <= max(1.1e-4, u)
+
+
+@pytest.mark.parametrize("peer", [IMU_TK, MATLAB])
+def test_converted_to_imu_tk_its_own_numbers_agree_with_both_programs(xsens, peer):
+    """T, 1/K and b of the file that imu_tk reads; u of T as derived by hand in `correction`."""
+    theirs = to_tool(xsens, "imu_tk").estimate
+    T, u = correction(xsens)
+    for ij, by_hand, u_by_hand, value in zip(("xy", "xz", "yz"), T, u, peer["T"], strict=True):
+        found = theirs[f"T_a_{ij}"]
+        assert found.value == pytest.approx(by_hand, rel=1e-12)
+        assert found.u == pytest.approx(u_by_hand, rel=1e-6)
+        assert abs(found.value - value) <= max(1.1e-4, found.u)
+    for i, axis in enumerate("xyz"):
+        K, b, K_g = (theirs[name] for name in (f"K_a_{axis}{axis}", f"b_a_{axis}", f"K_g_{axis}{axis}"))
+        assert abs(K.value * peer["scale"][i] - 1.0) <= max(1.5e-4, K.u / K.value)
+        assert abs(b.value - peer["bias"][i]) <= max(0.002 * peer["scale"][i], b.u)
+        assert abs(K_g.value * peer["gyro"][i] - 1.0) <= K_g.U / K_g.value
 
 
 @pytest.mark.parametrize("peer", [IMU_TK, MATLAB])

@@ -48,6 +48,14 @@ COMMANDS = {
         "the verdict is not ok.",
         "inercal calibrate turntable test.csv --study turntable.toml",
     ),
+    ("allan", ""): (
+        "inercal.cli.allan:allan",
+        "Tell the noise of an instrument from a recording at rest.\n\nOverlapping Allan deviation of every channel with "
+        "confidence limits, and angle or velocity random walk N, bias instability B, rate random walk K, ramp R and "
+        "quantisation Q with uncertainties. --out saves them (.json or .toml) or the curves (.csv), --report writes a "
+        "page with pictures. Exit code 1: done, but the instrument was not at rest.",
+        "inercal allan static.csv --report noise.html",
+    ),
     ("sensitivity", ""): (
         "inercal.cli.sensitivity:sensitivity",
         "Say which error of a turntable matters for what the instrument should read.\n\nSobol indices of first and "
@@ -64,14 +72,47 @@ COMMANDS = {
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",
         "Simulate a test on a turntable, with the errors of the table and the noise of the instrument.\n\nThe study "
-        "states the true coefficients under [instrument.coefficients]. The recording goes to --out (.csv).",
+        "states the true coefficients under [instrument.coefficients]. The recording goes to --out (.csv, "
+        ".npz, .h5, .parquet or .nc).",
         "inercal simulate turntable turntable.toml --seed 1 --out test.csv",
+    ),
+    ("temperature", ""): (
+        "inercal.cli.temperature:temperature",
+        "Fit what a sensor's output, or its calibration, does with temperature.\n\nFrom one recording at rest over a "
+        "sweep of temperature, or from calibrations made at several temperatures (in the order of time): a cubic with "
+        "uncertainties, and the hysteresis. --out saves it (.json or .toml), --report writes a page with pictures.",
+        "inercal temperature sweep.csv --map sweep-map.toml --report t.html",
     ),
     ("apply", ""): (
         "inercal.cli.apply:apply",
-        "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv). "
-        "With --invert the recording holds true values and the outputs of the instrument are written.",
+        "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv, "
+        ".npz, .h5, .parquet or .nc). With --invert the recording holds true values and the outputs of the instrument "
+        "are written. With --stream CSV lines come in on standard input and corrected ones go out, each at once.",
         "inercal apply cal.json log.csv --out corrected.csv",
+    ),
+    ("compare", ""): (
+        "inercal.cli.compare:compare",
+        "Compare two calibrations of one instrument, run to run.\n\nThe difference of each coefficient over its "
+        "uncertainty, the normalised error E_n, and whether all differences together are explained; sources common "
+        "to both are taken off. --out saves the differences (.json or .toml), --report writes a page. Exit code 1: "
+        "done, but the calibrations differ by more than their uncertainties explain.",
+        "inercal compare before.json after.json --report drift.html",
+    ),
+    ("convert", ""): (
+        "inercal.cli.convert:convert",
+        "Convert a calibration to another tool's convention, or from it.\n\n--to writes the file that imu_tk, "
+        "imucal, Kalibr or PSINS reads (imu_tk: one for each sensor); without --out it is printed. --from reads "
+        "such a file and writes a calibration (.json or .toml) for `inercal apply`; what the file does not state, "
+        "such as uncertainty, stays unknown. Exit code 1: done, but the verdict on the calibration is not ok.",
+        "inercal convert cal.json --to imucal --out cal_imucal.json",
+    ),
+    ("monitor", ""): (
+        "inercal.cli.monitor:monitor",
+        "Watch an instrument live: is it at rest, for how long, and how noisy?\n\nCSV lines come in, from FILE or "
+        "standard input, and lines go out: rest against a quiet start of five seconds, and since the last motion mean, "
+        "standard deviation, random walk N and Allan deviation of each channel. With --checkpoint the same command "
+        "goes on where it was stopped.",
+        "inercal monitor log.csv --every '1 s'",
     ),
     ("schema", ""): (
         "inercal.cli.schema:schema",

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
-from inercal.instruments.triad import TriadModel, triad_from_terms
+from inercal.instruments.triad import TriadModel, apart, triad_from_terms
 from inercal.records.record import Column, Record
-from inercal.units import parse_unit
+from inercal.units import Unit, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class ImuModel:
 
     def _drift(self, f: Array) -> Array | float:
         """g-sensitive drift [gyro output]; where there is none, a missing specific force takes no part."""
-        return f @ self.g_sensitivity.T if self.g_sensitivity.any() else 0.0
+        return apart(self.g_sensitivity, f) if self.g_sensitivity.any() else 0.0
 
 
 def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
@@ -83,16 +83,32 @@ def _invertible(triad: TriadModel) -> bool:
     )
 
 
-def apply_to(record: Record, model: ImuModel, invert: bool = False) -> Record:
-    """Correct the ``acc`` and ``gyro`` columns of a record, all others unchanged.
+@dataclass(frozen=True)
+class Correction:
+    """How the samples of a record are corrected, or with ``invert`` made into outputs of the instrument.
 
-    With ``invert`` the record holds true values and the outputs of the instrument are made of them. A gyro
-    that the calibration does not cover is an error, not passed on as if it were corrected.
+    ``units`` are those of the results by sensor; ``factors`` take the samples to what the model expects.
+    """
+
+    model: ImuModel
+    invert: bool
+    units: Mapping[str, Unit]
+    factors: Mapping[str, float]
+
+    def __call__(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:
+        """Results (*batch, 3) for samples (*batch, 3) of both sensors, in the units of the record."""
+        work = self.model.indicate if self.invert else self.model.correct
+        return work(acc * self.factors["acc"], None if gyro is None else gyro * self.factors["gyro"])
+
+
+def correction(record: Record, model: ImuModel, invert: bool = False) -> Correction:
+    """The correction of a record, whose columns may be without samples yet.
 
     Raises
     ------
     InputError
-        Units that are not those of the calibration, missing or uncalibrated channels, two clocks.
+        Units that are not those of the calibration, missing or uncalibrated channels, two clocks. A gyro that
+        the calibration does not cover is an error, not passed on as if it were corrected.
     """
     acc = record.triad("acc")
     gyro = record.triad("gyro") if "gyro_x" in record else None
@@ -103,6 +119,7 @@ def apply_to(record: Record, model: ImuModel, invert: bool = False) -> Record:
             raise InputError(gyro.source.path, "gyro and accelerometers have different clocks, expected one")
     truth = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
     output = {sensor: parse_unit(symbol) for sensor, symbol in model.units.items()}
+    units, factors = {}, {}
     for triad in (acc, gyro):
         if triad is None:
             continue
@@ -113,19 +130,24 @@ def apply_to(record: Record, model: ImuModel, invert: bool = False) -> Record:
                 f"{triad.sensor} is in {triad.unit.symbol}, expected {wanted.symbol} as "
                 f"{'true values' if invert else 'the instrument was calibrated'}",
             )
-    values = {
-        triad.sensor: triad.values * (triad.unit.factor if invert else 1.0) for triad in (acc, gyro) if triad
-    }
-    found = (model.indicate if invert else model.correct)(values["acc"], values.get("gyro"))
-    units = output if invert else truth
+        units[triad.sensor] = (output if invert else truth).get(triad.sensor, triad.unit)
+        factors[triad.sensor] = triad.unit.factor if invert else 1.0
+    return Correction(model, invert, units, factors)
+
+
+def apply_to(record: Record, model: ImuModel, invert: bool = False) -> Record:
+    """Correct the ``acc`` and ``gyro`` columns of a record, all others unchanged; raises as `correction` does.
+
+    With ``invert`` the record holds true values and the outputs of the instrument are made of them.
+    """
+    correct = correction(record, model, invert)
+    triads = [record.triad(sensor) for sensor in correct.units]
+    acc, gyro = correct(triads[0].values, triads[1].values if len(triads) > 1 else None)
     columns = dict(record.columns)
-    for triad, new in zip((acc, gyro), found, strict=True):
-        if triad is None or new is None:
-            continue
+    for triad, new in zip(triads, (acc,) if gyro is None else (acc, gyro), strict=True):
         for i, axis in enumerate("xyz"):
-            name = f"{triad.sensor}_{axis}"
-            unit = units.get(triad.sensor, triad.unit)
+            name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(new[:, i])
             columns[name] = Column(
-                name, triad.sensor, axis, unit, np.ascontiguousarray(new[:, i]), acc.t, triad.source
+                name, triad.sensor, axis, correct.units[triad.sensor], values, triads[0].t, triad.source
             )
     return Record(columns, record.findings, record.sources, record.labels)
