@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from inercal.cli import EXIT_BAD_VERDICT, process_age
+from inercal.cli import process_age
 from inercal.cli.options import (
     Files,
     MapFile,
@@ -19,6 +19,7 @@ from inercal.cli.options import (
     read_record,
     working,
 )
+from inercal.cli.outcome import hand_over
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -68,7 +69,7 @@ def calibrate_imu(
 
         return render(estimate, pictures(found), "Calibration of an inertial measurement unit")
 
-    return _hand_over(estimate, estimate, page, output, estimate.status.advice)
+    return hand_over(estimate, estimate, page, output, estimate.status.advice)
 
 
 def calibrate_turntable(
@@ -97,7 +98,7 @@ def calibrate_turntable(
         drawn = pictures(found) if isinstance(found, Calibration) else rate_pictures(found)
         return render(shown, drawn, "Calibration on a turntable")
 
-    return _hand_over(estimate, shown, page, output, table=tolerances(estimate))
+    return hand_over(estimate, shown, page, output, table=tolerances(estimate))
 
 
 def _solve(
@@ -124,36 +125,3 @@ def _solve(
     estimate = found.estimate
     timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
     return found, replace(estimate, timing=timing, inputs=(*estimate.inputs, *map(source_of, studied)))
-
-
-def _hand_over(
-    estimate: Estimate,
-    shown: Estimate,
-    page: Callable[[], str],
-    output: ReportOutput,
-    advice: str = "",
-    table: str = "",
-) -> int:
-    """Write what was asked for, say the verdict, and give the exit code.
-
-    People see ``shown`` and the ``table`` below it, and with a bad verdict the ``advice``, where the message does not
-    hold it itself.
-    """
-    from inercal.estimate.exchange import save, to_json
-    from inercal.estimate.status import Status
-
-    output.say_findings(estimate.findings)
-    if output.out is not None:
-        save(estimate, output.out)
-        output.say(f"calibration: {output.out}")
-    if output.report is not None:
-        from inercal._files import write_text
-
-        write_text(output.report, page())
-        output.say(f"report: {output.report}")
-    text = "".join(f"{part}\n\n" for part in (shown.table() if shown.names else "", table) if part)
-    verdict = f"{estimate.status.value}: {estimate.message}"
-    if estimate.status is not Status.OK and advice:
-        verdict += f"\n{advice}"
-    output.emit(to_json(estimate), text + verdict)
-    return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT

@@ -61,6 +61,7 @@ _UNITS = {
     "_m_s2": "m/s²",
     "_rad_s": "rad/s",
     "_rad": "rad",
+    "_degC": "°C",
     "_deg": "°",
     "_arcsec": "arcsec",
     "_hz": "Hz",

@@ -1,0 +1,69 @@
+"""``inercal temperature``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from inercal.cli import process_age
+from inercal.cli.options import MapFile, ReportOutput, read_record
+from inercal.cli.outcome import hand_over
+from inercal.errors import InputError
+
+if TYPE_CHECKING:
+    from inercal.imu.temperature.model import TemperatureModel
+
+_CALIBRATIONS = (".json", ".toml")
+
+
+def temperature(
+    files: Annotated[
+        list[Path], Parameter(help="A static recording over a sweep, or calibrations (.json, .toml).")
+    ],
+    /,
+    *,
+    map_file: MapFile = None,
+    at: Annotated[str, Parameter(help="Temperature T0 about which the polynomial is written.")] = "25 degC",
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Fit what a sensor's output or its calibration does with temperature."""
+    from dataclasses import replace
+
+    from inercal.units import parse_quantity
+
+    reference = parse_quantity(at, "temperature", "--at").value
+    output.check((".json", ".toml"), (*files, map_file))
+    clock = time.perf_counter()
+    if all(file.suffix.lower() in _CALIBRATIONS for file in files):
+        if map_file is not None:
+            raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
+        model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
+    else:
+        from inercal.imu.temperature.sweep import fit_recording
+
+        record = read_record(files, map_file, output)
+        read_s = time.perf_counter() - clock
+        model = fit_recording(record, reference)
+    solve_s = time.perf_counter() - clock - read_s
+    timing = {"read": read_s, "solve": solve_s, "total": process_age()}
+    estimate = replace(model.estimate, timing=timing)
+
+    def page() -> str:
+        from inercal.imu.temperature.figures import pictures
+        from inercal.report.html import render
+
+        return render(estimate, pictures(model), "Bias and scale factor against temperature")
+
+    return hand_over(estimate, estimate, page, output, estimate.status.advice, what="temperature model")
+
+
+def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
+    """The model of saved calibrations, in the order given."""
+    from inercal.estimate.exchange import load
+    from inercal.imu.temperature.calibrations import fit_calibrations
+    from inercal.records.read import source_of
+
+    return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)

@@ -1,0 +1,124 @@
+"""Coefficients against temperature, from calibrations made at several temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.status import Status
+from inercal.imu.temperature.cubic import Cubic, fit_points
+from inercal.imu.temperature.model import (
+    LEAST_SPAN,
+    REFERENCE,
+    Curve,
+    TemperatureModel,
+    assemble,
+    no_span,
+)
+from inercal.records.findings import Finding
+from inercal.records.record import Source
+from inercal.units import parse_quantity
+
+Array = NDArray[np.float64]
+
+FEWEST = 3
+"""Calibrations without which no curve is fitted."""
+
+
+def fit_calibrations(
+    estimates: Sequence[Estimate], files: Sequence[Source], reference: float = REFERENCE
+) -> TemperatureModel:
+    """Fit every coefficient of calibrations against the temperatures in their conditions.
+
+    A cubic needs five temperatures; with fewer the polynomial is of the degree that leaves one of them over. Where
+    temperature rose to some and fell to others (in the order given), the difference is a coefficient too, if
+    degrees of freedom are left for it.
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+        Results of one kind of calibration of one instrument, in the order of time.
+    files : sequence of Source
+        The files they are from, as many.
+    reference : float
+        T0 [degC].
+
+    Raises
+    ------
+    InputError
+        Too few, a status other than ok, a calibration without a temperature, or one with other coefficients.
+    """
+    if len(estimates) < FEWEST:
+        raise InputError(files[0].path, f"found {len(estimates)} calibrations, expected at least {FEWEST}")
+    first = estimates[0]
+    for estimate, file in zip(estimates, files, strict=True):
+        if estimate.status is not Status.OK:
+            raise InputError(file.path, f"found the status {estimate.status.value}, expected ok")
+        if (estimate.names, estimate.units) != (first.names, first.units):
+            raise InputError(
+                file.path, f"found other coefficients or units than in {files[0].path}, expected the same"
+            )
+    T = np.array([_temperature(estimate, file) for estimate, file in zip(estimates, files, strict=True)])
+    if np.ptp(T) < LEAST_SPAN:
+        return TemperatureModel(no_span(float(T.min()), float(T.max()), files, ()))
+    distinct = len(np.unique(np.round(T / 0.5)))
+    terms = min(4, distinct - 1)
+    step = np.diff(T)
+    rising = 0.5 * np.sign(np.concatenate([step[:1], step]))
+    both = bool(min(np.sum(rising > 0), np.sum(rising < 0)) >= 2 and len(T) > terms + 2)
+    nothing = np.empty((len(T), 0))
+    curves = []
+    for k, name in enumerate(first.names):
+        y = np.array([estimate.values[k] for estimate in estimates])
+        # what comes from elsewhere moves all alike: it belongs to the values, not to their change
+        known = np.array([0.0 if e.type_b is None else e.type_b[k, k] for e in estimates])
+        variances = np.array([e.covariance[k, k] for e in estimates])
+        own = np.maximum(variances - known, 1e-12 * variances)
+        fits = [
+            fit_points(T, y, own, float(np.mean(known)), reference, more, terms)
+            for more in ((nothing, rising[:, None]) if both else (nothing,))
+        ]
+        curves.append(
+            Curve(
+                name,
+                first.units[k],
+                T,
+                y,
+                rising,
+                fits[0],
+                fits[1] if both else None,
+                _apart(fits[-1], both),
+                np.sqrt(variances),
+            )
+        )
+    findings = []
+    if terms < 4:
+        text = (
+            f"{distinct} temperatures carry a polynomial of degree {terms - 1} only, expected 5 for a cubic"
+        )
+        findings.append(Finding("few_degrees_of_freedom", text))
+    what = f"{len(curves)} coefficients from {len(T)} calibrations"
+    given = {"reference_degC": reference}
+    return TemperatureModel(assemble(curves, reference, files, findings, given, what), tuple(curves))
+
+
+def _apart(fit: Cubic, both: bool) -> float:
+    """The difference between rising and falling where it is more than chance, else 0."""
+    difference, u = abs(float(fit.coefficients[-1])), float(np.sqrt(fit.covariance[-1, -1]))
+    return difference if both and difference > coverage_factor(float(fit.dof[-1])) * u else 0.0
+
+
+def _temperature(estimate: Estimate, file: Source) -> float:
+    """The temperature in the conditions of a calibration [degC]."""
+    text = estimate.conditions.get("temperature")
+    if not text:
+        raise InputError(
+            file.path,
+            'conditions.temperature: missing, expected that of the instrument (temperature = "23 degC" under '
+            "[conditions] in the study)",
+        )
+    return parse_quantity(text, "temperature", f"{file.path}: conditions.temperature").value
