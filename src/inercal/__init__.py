@@ -7,8 +7,9 @@ Frames, signs, units
     edge (files, command line, reports). The unit g is 9.80665 m/s^2; local gravity belongs to a site.
     ``C_ab`` and ``q_ab`` take components in b to components in a; adjacent letters match: ``C_ab @ v_b``.
     Quaternions are scalar first, Hamilton; q and -q are one attitude. Frames: i inertial, n of the site (with
-    z up where nothing else is said), b of the instrument (x along accelerometer x, y in the plane of
-    accelerometers x and y). Accelerometers read specific force: +g up at rest. Batch axes lead.
+    z up where nothing else is said), b of the instrument (z along the input axis of
+    accelerometer z, y in the plane of those of y and z). Accelerometers read specific force: +g up at rest. Batch
+    axes lead.
 
 Instruments, forward: truth to indication
     triad          y = S M x + b: S scale factors, M unit-diagonal misalignment, b the output at zero input
@@ -42,7 +43,7 @@ Map, lower floors first; each imports only from those above its own line
     design                     candidates, criteria, exchange, comparison
     imu                        multi-position calibration: poses, accelerometer, turns, gyro, simulate, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
-    convert                    calibrations applied
+    convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     study, report, examples    files people write; pages people read; recordings that ship
     cli                        one module per verb
 """

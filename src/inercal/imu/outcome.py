@@ -28,11 +28,11 @@ COMMAND = "calibrate imu"
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "
     "frame axis j); accelerometers: K1, M upper-triangular, K0, with |f| = g in every static pose; gyro: S, T full, "
-    "D_F, and + G f where g-sensitivity, + D_R (t - t0) where the drift of the bias is estimated. Frame: x along "
-    "accelerometer x, y in the plane of accelerometers x and y."
+    "D_F, and + G f where g-sensitivity, + D_R (t - t0) where the drift of the bias is estimated. Frame: z along the "
+    "input axis of accelerometer z, y in the plane of the input axes of accelerometers y and z."
 )
 
-FRAME = "b, of the instrument: x along accelerometer x, y in the plane of accelerometers x and y"
+FRAME = "b, of the instrument: z along the input axis of accelerometer z, y in the plane of those of y and z"
 
 REFERENCES = (
     "D. Tedaldi, A. Pretto, E. Menegatti, A robust and easy to implement method for IMU calibration without external "
@@ -94,7 +94,7 @@ def assemble(
         statistics=statistics,
         budget=budget,
         model=MODEL,
-        conditions=_conditions(recording, poses, settings),
+        conditions=_conditions(record, recording, settings),
         traceability=settings.traceability,
         inputs=record.sources,
         provenance=provenance(settings.given),
@@ -139,10 +139,9 @@ def _noise(recording: Recording, poses: Poses, joint: Joint) -> tuple[Array, Arr
     return pose, noise.coefficients[0] / joint.gyro.model.scale**2, noise.variance(lengths).ravel()
 
 
-def _conditions(recording: Recording, poses: Poses, settings: ImuSettings) -> dict[str, Any]:
+def _conditions(record: Record, recording: Recording, settings: ImuSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid, as recorded."""
     t = recording.accelerometer.t
-    temperature = settings.temperature
     g = settings.site.gravity
     ranges: dict[str, Any] = {
         "specific_force_along_an_axis_m_s2": [-g, g],
@@ -154,11 +153,21 @@ def _conditions(recording: Recording, poses: Poses, settings: ImuSettings) -> di
         ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
     return {
         "frame": FRAME,
-        "temperature": None if temperature is None else temperature.text,
+        "temperature": temperature_words(record, settings),
         "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,
     }
+
+
+def temperature_words(record: Record, settings: ImuSettings) -> str | None:
+    """The temperature of the instrument: as stated, else the mean of what was recorded."""
+    if settings.temperature is not None:
+        return settings.temperature.text
+    column = record.columns.get("temperature")
+    if column is None or column.unit.dimension != "temperature" or not np.isfinite(column.values).any():
+        return None
+    return f"{np.nanmean(column.si()):.1f} degC"
 
 
 def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any]]:

@@ -1,14 +1,16 @@
 """Three sensors as one: the linear triad, forward from truth to indication and back.
 
 ``y = S M x + b``, S diagonal scale [output per SI unit], M unit-diagonal misalignment, b the output at zero
-input [output]. M_ij is the response of sensor i to the input along j. An accelerometer triad that defines
-the frame has an upper-triangular M (x of the frame along sensor x, y in the plane of sensors x and y).
+input [output]. M_ij is the response of sensor i to the input along j, so that the rows of M lie along the input
+axes. An accelerometer triad that defines the frame has an upper-triangular M: z of the frame along the input axis
+of sensor z, y in the plane of those of y and z.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +33,24 @@ class TriadModel:
 
     def indicate(self, x: Array) -> Array:
         """Outputs (*batch, 3) for true inputs ``x`` (*batch, 3) in SI units."""
-        return x @ self.gain.T + self.bias
+        return apart(self.gain, x) + self.bias
 
     def correct(self, y: Array) -> Array:
         """True inputs (*batch, 3) in SI units for outputs ``y`` (*batch, 3): the inverse of `indicate`."""
-        return (y - self.bias) @ np.linalg.inv(self.gain).T
+        return apart(self._inverse, y - self.bias)
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Inverse of the gain (3, 3) [SI unit per output]."""
+        return np.asarray(np.linalg.inv(self.gain), dtype=np.float64)
+
+
+def apart(A: Array, x: Array) -> Array:
+    """``A x`` of a matrix (3, 3) and each of the vectors ``x`` (*batch, 3), to the same digits in any batch.
+
+    The matrix product of NumPy rounds one sample otherwise than the same among many.
+    """
+    return x[..., 0, None] * A[:, 0] + x[..., 1, None] * A[:, 1] + x[..., 2, None] * A[:, 2]
 
 
 def triad_from_terms(values: Mapping[str, float], scale: str, misalignment: str, bias: str) -> TriadModel:
