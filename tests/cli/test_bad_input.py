@@ -13,14 +13,14 @@ from inercal.cli import run
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     from inercal.imu.simulate import draw_truth, hand_poses, simulate
-    from inercal.records.write import write_csv
+    from inercal.records.write import write_record
 
     path = tmp_path_factory.mktemp("spoiled")
     rng = np.random.default_rng(3)
     record, _ = simulate(
         draw_truth(rng), hand_poses(rng, 11), 9.81, 0.8, rng, rate=20.0, start=10.0, hold=2.5, turn=1.5
     )
-    write_csv(record, path / "log.csv")
+    write_record(record, path / "log.csv")
     (path / "imu.toml").write_text(
         '[site]\ngravity = "9.81(1) m/s^2"\n[imu]\nstatic_start = "9 s"\n', "utf-8"
     )

@@ -27,11 +27,11 @@ def inercal(*arguments: object, **options: object) -> subprocess.CompletedProces
 def simulated(tmp_path) -> Path:
     """A recording in canonical CSV, with its study."""
     from inercal.imu.simulate import draw_truth, hand_poses, simulate
-    from inercal.records.write import write_csv
+    from inercal.records.write import write_record
 
     rng = np.random.default_rng(1)
     record, _ = simulate(draw_truth(rng), hand_poses(rng, 16), 9.81, 0.8, rng, rate=50.0)
-    write_csv(record, tmp_path / "log.csv")
+    write_record(record, tmp_path / "log.csv")
     (tmp_path / "imu.toml").write_text('[site]\ngravity = "9.81(1) m/s^2"\nlatitude = "0.8 rad"\n', "utf-8")
     return tmp_path
 

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.records.checks import check, outliers, saturation, time_axis, time_unit
+from inercal.records.checks import check
+from inercal.records.checks.time import time_axis, time_unit
+from inercal.records.checks.values import outliers, saturation
 from inercal.records.places import places
 from inercal.records.record import Column, Source
 from inercal.units import parse_unit

@@ -89,17 +89,6 @@ def test_what_cannot_be_read_is_said(tmp_path):
         read(path, record_map)
 
 
-def test_version_7_3_is_named(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    path = tmp_path / "a.mat"
-    with h5py.File(path, "w", userblock_size=512) as file:
-        file["data"] = TABLE
-    with path.open("r+b") as file:
-        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
-    with pytest.raises(RecordError, match=r"found MAT v7.3 \(HDF5\), which is not read yet, expected v7"):
-        read(path, mapped(tmp_path / "map.toml"))
-
-
 def test_the_xsens_recording_shares_one_clock_and_raises_no_suspicion(tmp_path):
     text = '[columns.t]\nfrom = ["IMU0x2Dalpha", 0]\nunit = "s"\n'
     for sensor, variable in (("acc", "IMU0x2Dalpha"), ("gyro", "IMU0x2Domega")):

@@ -45,6 +45,15 @@ def test_channels_in_numbers():
     assert row.rate == pytest.approx(100.0)
 
 
+def test_rows_of_a_table_without_stamps_have_no_rate():
+    """Dwell rows are counted 0, 1, 2, ...: no sample rate follows from that."""
+    counted = record({"phi1": [0.0, 90.0, 180.0], "y_x": [1.0, 2.0, 3.0]}, np.arange(3.0), unit="deg")
+    assert [math.isnan(row.rate) for row in summary(counted)] == [True, True]
+    assert "row, counted from 0" in inspection_pictures(counted)[0].svg
+    timed = record({"phi1": [0.0, 90.0, 180.0]}, 60.0 * np.arange(3.0), unit="deg")
+    assert summary(timed)[0].rate == pytest.approx(1.0 / 60.0)
+
+
 @pytest.mark.parametrize(
     ("values", "t"),
     [

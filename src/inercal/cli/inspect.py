@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from math import isnan
+from typing import TYPE_CHECKING
+
 from inercal.cli.options import Files, MapFile, ReportOutput, envelope, read_record
+
+if TYPE_CHECKING:
+    from inercal.report.inspection import ChannelSummary
 
 
 def inspect(
@@ -35,7 +41,7 @@ def inspect(
         write_text(output.report, render_inspection(record, rows, inspection_pictures(record)))
         output.say(f"report: {output.report}")
     lines = [
-        f"{row.name:11s} {sparkline(record[row.name].values):24s} {row.samples} samples at {row.rate:.5g} Hz, "
+        f"{row.name:11s} {sparkline(record[row.name].values):24s} {_count(row)}, "
         f"mean {row.mean:.6g}, sd {row.deviation:.3g}, {row.minimum:.6g} to {row.maximum:.6g} {row.unit}"
         for row in rows
     ]
@@ -43,3 +49,10 @@ def inspect(
         words
     ]
     output.emit(data, "\n".join(lines))
+
+
+def _count(row: ChannelSummary) -> str:
+    """How many samples at which rate; rows where they have no rate."""
+    if isnan(row.rate):
+        return f"{row.samples} rows"
+    return f"{row.samples} samples at {row.rate:.5g} Hz"

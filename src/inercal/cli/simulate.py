@@ -24,7 +24,7 @@ def simulate_turntable(
     import numpy as np
 
     from inercal.records.read import source_of
-    from inercal.records.write import write_csv
+    from inercal.records.write import SUFFIXES, write_record
     from inercal.study.load import files_of, load_turntable_study
     from inercal.turntable.task import simulate
 
@@ -32,14 +32,14 @@ def simulate_turntable(
         raise InputError("--out", "missing, expected the file to write, such as simulated.csv")
     if seed < 0:
         raise InputError("--seed", f"found {seed}, expected 0 or more")
-    output.check((".csv",), (study,))
+    output.check(SUFFIXES, (study,))
     settings = load_turntable_study(study, overrides or ())
     inputs = files_of(study, settings.given)
     output.spare(inputs)
     with of_study(study):
         record = simulate(settings, np.random.default_rng(seed))
     with reading(output, "writing") as progress:
-        write_csv(record, output.out, progress)
+        write_record(record, output.out, progress)
     rows = len(next(iter(record.columns.values())).t)
     words = f"{rows} rows written to {output.out}"
     result = {"out": str(output.out), "rows": rows, "seed": seed, "columns": list(record.columns)}

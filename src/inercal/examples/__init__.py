@@ -15,20 +15,23 @@ class Example:
     name: str
     title: str
     records: tuple[str, ...]
-    study: str
-    map: str
     licence: str
+    map: str | None = None
+    study: str | None = None
+    verb: str = "calibrate imu"
 
     @property
     def files(self) -> tuple[str, ...]:
         """All its files."""
-        return (*self.records, self.study, self.map, self.licence)
+        return tuple(filter(None, (*self.records, self.study, self.map, self.licence)))
 
     def command(self, folder: str = ".") -> str:
-        """The command that calibrates from copies in ``folder``."""
+        """The command that uses copies in ``folder``."""
         prefix = "" if folder == "." else f"{folder}/"
-        records = " ".join(f"{prefix}{name}" for name in self.records)
-        return f"inercal calibrate imu {records} --map {prefix}{self.map} --study {prefix}{self.study}"
+        words = [f"inercal {self.verb}", *(f"{prefix}{name}" for name in self.records)]
+        words += [f"--map {prefix}{self.map}"] if self.map else []
+        words += [f"--study {prefix}{self.study}"] if self.study else []
+        return " ".join(words)
 
 
 EXAMPLES: dict[str, Example] = {
@@ -38,17 +41,56 @@ EXAMPLES: dict[str, Example] = {
             "xsens",
             "Xsens MTi turned by hand through 38 poses, 511 s at 100 Hz (Tedaldi, Pretto, Menegatti, ICRA 2014)",
             ("xsens_acc.mat", "xsens_gyro.mat"),
-            "xsens.toml",
-            "xsens-map.toml",
             "licences/imu_tk.txt",
+            "xsens-map.toml",
+            "xsens.toml",
         ),
         Example(
             "mpu6050",
             "MPU-6050 held in only ten poses, 102 s at 100 Hz: too few, and inercal says which",
             ("mpu6050.csv.gz",),
-            "mpu6050.toml",
-            "mpu6050-map.toml",
             "licences/ImuCalibration.txt",
+            "mpu6050-map.toml",
+            "mpu6050.toml",
+        ),
+        Example(
+            "ferraris",
+            "IMU set on its six sides and turned about its three axes, sections labelled, 205 Hz (imucal)",
+            ("ferraris.csv.gz",),
+            "licences/imucal.txt",
+            "ferraris-map.toml",
+            "ferraris.toml",
+        ),
+        Example(
+            "ferraris-si",
+            "the same kind of session in m/s^2 and deg/s, sections by their times, 102 Hz (imucal)",
+            ("ferraris-si.csv.gz",),
+            "licences/imucal.txt",
+            "ferraris-si-map.toml",
+            "ferraris-si.toml",
+        ),
+        Example(
+            "table",
+            "IMU on a two-axis turntable with known angles, 265 s at 100 Hz, simulated by pyins",
+            ("table.npz",),
+            "licences/pyins.txt",
+            study="table.toml",
+        ),
+        Example(
+            "lasergyro",
+            "ring-laser IMU at rest, 31 min at 100 Hz, angles and velocities gained per sample (PSINS)",
+            ("lasergyro.txt.gz",),
+            "licences/PSINS.txt",
+            "lasergyro-map.toml",
+            verb="allan",
+        ),
+        Example(
+            "thermal",
+            "MEMS IMU at rest in a climatic chamber, -18 to 74 degC",
+            ("thermal.csv.gz",),
+            "licences/tofupilot.txt",
+            "thermal-map.toml",
+            verb="temperature",
         ),
     )
 }

@@ -22,7 +22,10 @@ _SENSORS = {
     "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega",
 }
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
-_TIME = r"t|time|timestamp|time stamp|stamp|sec|secs|seconds|time (?:s|ms|us|ns)|timestamp (?:s|ms|us|ns)"
+_TIME = (
+    r"(?:t|time)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds|time (?:s|ms|us|ns)"
+    r"|timestamp (?:s|ms|us|ns)"
+)
 _LABEL = r"label|part|section|pose"
 _ANGLE = re.compile(r"phi ?([123])(?: ?(deg|rad|arcmin|arcsec))?")
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
@@ -42,7 +45,7 @@ class _Guess:
 
 @dataclass(frozen=True)
 class _File:
-    """What was guessed about one file."""
+    """What was guessed about one file, or about the columns of one clock in it."""
 
     path: Path
     guesses: Mapping[str, _Guess]
@@ -76,11 +79,12 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
     """
     files: list[_File] = []
     for path in [paths] if isinstance(paths, str | Path) else paths:
-        file = _look(Path(path), on_table)
-        if not any(file.guesses.keys() & other.guesses.keys() - {"t"} for other in files):
-            files.append(file)
+        looked = _look(Path(path), on_table)
+        if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
+            files += looked
+    names = dict.fromkeys(_quoted(file.path.name) for file in files)
     lines = [
-        f"# Guessed from {', '.join(_quoted(file.path.name) for file in files)}: check each line, above all",
+        f"# Guessed from {', '.join(names)}: check each line, above all",
         "# the units, the order of the axes and their signs.",
     ]
     if len(files) == 1:
@@ -95,19 +99,26 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path, on_table: bool) -> _File:
-    """Guess the channels of one file."""
+def _look(path: Path, on_table: bool) -> list[_File]:
+    """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
     try:
         samples = sorted(format_of(path).peek(path), key=lambda sample: -len(sample.values))
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
-    guesses: dict[str, _Guess] = {}
+    lengths: dict[int, dict[str, _Guess]] = {}
     for sample in samples:
-        if len(sample.values) != len(samples[0].values):
-            continue
+        guesses = lengths.setdefault(len(sample.values), {})
         for guess in _by_header(sample) if sample.names or on_table else _by_shape(sample, path):
             guesses.setdefault(guess.name, guess)
-    if not guesses.keys() - {"t", "label"}:
+    leading = tuple(line for sample in samples for line in sample.leading)
+    longest, *others = lengths.values() or [{}]
+    found = [_File(path, longest, leading)]
+    for guesses in others:
+        known = {name for file in found for name in file.guesses} - {"t"}
+        new = {name: guess for name, guess in guesses.items() if name not in known}
+        if "t" in new and len(new) > 1:
+            found.append(_File(path, new, ()))
+    if not longest.keys() - {"t", "label"}:
         held = "; ".join(", ".join(sample.names) or f"{sample.values.shape[1]} columns" for sample in samples)
         wanted = (
             "a header such as phi1,phi2,acc_x"
@@ -115,7 +126,7 @@ def _look(path: Path, on_table: bool) -> _File:
             else "columns that look like those of an instrument"
         )
         raise RecordError(path, f"found {held[:100]}, expected {wanted}")
-    return _File(path, guesses, tuple(line for sample in samples for line in sample.leading))
+    return found
 
 
 def _by_header(sample: Sample) -> list[_Guess]:
@@ -124,6 +135,7 @@ def _by_header(sample: Sample) -> list[_Guess]:
     for index, title in enumerate(sample.names):
         match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title)
         plain, unit = (match[1], match[2]) if match else (title, None)
+        unit = unit or (sample.units[index] if sample.units else None)
         name = plain if is_channel(plain) else _named(plain)
         if name is not None:
             angle = _ANGLE.fullmatch(_words(plain))

@@ -76,7 +76,7 @@ class FileEntry(Strict):
 
 
 class NamedFileEntry(FileEntry):
-    """``[file.NAME]``: one of several files, with its own layout and columns."""
+    """``[file.NAME]``: one of several files, or of the clocks of one, with its own layout and columns."""
 
     path: str = Field(min_length=1)
     columns: dict[str, ColumnEntry] = Field(min_length=1)
@@ -136,9 +136,10 @@ def read_map(path: str | Path) -> RecordMap:
     plain = (Part(_channels(entry.columns, path), _options(entry.file)),) if entry.columns else ()
     rate = _rate(entry.time, path)
     parts = (*plain, *(_part(name, named[name], path) for name in named))
-    files = [Path(part.path).name for part in parts if part.name]
-    if len(set(files)) < len(files):
-        raise MapError(path, f"file: found one file name twice in {', '.join(files)}, expected distinct ones")
+    files = sorted({Path(part.path) for part in parts if part.name})
+    if len({file.name for file in files}) < len(files):
+        names = ", ".join(map(str, files))
+        raise MapError(path, f"file: found one file name in two folders in {names}, expected distinct ones")
     return RecordMap(Path(path), parts, rate, entry.time.ignore)
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 from inercal.errors import MissingExtraError
+from inercal.records.clocks import clocks
 
 if TYPE_CHECKING:
     import xarray
@@ -24,18 +24,11 @@ def to_xarray(record: Record) -> xarray.Dataset:
         import xarray
     except ImportError as error:
         raise MissingExtraError("Record.to_xarray", "xarray") from error
-    columns = record.columns.values()
-    one_clock = len({id(column.t) for column in columns}) <= 1
-    clocks: dict[int, str] = {}
-    for column in columns:
-        name = "time" if one_clock else f"time_{column.sensor}"
-        numbered = (f"{name}_{number}" for number in itertools.count(2))
-        free = next(each for each in itertools.chain([name], numbered) if each not in clocks.values())
-        clocks.setdefault(id(column.t), free)
+    time = clocks(record, "time")
     return xarray.Dataset(
         {
             column.name: (
-                clocks[id(column.t)],
+                time.of_column[column.name],
                 column.values,
                 {
                     "units": column.unit.symbol,
@@ -46,8 +39,8 @@ def to_xarray(record: Record) -> xarray.Dataset:
                     "sha256": column.source.sha256,
                 },
             )
-            for column in columns
+            for column in record.columns.values()
         },
-        coords={clocks[id(column.t)]: (clocks[id(column.t)], column.t, {"units": "s"}) for column in columns},
+        coords={name: (name, t, {"units": "s"}) for name, t in time.axes.items()},
         attrs={"findings": "; ".join(f"{finding.code}: {finding.message}" for finding in record.findings)},
     )

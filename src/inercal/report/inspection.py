@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.records.clocks import counted_rows
 from inercal.records.findings import Finding
 from inercal.records.record import Column, Record
 from inercal.report.html import Picture, page
@@ -26,8 +27,8 @@ class ChannelSummary:
     """A channel in numbers.
 
     ``samples`` counts all rows and ``missing`` those that hold no finite number; ``rate`` [Hz] is the median
-    one; ``mean``, ``deviation`` (standard deviation), ``minimum`` and ``maximum`` are in ``unit``. What cannot
-    be said is NaN.
+    one, NaN where rows have no time stamps and are counted; ``mean``, ``deviation`` (standard deviation),
+    ``minimum`` and ``maximum`` are in ``unit``. What cannot be said is NaN.
     """
 
     name: str
@@ -44,7 +45,8 @@ class ChannelSummary:
 def summary(record: Record) -> tuple[ChannelSummary, ...]:
     """The channels of a record in numbers, in the order they were read."""
     clocks = {id(column.t): column.t for column in record.columns.values()}
-    rates = {key: _rate(t) for key, t in clocks.items()}
+    counted = counted_rows(record.columns)
+    rates = {key: float("nan") if counted else _rate(t) for key, t in clocks.items()}
     return tuple(_summary(column, rates[id(column.t)]) for column in record.columns.values())
 
 
@@ -102,11 +104,12 @@ def inspection_pictures(record: Record) -> list[Picture]:
     sensors: dict[str, list[Column]] = {}
     for column in record.columns.values():
         sensors.setdefault(column.sensor, []).append(column)
-    return [_picture(sensor, columns, record.findings) for sensor, columns in sensors.items()]
+    axis = "row, counted from 0" if counted_rows(record.columns) else "time [s]"
+    return [_picture(sensor, columns, record.findings, axis) for sensor, columns in sensors.items()]
 
 
-def _picture(sensor: str, columns: Sequence[Column], findings: Sequence[Finding]) -> Picture:
-    """The channels of one sensor above each other."""
+def _picture(sensor: str, columns: Sequence[Column], findings: Sequence[Finding], axis: str) -> Picture:
+    """The channels of one sensor above each other, over an ``axis`` of that title."""
     with figure(WIDTH, 0.5 + 1.15 * len(columns)) as page:
         panels = page.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
         for k, (axes, column) in enumerate(zip(panels, columns, strict=True)):
@@ -119,7 +122,7 @@ def _picture(sensor: str, columns: Sequence[Column], findings: Sequence[Finding]
                     f"{number}", (begin, 1.0), xycoords=axes.get_xaxis_transform(), color=ALARM, fontsize=6.5,
                     ha="center", va="bottom",
                 )  # fmt: skip
-        panels[-1].set_xlabel("time [s]")
+        panels[-1].set_xlabel(axis)
         drawn = svg(page)
     return Picture(
         sensor,

@@ -20,7 +20,7 @@ from inercal.units import Unit
 if TYPE_CHECKING:
     from inercal.records.maps import RecordMap
 
-#: suffix -> module of this package that reads it
+#: suffix -> module of this package that reads it; a folder that ROS 2 recorded is read as a bag
 FORMATS = {
     **{
         suffix + packed: "text"
@@ -28,6 +28,12 @@ FORMATS = {
         for packed in ("", ".gz")
     },
     ".mat": "mat",
+    **dict.fromkeys((".h5", ".hdf5"), "hdf5"),
+    ".nc": "netcdf",
+    ".npz": "npz",
+    ".parquet": "parquet",
+    ".tdms": "tdms",
+    **dict.fromkeys((".bag", ".mcap", ".db3"), "bags"),
 }
 
 _CANONICAL = Part(channels=None)
@@ -44,10 +50,12 @@ def read(
     ----------
     paths : path or sequence of paths
         Files with distinct channels are parts of one record; each keeps its own time axis, unless the
-        stamps are equal. May be empty if the map names its files.
+        stamps are equal. So do columns of one file on clocks of their own, as in TDMS and HDF5. May be
+        empty if the map names its files.
     record_map : path or RecordMap, optional
-        Which column is which channel. Without one, text files must have a canonical header such as
-        ``t [s],acc_x [m/s^2]``.
+        Which column is which channel. Without one, a file must say so itself: a canonical header such as
+        ``t [s],acc_x [m/s^2]``, arrays of such names or with units beside them, or one topic of
+        `sensor_msgs/Imu`.
     progress : callable, optional
         Called with bytes done and bytes in all.
 
@@ -71,6 +79,60 @@ def read(
     >>> read(path)["acc_z"].values
     array([1.001, 0.999, 1.   ])
     """
+    tables, record_map = _tables(paths, record_map, progress)
+    return _record(tables, record_map)
+
+
+def read_runs(
+    paths: str | Path | Sequence[str | Path],
+    record_map: str | Path | RecordMap | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Record]:
+    """Read the records of one or several runs of a test: files with the same channels are repeat runs.
+
+    A file belongs to the first run that has none of its channels yet, so that ``acc1 gyro1 acc2 gyro2`` and
+    ``acc1 acc2 gyro1 gyro2`` are two runs alike. Parameters and errors are those of `read`; the same file twice is an
+    error too.
+    """
+    given = [paths] if isinstance(paths, str | Path) else paths
+    for index, path in enumerate(given):
+        if Path(path).resolve() in (Path(other).resolve() for other in given[:index]):
+            raise RecordError(path, "found it given twice, expected each run once")
+    tables, record_map = _tables(paths, record_map, progress)
+    return [_record(run, record_map) for run in _runs(tables)]
+
+
+def _runs(tables: Sequence[FileTable]) -> list[list[FileTable]]:
+    """The tables of each run; raises `RecordError` where one file stands for two."""
+    files: dict[Source, list[FileTable]] = {}
+    for file in tables:
+        files.setdefault(file.source, []).append(file)
+    runs: list[tuple[set[str], list[FileTable]]] = []
+    for source, own in files.items():
+        channels = _channels(own)
+        run = next((run for run in runs if not run[0] & channels), None)
+        if run is None:
+            run = (set(), [])
+            runs.append(run)
+        twin = next((other for other in files if other.sha256 == source.sha256 and other is not source), None)
+        if twin is not None and channels & _channels(files[twin]):
+            raise RecordError(source.path, f"holds the same as {twin.path}, expected each run once")
+        run[0].update(channels)
+        run[1].extend(own)
+    return [own for _, own in runs]
+
+
+def _channels(tables: Sequence[FileTable]) -> set[str]:
+    """The channels of tables, apart from the time."""
+    return {channel.name for file in tables for channel in file.table.channels} - {"t"}
+
+
+def _tables(
+    paths: str | Path | Sequence[str | Path],
+    record_map: str | Path | RecordMap | None,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[list[FileTable], RecordMap | None]:
+    """The tables of all files in order, and the map read."""
     files = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
     if isinstance(record_map, str | Path):
         from inercal.records.maps import read_map
@@ -80,23 +142,33 @@ def read(
     if not jobs:
         raise RecordError("record", "found no file to read, expected one at least")
     formats = [format_of(path) for path, _ in jobs]
-    sizes = [path.stat().st_size for path, _ in jobs]
-    tables = []
+    sizes = [sum(file.stat().st_size for file in _files(path)) for path, _ in jobs]
+    tables: list[FileTable] = []
     for index, (path, part) in enumerate(jobs):
         told = partial(_tell, progress, sum(sizes[:index]), sum(sizes))
-        tables.append(_read_one(formats[index], path, part, told))
+        tables += _read_one(formats[index], path, part, told)
+    return tables, record_map
+
+
+def _record(tables: Sequence[FileTable], record_map: RecordMap | None) -> Record:
+    """The record of tables that belong together."""
     columns = join(tables, record_map)
+    sources = [
+        *(file.source for file in tables),
+        *([] if record_map is None else [source_of(record_map.path)]),
+    ]
     if not columns:
-        raise RecordError(jobs[0][0], "found a time column alone, expected a channel")
-    findings = [
-        replace(finding, where=finding.where if len(tables) == 1 else f"{file.path.name}, {finding.where}")
+        raise RecordError(tables[0].path, "found a time column alone, expected a channel")
+    several = len({file.path for file in tables}) > 1
+    findings = dict.fromkeys(
+        replace(finding, where=f"{file.path.name}, {finding.where}" if several else finding.where)
         for file in tables
         for finding in file.table.findings
-    ]
+    )
     return Record(
         columns,
         (*findings, *check(columns)),
-        (*(file.source for file in tables), *(() if record_map is None else (source_of(record_map.path),))),
+        tuple(dict.fromkeys(sources)),
         next((file.table.labels for file in tables if file.table.labels), ()),
     )
 
@@ -107,15 +179,17 @@ def _assigned(files: Sequence[Path], record_map: RecordMap) -> list[tuple[Path, 
     A named file that is not given is looked for beside the map.
     """
     parts = [_without_time(part) if record_map.ignore_time else part for part in record_map.parts]
-    named = {Path(part.path).name: part for part in parts if part.name}
+    named = [part for part in parts if part.name]
     plain = next((part for part in parts if not part.name), None)
-    jobs = []
+    jobs: list[tuple[Path, Part]] = []
     for file in files:
-        part = named.get(file.name, plain)
-        if part is None:
-            raise RecordError(file, f"not named by {record_map.path}, expected {' or '.join(named)}")
-        jobs.append((file, part))
-    for part in named.values():
+        its_own = [part for part in named if Path(part.path).name == file.name]
+        its_own = its_own or ([] if plain is None else [plain])
+        if not its_own:
+            names = " or ".join(dict.fromkeys(Path(part.path).name for part in named))
+            raise RecordError(file, f"not named by {record_map.path}, expected {names}")
+        jobs += [(file, part) for part in its_own]
+    for part in named:
         if not any(job is part for _, job in jobs):
             jobs.append((record_map.path.parent / part.path, part))
     if plain is not None and not any(job is plain for _, job in jobs):
@@ -129,33 +203,39 @@ def _without_time(part: Part) -> Part:
 
 
 def source_of(path: str | Path) -> Source:
-    """A file and the SHA-256 of its bytes; raises `RecordError` where it cannot be read."""
+    """A file, or the files of a folder in order, and the SHA-256 of the bytes; raises `RecordError`."""
+    digest = hashlib.sha256()
     try:
-        with Path(path).open("rb") as file:
-            return Source(str(path), hashlib.file_digest(file, "sha256").hexdigest())
+        for name in _files(Path(path)):
+            with name.open("rb") as file:
+                while piece := file.read(1 << 20):
+                    digest.update(piece)
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
+    return Source(str(path), digest.hexdigest())
+
+
+def _files(path: Path) -> list[Path]:
+    """The file, or those of a folder in the order of their names."""
+    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
 
 
 def canonical_units(paths: Sequence[Path]) -> dict[str, Unit] | None:
-    """Unit of each channel that the headers of the files name; None where one of them needs a map, or is none."""
-    from inercal.records.read import text
-
+    """Unit of each channel that the files themselves name; None where one of them needs a map, or is none."""
     try:
-        if any(format_of(path) is not text for path in paths):
-            return None
-        return {channel.name: channel.unit for path in paths for channel in text.header(path)}
+        return {channel.name: channel.unit for path in paths for channel in format_of(path).header(path)}
     except (InputError, OSError):
         return None
 
 
-def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], None]) -> FileTable:
-    """The wanted columns of one file, and the hash of its bytes."""
+def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], None]) -> list[FileTable]:
+    """The wanted columns of one file, a table for each clock, and the hash of its bytes."""
     try:
-        table = form.read(path, part.options, part.channels, progress)
+        tables = form.read(path, part.options, part.channels, progress)
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
-    return FileTable(path, source_of(path), part, table)
+    source = source_of(path)
+    return [FileTable(path, source, part, table) for table in tables]
 
 
 def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
@@ -166,12 +246,19 @@ def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, 
 
 def format_of(path: Path) -> Format:
     """The module that reads a file; raises `RecordError` if there is no such file or none reads its suffix."""
+    if (path / "metadata.yaml").is_file():
+        return _module("bags")
     name = path.name.lower()
     for suffix, module in FORMATS.items():
         if name.endswith(suffix):
             if not path.is_file():
                 found = "a folder" if path.is_dir() else "no such file"
                 raise RecordError(path, f"found {found}, expected a recording")
-            return cast(Format, importlib.import_module(f"{__name__}.{module}"))
+            return _module(module)
     ending = "".join(Path(name).suffixes[-2:]) if name.endswith(".gz") else Path(name).suffix
     raise RecordError(path, f"found the ending {ending or 'none'!r}, expected one of {', '.join(FORMATS)}")
+
+
+def _module(name: str) -> Format:
+    """A module of this package, loaded only now."""
+    return cast(Format, importlib.import_module(f"{__name__}.{name}"))

@@ -16,7 +16,7 @@ from inercal.errors import MapError, RecordError
 from inercal.records.channels import Channel, of_a_table
 from inercal.records.read.table import Part, Table
 from inercal.records.record import Array, Column, Source
-from inercal.units import parse_unit, shown
+from inercal.units import Unit, parse_unit, shown
 
 if TYPE_CHECKING:
     from inercal.records.maps import RecordMap
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FileTable:
-    """A file that was read: the part of the map it was read by, and the table found."""
+    """A file that was read: the part of the map it was read by, and a table found; one for each of its clocks."""
 
     path: Path
     source: Source
@@ -34,7 +34,7 @@ class FileTable:
 
 @np.errstate(over="ignore", invalid="ignore")
 def join(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, Column]:
-    """Columns by name, sign, scale and unit applied; files whose time stamps are equal share one time axis.
+    """Columns by name, sign, scale and unit applied; tables whose time stamps are equal share one time axis.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def join(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, 
         Two files hold the same channel, or a file has no time axis.
     """
     if record_map is not None:
-        _check_present(files, record_map.path)
+        check_present(files, record_map.path)
     rate = None if record_map is None else record_map.rate
     _check_once(files)
     columns: dict[str, Column] = {}
@@ -53,13 +53,14 @@ def join(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, 
         t = _time_axis(file, files, rate)
         t = next((axis for axis in axes if np.array_equal(axis, t, equal_nan=True)), t)
         axes.append(t)
+        stamped = any("t" in other.table.values for other in files if other.part is file.part)
         for channel in file.table.channels:
             if channel.name not in ("t", "label"):
-                columns[channel.name] = _column(channel, file, t)
+                columns[channel.name] = _column(channel, file, t, None if stamped else rate)
     return columns
 
 
-def _check_present(files: Sequence[FileTable], map_path: Path) -> None:
+def check_present(files: Sequence[FileTable], map_path: Path) -> None:
     """Each mapped column must be in one file at least, and each file must hold one at least."""
     for part in {id(file.part): file.part for file in files}.values():
         read = [file for file in files if file.part is part]
@@ -92,8 +93,10 @@ def _check_once(files: Sequence[FileTable]) -> None:
 
 
 def _time_axis(file: FileTable, files: Sequence[FileTable], rate: float | None) -> Array:
-    """Sample times [s] of a file: its own column, that of another file of its part, or from the rate."""
+    """Sample times [s] of a table: its own column or clock, that of another table of its part, or from the rate."""
     table = file.table
+    if table.clock is not None and rate is None:
+        return table.clock
     timed = [other for other in files if other.part is file.part and "t" in other.table.values]
     if file in timed:
         timed = [file]
@@ -107,12 +110,27 @@ def _time_axis(file: FileTable, files: Sequence[FileTable], rate: float | None) 
             f"found {table.rows} rows without t, and stamps for {found}, expected one with as many rows, or a "
             "[file.NAME] for each file with its own t",
         )
+    lengths = sorted({other.table.rows for other in files if other.source == file.source})
+    if len(lengths) > 1:
+        raise RecordError(
+            file.path,
+            f"found columns of {' and '.join(map(str, lengths))} rows, expected as many of each where one rate is "
+            "stated for all",
+        )
+    return np.arange(table.rows) / row_rate(table.channels, rate, file.path)
+
+
+def row_rate(channels: Sequence[Channel], rate: float | None, path: Path) -> float:
+    """Rows a second of a file without time stamps: the stated ``rate`` [Hz], 1 where a test on a table states none.
+
+    Raises `RecordError` for any other file.
+    """
     if rate is not None:
-        return np.arange(table.rows) / rate
-    if of_a_table(table.values) and not any(channel.increment for channel in table.channels):
-        return np.arange(table.rows, dtype=np.float64)
+        return rate
+    if of_a_table(channel.name for channel in channels) and not any(each.increment for each in channels):
+        return 1.0
     raise RecordError(
-        file.path, 'found no time column t, expected one, or [time] rate = "100 Hz" (say) in a column map'
+        path, 'found no time column t, expected one, or [time] rate = "100 Hz" (say) in a column map'
     )
 
 
@@ -122,18 +140,34 @@ def _seconds(file: FileTable) -> Array:
     t = file.table.values["t"]
     if np.isnan(t).all():
         raise RecordError(file.path, f"found no number in the time column of {t.size} rows, expected seconds")
-    factor = channel.factor * channel.unit.factor
+    (factor,), _ = conversion(channel)
     return t if factor == 1.0 else t * factor
 
 
-def _column(channel: Channel, file: FileTable, t: Array) -> Column:
-    """One channel in its unit, increments turned into rates by the median sample interval."""
-    values, unit = file.table.values[channel.name], channel.unit
-    if channel.factor != 1.0:
-        values = values * channel.factor
+def conversion(channel: Channel, interval: float = 0.0) -> tuple[tuple[float, ...], Unit]:
+    """What raw values of a channel are multiplied by, one after the other, and the unit they then have.
+
+    The time becomes seconds, increments over an ``interval`` [s] become rates; other units are kept.
+    """
+    unit = channel.unit
+    if channel.name == "t":
+        return (channel.factor * unit.factor,), parse_unit("s")
+    if not channel.increment:
+        return (channel.factor,), unit
+    rate = parse_unit("m/s^2" if unit.dimension == "velocity" else "rad/s")
+    return (channel.factor, unit.factor / interval), rate
+
+
+def _column(channel: Channel, file: FileTable, t: Array, rate: float | None) -> Column:
+    """One channel in its unit, increments turned into rates by the stated or the median sample interval."""
+    interval = 0.0
     if channel.increment:
-        values = values * (unit.factor / _interval(t, file.path))
-        unit = parse_unit("m/s^2" if unit.dimension == "velocity" else "rad/s")
+        interval = _interval(t, file.path) if rate is None else 1.0 / rate
+    factors, unit = conversion(channel, interval)
+    values = file.table.values[channel.name]
+    for factor in factors:
+        if factor != 1.0:
+            values = values * factor
     return Column(channel.name, channel.sensor, channel.axis, unit, values, t, file.source)
 
 

@@ -69,7 +69,7 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
     RecordError
         There are no rows, or the header does not fit them.
     """
-    comments = ("#", "%") if options.comment is None else (options.comment,) if options.comment else ()
+    comments = comment_marks(options)
     written = (
         (index, line)
         for index, line in enumerate(lines)
@@ -81,9 +81,9 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
     if binary := [index + 1 for index, line in rows if "\0" in line]:
         raise RecordError(path, f"line {binary[0]}: found a zero byte, expected text")
     sample = [line for _, line in rows[1:][-_SAMPLE:]] or [rows[0][1]]
-    delimiter = _sniff_delimiter(sample) if options.delimiter is None else options.delimiter
+    delimiter = _sniff_delimiter(sample, rows[0][1]) if options.delimiter is None else options.delimiter
     delimiter = None if delimiter == " " else delimiter
-    decimal = options.decimal or _sniff_decimal(sample, delimiter)
+    decimal = options.decimal or sniff_decimal(sample, delimiter)
     width = Counter(len(_split(line, delimiter)) for line in sample).most_common(1)[0][0]
 
     index, line = rows[0]
@@ -102,6 +102,13 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
             "(`skip` under [file] passes over lines before the header)",
         )
     return Layout(delimiter, decimal, comments, width, names, index + 1, index + 1)
+
+
+def comment_marks(options: FileOptions) -> tuple[str, ...]:
+    """What a line begins with that is passed over."""
+    if options.comment is None:
+        return ("#", "%")
+    return (options.comment,) if options.comment else ()
 
 
 def is_header(layout: Layout, fields: Sequence[str]) -> bool:
@@ -127,9 +134,12 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return line.split(delimiter)
 
 
-def _sniff_delimiter(sample: Sequence[str]) -> str | None:
-    """The first delimiter that parts most lines into the same number of fields, at least two."""
-    for delimiter in _DELIMITERS:
+def _sniff_delimiter(sample: Sequence[str], first: str) -> str | None:
+    """The first delimiter that parts most lines into the same number of fields, at least two.
+
+    Those in the ``first`` line, which may be the header, go before others, which may stand in labels.
+    """
+    for delimiter in sorted(_DELIMITERS, key=lambda mark: mark is None or mark not in first):
         counts = Counter(len(_split(line, delimiter)) for line in sample)
         width, lines = counts.most_common(1)[0]
         if width > 1 and 2 * lines > len(sample):
@@ -137,7 +147,7 @@ def _sniff_delimiter(sample: Sequence[str]) -> str | None:
     return None
 
 
-def _sniff_decimal(sample: Sequence[str], delimiter: str | None) -> str:
+def sniff_decimal(sample: Sequence[str], delimiter: str | None) -> str:
     """A comma if numbers such as 1,5 are there and none such as 1.5."""
     if delimiter == ",":
         return "."

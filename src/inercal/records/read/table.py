@@ -43,11 +43,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Table:
-    """Raw columns of one file.
+    """Raw columns of one file, or those of one clock where a file has several.
 
     ``values`` holds an array (n,) for each channel found, as in the file, before sign, scale and unit; what
     is missing or infinite is NaN and is in ``findings``, with rows that could not be read. ``contents``
     says in words what the file holds, for the error about a channel that is not there.
+    ``clock`` (n,) [s] is the time axis that the file states for these columns, where no column t is wanted.
     """
 
     channels: tuple[Channel, ...]
@@ -56,14 +57,15 @@ class Table:
     rows: int
     labels: tuple[str, ...] = field(default=(), repr=False)
     findings: tuple[Finding, ...] = ()
+    clock: Array | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
 class Sample:
     """A first look at an array of a file, to guess a map from.
 
-    ``values`` (n, k) are its columns (text is NaN) and ``names`` (k,) its header, if any; ``leading`` holds
-    the lines passed over by ``options.skip``.
+    ``values`` (n, k) are its columns (text is NaN), ``names`` (k,) its header and ``units`` (k,) those stated
+    beside the names, if any; ``leading`` holds the lines passed over by ``options.skip``.
     """
 
     values: Array
@@ -71,6 +73,7 @@ class Sample:
     options: FileOptions
     variable: str = ""
     leading: tuple[str, ...] = ()
+    units: tuple[str | None, ...] = ()
 
 
 class Format(Protocol):
@@ -82,8 +85,14 @@ class Format(Protocol):
         options: FileOptions,
         channels: tuple[Channel, ...] | None,
         progress: Callable[[int], None],
-    ) -> Table:
-        """Read those of the channels that the file holds; ``progress`` is told the bytes done."""
+    ) -> list[Table]:
+        """Read those of the channels that the file holds; ``progress`` is told the bytes done.
+
+        A table for each clock, one at least. Without ``channels``, those that the file itself names.
+        """
+
+    def header(self, path: Path) -> tuple[Channel, ...]:
+        """The channels that the file itself names, with units; raises `InputError` where it names none."""
 
     def peek(self, path: Path) -> list[Sample]:
         """Look at the beginning of each array in the file."""

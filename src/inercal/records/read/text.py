@@ -7,7 +7,6 @@ through line by line: every row is kept, with NaN for what is no number, and the
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -18,16 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError
-from inercal.records.channels import Channel, is_channel, misfit, needs_unit
+from inercal.records.channels import Channel
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
+from inercal.records.read.canonical import EXAMPLE, canonical
 from inercal.records.read.layout import Layout, find_layout
 from inercal.records.read.lines import Block, blocks
 from inercal.records.read.table import FileOptions, Sample, Table
 from inercal.records.record import Array
-from inercal.units import parse_unit, shown
 
-_EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
 _HEADER_LINES = 50
 _LAYOUT_LINES = 400
 
@@ -45,21 +43,17 @@ def read(
     options: FileOptions,
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
-) -> Table:
-    """Read a text file; without ``channels`` its header must be canonical (``t [s],acc_x [m/s^2]``)."""
+) -> list[Table]:
+    """Read a text file as one table; without ``channels`` its header must be canonical (``t [s],acc_x [m/s^2]``)."""
     with path.open("rb") as file:
         stream = blocks(file, path)
         head = next(stream)
         layout = find_layout(head.lines, options, path)
-        if channels is None:
-            channels = _canonical(layout, head.lines, path)
-        found = {
-            channel: index for channel in channels if (index := _index(channel, layout, path)) is not None
-        }
+        found = locate(channels, layout, head.lines, path)
         numbers = {channel.name: index for channel, index in found.items() if channel.name != "label"}
         label = next((index for channel, index in found.items() if channel.name == "label"), None)
         if not numbers:
-            return Table((), {}, _contents(layout), 0)
+            return [Table((), {}, contents(layout), 0)]
 
         pieces: list[list[Array]] = [[] for _ in numbers]
         labels: list[str] = []
@@ -81,14 +75,9 @@ def read(
         raise RecordError(
             path, f"no row of numbers, line {layout.first + 1} is {line[:60]!r}, expected numbers"
         )
-    return Table(
-        tuple(found),
-        values,
-        _contents(layout),
-        len(next(iter(values.values()))),
-        tuple(labels),
-        _findings(flaws, tuple(numbers), block, layout.width),
-    )
+    count = len(next(iter(values.values())))
+    findings = _findings(flaws, tuple(numbers), block, layout.width)
+    return [Table(tuple(found), values, contents(layout), count, tuple(labels), findings)]
 
 
 def header(path: Path) -> tuple[Channel, ...]:
@@ -121,34 +110,27 @@ def _leading(lines: list[str], path: Path) -> int:
     return 0
 
 
+def locate(
+    channels: tuple[Channel, ...] | None, layout: Layout, lines: list[str], path: Path
+) -> dict[Channel, int]:
+    """Number of the column of each channel that a text file holds.
+
+    ``channels`` are those wanted, None for all that the header, one of the first ``lines``, must then name.
+    Raises `RecordError` where it names none, or one twice.
+    """
+    wanted = _canonical(layout, lines, path) if channels is None else channels
+    return {channel: index for channel in wanted if (index := _index(channel, layout, path)) is not None}
+
+
 def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, ...]:
     """The channels a canonical header names; columns of other names are none of ours."""
     where = f"{path}: line {layout.header_line}"
     if not layout.header:
         line = layout.first
         raise RecordError(
-            path, f"line {line + 1}: found {lines[line][:60]!r}, expected a header such as {_EXAMPLE}"
+            path, f"line {line + 1}: found {lines[line][:60]!r}, expected a header such as {EXAMPLE}"
         )
-    channels: dict[str, Channel] = {}
-    for index, title in enumerate(layout.header):
-        match = re.fullmatch(r"(\w+)\s*(?:\[(.*)\])?", title)
-        if match is None or not is_channel(name := match[1]):
-            continue
-        if name in channels:
-            raise RecordError(where, f"found {name} twice, expected each column once")
-        if match[2] is None and needs_unit(name):
-            raise RecordError(
-                where,
-                f"found {shown(title)} without a unit, expected it in brackets or a map, as in {_EXAMPLE}",
-            )
-        unit = parse_unit(match[2] or "1", f"{where}: {name}")
-        if problem := misfit(name, unit):
-            raise RecordError(where, f"{name}: {problem}")
-        channels[name] = Channel(name, index, unit)
-    if not channels.keys() - {"label"}:
-        found = ", ".join(layout.header)[:100]
-        raise RecordError(where, f"found the columns {found}, expected known ones as in {_EXAMPLE}, or a map")
-    return tuple(channels.values())
+    return canonical(((index, title, None) for index, title in enumerate(layout.header)), where)
 
 
 def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
@@ -168,7 +150,7 @@ def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
             return None
 
 
-def _contents(layout: Layout) -> str:
+def contents(layout: Layout) -> str:
     """What the file holds, in words."""
     return (
         f"columns {', '.join(layout.header)}" if layout.header else f"{layout.width} columns without a header"

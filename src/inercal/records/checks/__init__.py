@@ -1,0 +1,59 @@
+"""Checks of a record just read: what its stamps and values tell about how it was recorded.
+
+Nothing is changed, dropped or decided here; a check only says what is suspicious and where, and ordinary
+motion and noise say nothing. Rows are counted from 1, the first row of data.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from inercal.records.channels import of_a_table
+from inercal.records.checks.angles import angles
+from inercal.records.checks.time import time_axis, time_unit
+from inercal.records.checks.values import accelerometer_unit, gyro_unit, outliers, saturation
+from inercal.records.findings import Finding
+from inercal.records.places import counted, places
+from inercal.records.record import Array, Column
+
+_MEASURED = re.compile(r"acc_[xyz]|a\d+|gyro\w*|y_[xy]|temperature")
+
+
+def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
+    """Everything suspicious about the columns of a record, apart from what their readers have said.
+
+    Parameters
+    ----------
+    columns : mapping of str to Column
+        Those of a record, by name; each time axis they share is looked at once.
+    """
+    clocks = {id(column.t): column for column in columns.values()}
+    sampled = not of_a_table(columns)
+    findings: list[Finding] = []
+    with np.errstate(all="ignore"):
+        for column in clocks.values():
+            subject = "t" if len(clocks) == 1 else f"t of {Path(column.source.path).name}"
+            findings += time_axis(column.t, subject)
+            findings += time_unit(column.t, subject) if sampled else []
+        for column in columns.values():
+            if _MEASURED.fullmatch(column.name):
+                findings += saturation(column.values, column.name)
+                findings += outliers(column.values, column.name)
+        findings += accelerometer_unit(columns)
+        findings += gyro_unit(columns)
+        findings += angles(columns)
+    return tuple(findings)
+
+
+def missing(values: Mapping[str, Array]) -> tuple[Finding, ...]:
+    """``nan``: rows of each column (by name) that hold no number."""
+    empty = {name: np.flatnonzero(np.isnan(column)) for name, column in values.items()}
+    return tuple(
+        Finding("nan", f"{name}: {counted(rows.size, 'missing value')}", places("row", rows + 1))
+        for name, rows in empty.items()
+        if rows.size
+    )

@@ -1,0 +1,124 @@
+"""Checks of measured values: ranges, single samples, units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from inercal.records.checks.samples import SAMPLE, known, plateaus, thinned
+from inercal.records.findings import Finding
+from inercal.records.places import counted, places
+from inercal.records.record import Array, Column
+from inercal.units import STANDARD_GRAVITY, parse_unit
+
+_AROUND = 42
+
+
+def saturation(values: Array, name: str) -> list[Finding]:
+    """``saturation``: three or more equal samples at an extreme that motion has run into."""
+    rows = saturated(values)
+    if rows.size == 0:
+        return []
+    at = " and ".join(f"{level:.6g}" for level in np.unique(values[rows]))
+    text = f"{name}: {counted(rows.size, 'sample')} in runs at {at}"
+    return [Finding("saturation", text, places("row", rows + 1))]
+
+
+def saturated(values: Array) -> NDArray[np.int64]:
+    """Rows of ``values`` (n,) in runs of three or more equal samples at an extreme that motion has run into.
+
+    Quiet signals rest on the steps of their converter, and noise-free ones on any level. So a run counts
+    only if the samples before and after are well off the extreme (by more than three of the smallest steps
+    and by 2 % of a large one), and only if there are not as many samples in such runs at other levels, nor most of
+    all samples in them.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    signal, rows = known(values)
+    if signal.size < 10:
+        return none
+    low, high = signal.min(), signal.max()
+    if max(np.count_nonzero(signal == low), np.count_nonzero(signal == high)) < 3:
+        return none
+    step = np.diff(signal)
+    size = np.abs(step[step != 0])
+    if size.size == 0 or high - low < 20 * size.min():
+        return none
+    starts, ends = plateaus(step)
+    before = np.where(starts > 0, np.abs(step[starts - 1]), np.inf)
+    after = np.where(ends < step.size, np.abs(step[np.minimum(ends, step.size - 1)]), np.inf)
+    sharp = np.minimum(before, after) > max(3 * size.min(), 0.02 * np.quantile(thinned(size), 0.99))
+    starts, ends = starts[sharp], ends[sharp]
+    extreme = (signal[starts] == low) | (signal[starts] == high)
+    length = ends - starts + 1
+    samples = int(length[extreme].sum())
+    if 2 * samples <= length.sum() or 2 * samples > signal.size:
+        return none
+    runs = np.concatenate([np.arange(a, b + 1) for a, b in zip(starts[extreme], ends[extreme], strict=True)])
+    return np.asarray(rows[runs], dtype=np.int64)
+
+
+def outliers(values: Array, name: str) -> list[Finding]:
+    """``outlier``: single samples off both neighbours, to the same side, by more than 12 times the noise.
+
+    The noise is the standard deviation of the steps from sample to sample, the larger of two: from their
+    median over the recording, and from the fifth largest of the 42 around the sample (two of them its own),
+    so that motion is measured against motion.
+    """
+    signal, rows = known(values)
+    if signal.size <= _AROUND:
+        return []
+    step = np.diff(signal)
+    size = np.abs(step)
+    height = np.minimum(size[:-1], size[1:])
+    height[(step[:-1] > 0) == (step[1:] > 0)] = 0.0
+    usual = thinned(size)
+    noise = max(np.median(usual) / 0.674, usual.min(initial=np.inf, where=usual > 0))
+    suspects = np.flatnonzero(height > 12.0 * noise)
+    windows = sliding_window_view(size, _AROUND)
+    found = []
+    for some in np.array_split(suspects, suspects.size // SAMPLE + 1):
+        near = windows[np.clip(some - _AROUND // 2, 0, len(windows) - 1)]
+        moved = np.partition(near, _AROUND - 5, axis=1)[:, _AROUND - 5] / 1.645
+        found.append(some[height[some] > 12.0 * moved])
+    single = np.concatenate(found) + 1
+    if single.size == 0:
+        return []
+    text = f"{name}: {counted(single.size, 'sample')} far from both neighbours, knocks or wrong bits"
+    return [Finding("outlier", text, places("row", rows[single] + 1))]
+
+
+def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
+    """``unit_suspect``: the median norm is that of gravity in another unit than the one stated."""
+    axes = [columns[name] for name in ("acc_x", "acc_y", "acc_z") if name in columns]
+    if len(axes) < 3 or any(axis.unit != axes[0].unit or axis.t is not axes[0].t for axis in axes):
+        return []
+    stated = axes[0].unit
+    norms = np.sqrt(sum(thinned(axis.values) ** 2 for axis in axes))
+    norms = norms[np.isfinite(norms)]
+    if stated.dimension != "acceleration" or norms.size == 0:
+        return []
+    norm = float(np.median(norms))
+    fitting = [
+        unit
+        for unit in (stated, *(parse_unit(text) for text in ("g", "m/s^2", "mg", "ug", "cm/s^2")))
+        if 0.8 < norm * unit.factor / STANDARD_GRAVITY < 1.2
+    ]
+    if not fitting or stated in fitting:
+        return []
+    text = f"acc: a median norm of {norm:.4g} {stated.symbol} looks like {fitting[0].symbol}"
+    return [Finding("unit_suspect", text)]
+
+
+def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
+    """``unit_suspect``: rates in rad/s that only deg/s can be, one in a thousand beyond 100 rad/s."""
+    findings = []
+    for name in ("gyro_x", "gyro_y", "gyro_z", "gyro"):
+        if name in columns and columns[name].unit.symbol == "rad/s":
+            signal, _ = known(columns[name].values)
+            if 1000 * np.count_nonzero(np.abs(signal) > 100.0) > signal.size:
+                text = f"{name}: rates up to {np.abs(signal).max():.4g} rad/s look like deg/s"
+                findings.append(Finding("unit_suspect", text))
+    return findings

@@ -1,0 +1,303 @@
+"""What all formats of named arrays share: from the arrays of an open file to the columns wanted."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import InercalError, RecordError
+from inercal.records.channels import Channel
+from inercal.records.checks import missing
+from inercal.records.findings import Finding
+from inercal.records.read.canonical import canonical
+from inercal.records.read.table import FileOptions, Sample, Table
+from inercal.records.record import Array
+from inercal.units import parse_unit
+
+_LISTED = 20
+
+
+@dataclass(frozen=True)
+class NamedArray:
+    """An array (rows, columns) of an open file; ``load`` reads one of its columns (rows,).
+
+    A column holds numbers, dates or durations (NumPy's, taken as seconds), or, if ``text``, strings.
+    ``unit`` is the one the file states; ``clock`` names the array of the file that holds the time stamps of
+    the rows, where the file says so.
+    """
+
+    rows: int
+    columns: int
+    load: Callable[[int], NDArray[Any]]
+    text: bool = False
+    unit: str | None = None
+    clock: str | None = None
+
+
+def held(values: NDArray[Any], unit: str | None = None, clock: str | None = None) -> NamedArray:
+    """An array (n,) or (n, k) that is in memory."""
+    columns = 1 if values.ndim == 1 else values.shape[1]
+    return NamedArray(len(values), columns, partial(_of, values), values.dtype.kind in "SU", unit, clock)
+
+
+def _of(values: NDArray[Any], column: int) -> NDArray[Any]:
+    """A column of an array; all of it where that has only one dimension."""
+    return values if values.ndim == 1 else values[:, column]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The arrays of a file by name, in order; ``tabular`` if they are the columns of one table.
+
+    ``described`` says what the file holds, where that is not the list of its arrays.
+    """
+
+    arrays: Mapping[str, NamedArray]
+    findings: tuple[Finding, ...] = ()
+    tabular: bool = False
+    described: str = ""
+
+    @property
+    def words(self) -> str:
+        """What the file holds, in words."""
+        if self.described:
+            return self.described
+        if self.tabular:
+            names = list(self.arrays)
+        else:
+            numbers = ((name, array) for name, array in self.arrays.items() if not array.text)
+            names = [f"{name} ({array.rows} x {array.columns})" for name, array in numbers]
+        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        return f"the {'columns' if self.tabular else 'arrays'} {', '.join(names[:_LISTED])}{more}"
+
+
+@dataclass(frozen=True)
+class ArrayFormat:
+    """A format whose files hold named arrays: ``opened`` lends those of a file while it is open.
+
+    ``name`` says what a file of it is, for the error about a damaged one: ``a MAT file``. Whatever a library
+    trips over in such a file becomes a `RecordError`.
+    """
+
+    name: str
+    opened: Callable[[Path], AbstractContextManager[Contents]]
+
+    def read(
+        self,
+        path: Path,
+        options: FileOptions,
+        channels: tuple[Channel, ...] | None,
+        progress: Callable[[int], None],
+    ) -> list[Table]:
+        """Read the wanted columns, or those that canonical names and units tell."""
+        with self._lent(path) as contents:
+            wanted = self_named(contents, path) if channels is None else channels
+            found = tables(contents, options, wanted, path, mapped=channels is not None)
+        progress(path.stat().st_size)
+        return found
+
+    def header(self, path: Path) -> tuple[Channel, ...]:
+        """The channels that canonical names and units tell; raises `InputError` where there are none."""
+        with self._lent(path) as contents:
+            return self_named(contents, path)
+
+    def peek(self, path: Path) -> list[Sample]:
+        """Look at the arrays of a file."""
+        with self._lent(path) as contents:
+            return samples(contents)
+
+    @contextmanager
+    def _lent(self, path: Path) -> Iterator[Contents]:
+        """The contents of a file while it is open; errors as `RecordError`."""
+        with guarded(path, self.name), self.opened(path) as contents:
+            if all(array.text for array in contents.arrays.values()):
+                raise RecordError(path, "holds no two-dimensional array of numbers, expected one at least")
+            yield contents
+
+
+@contextmanager
+def guarded(path: Path, name: str) -> Iterator[None]:
+    """Whatever a library trips over in a damaged file, as `RecordError`: it is not ``name``, such as a bag."""
+    if path.is_file():
+        path.open("rb").close()  # what the system has against it is said in its own words
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            yield
+    except InercalError:
+        raise
+    except Exception as error:
+        raise RecordError(path, f"cannot be read as {name} ({reason(error)})") from error
+
+
+def reason(error: Exception) -> str:
+    """What an error of a library says, on one line."""
+    return " ".join(str(error).split())[:200] or type(error).__name__
+
+
+def self_named(contents: Contents, path: Path) -> tuple[Channel, ...]:
+    """The channels whose arrays have canonical names and units; raises `InputError` where there are none."""
+    arrays = {name: array for name, array in contents.arrays.items() if array.columns == 1}
+    titles = {name: re.sub(r"^[^\[]*/", "", name) for name in arrays}
+    if "t" not in (re.sub(r"\s*\[.*", "", title) for title in titles.values()):
+        titles = {name: re.sub(r"^time(?!\w)", "t", title) for name, title in titles.items()}
+    return canonical(((name, titles[name], arrays[name].unit) for name in arrays), path)
+
+
+def tables(
+    contents: Contents, options: FileOptions, channels: tuple[Channel, ...], path: Path, mapped: bool
+) -> list[Table]:
+    """Those of the channels that the file holds, in a table for each clock.
+
+    A wanted column t is the clock of all arrays with as many rows, of those that state a clock only if it
+    was ``mapped`` by hand. Raises `RecordError` where columns of one clock have different lengths.
+    """
+    found = {channel: place for channel in channels if (place := _place(channel, contents, options, path))}
+    groups: dict[str | None, dict[Channel, tuple[str, int]]] = {}
+    for channel, clock in _clocks(found, contents.arrays, mapped).items():
+        groups.setdefault(clock, {})[channel] = found[channel]
+    if not groups:
+        return [Table((), {}, contents.words, 0, (), contents.findings)]
+    parts = [_table(contents, group, clock, path) for clock, group in groups.items()]
+    if all(np.isnan(column).all() for part in parts for column in part.values.values()):
+        raise RecordError(path, "no row of numbers in the mapped columns, expected numbers")
+    return parts
+
+
+def samples(contents: Contents) -> list[Sample]:
+    """A first look at the arrays: single columns by length, with their names, and each table."""
+    arrays = {name: array for name, array in contents.arrays.items() if array.rows > 1}
+    found = []
+    for rows in dict.fromkeys(array.rows for array in arrays.values()):
+        single = {name: each for name, each in arrays.items() if each.columns == 1 and each.rows == rows}
+        if single:
+            values = np.column_stack(
+                [np.full(rows, np.nan) if each.text else _numbers(each.load(0)) for each in single.values()]
+            )
+            units = tuple(each.unit for each in single.values())
+            found.append(Sample(values, tuple(single), FileOptions(), units=units))
+    for name, array in arrays.items():
+        if array.columns > 1 and not array.text:
+            values = np.column_stack([_numbers(array.load(column)) for column in range(array.columns)])
+            found.append(Sample(values, (), FileOptions(), name))
+    return found
+
+
+def _clocks(
+    found: Mapping[Channel, tuple[str, int]], arrays: Mapping[str, NamedArray], mapped: bool
+) -> dict[Channel, str | None]:
+    """Name of the clock of each channel; None for the column t, and for what goes with it."""
+    t = next((name for channel, (name, _) in found.items() if channel.name == "t"), None)
+    clocks: dict[Channel, str | None] = {}
+    homeless = []
+    for channel, (name, _) in found.items():
+        array = arrays[name]
+        alike = t is not None and array.rows == arrays[t].rows and (mapped or array.clock is None)
+        clocks[channel] = None if alike or t in (name, array.clock) else array.clock
+        if not alike and array.clock is None:
+            homeless.append(channel)
+    stated = {clock: arrays[clock].rows for clock in clocks.values() if clock is not None}
+    for channel in homeless:
+        rows = arrays[found[channel][0]].rows
+        clocks[channel] = next((clock for clock, length in stated.items() if length == rows), None)
+    return clocks
+
+
+def _table(
+    contents: Contents, places: Mapping[Channel, tuple[str, int]], clock: str | None, path: Path
+) -> Table:
+    """The columns of one clock."""
+    values: dict[str, Array] = {}
+    labels: tuple[str, ...] = ()
+    rows: dict[str, int] = {}
+    for channel, (name, column) in places.items():
+        array = contents.arrays[name]
+        loaded = array.load(column)
+        rows[channel.name] = len(loaded)
+        if channel.name == "label":
+            labels = _texts(loaded)
+            continue
+        if array.text:
+            raise RecordError(path, f"{name} holds text, expected numbers for {channel.name}")
+        if loaded.dtype.kind in "Mm" and channel.unit.symbol != "s":
+            raise RecordError(path, f'{name} holds dates, which are read in seconds, expected unit = "s"')
+        values[channel.name] = _numbers(loaded)
+    if len(set(rows.values())) > 1:
+        counts = ", ".join(f"{count} rows of {name}" for name, count in rows.items())
+        raise RecordError(
+            path, f"found {counts}, expected as many of each, or a [file.NAME] for each clock of this file"
+        )
+    stamps = None
+    if clock is not None:
+        array = contents.arrays[clock]
+        stamps = _numbers(array.load(0)) * parse_unit(array.unit or "s", f"{path}: {clock}").factor
+    return Table(
+        tuple(places), values, contents.words, max(rows.values()), labels,
+        (*contents.findings, *missing(values)), stamps,
+    )  # fmt: skip
+
+
+def _place(channel: Channel, contents: Contents, options: FileOptions, path: Path) -> tuple[str, int] | None:
+    """Name of the array, and the column in it, that a channel comes from; None if this file has none such."""
+    match channel.origin:
+        case int(number) if contents.tabular:
+            name, column = dict(enumerate(contents.arrays)).get(number), 0
+        case int(number):
+            name, column = _single(contents, options, path), number
+        case str(title):
+            name, column = _named(title, contents, path), 0
+            if name is not None and (columns := contents.arrays[name].columns) > 1:
+                raise RecordError(path, f'{name} has {columns} columns, expected ["{name}", column]')
+        case (title, number):
+            name, column = _named(title, contents, path), number
+    return None if name is None or column >= contents.arrays[name].columns else (name, column)
+
+
+def _named(title: str, contents: Contents, path: Path) -> str | None:
+    """The array of that name; the end of its path will do, and the unit in brackets may be left out."""
+    if title in contents.arrays:
+        return title
+    plain = {name: name.partition(" [")[0].strip("/") for name in contents.arrays}
+    names = [name for name, bare in plain.items() if bare == title.strip("/")]
+    names = names or [name for name, bare in plain.items() if bare.rpartition("/")[2] == title]
+    if len(names) > 1:
+        raise RecordError(path, f"found {title} in {' and '.join(names[:3])}, expected the whole path")
+    return names[0] if names else None
+
+
+def _single(contents: Contents, options: FileOptions, path: Path) -> str | None:
+    """Name of the array a plain column number refers to."""
+    if options.variable is not None:
+        return _named(options.variable, contents, path)
+    several = [name for name, array in contents.arrays.items() if array.rows > 1 and array.columns > 1]
+    if len(several) != 1:
+        raise RecordError(path, f"holds {contents.words}, expected `variable` under [file] to name one")
+    return several[0]
+
+
+def _numbers(column: NDArray[Any]) -> Array:
+    """As float64, dates as seconds since 1970; NaN where infinite. Integers beyond 2^53 lose their last digits."""
+    if column.dtype.kind in "Mm":
+        known = ~np.isnat(column)
+        kind = "datetime64[ns]" if column.dtype.kind == "M" else "timedelta64[ns]"
+        whole, rest = np.divmod(column.astype(kind).astype(np.int64), 10**9)
+        return np.where(known, whole + 1e-9 * rest, np.nan)
+    numbers = np.ascontiguousarray(column, dtype=np.float64)
+    return np.where(np.isfinite(numbers), numbers, np.nan)
+
+
+def _texts(column: NDArray[Any]) -> tuple[str, ...]:
+    """As text: bytes decoded, whole numbers without a point, nothing for what is missing."""
+    if column.dtype.kind in "biuf":
+        return tuple(f"{value:.15g}" if value == value else "" for value in column.tolist())
+    texts = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in column)
+    return tuple("" if text is None else str(text).strip() for text in texts)

@@ -1,0 +1,58 @@
+"""Columns that say themselves what they hold: ``acc_x [m/s^2]``, or a name with a unit beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from inercal.errors import RecordError
+from inercal.records.channels import Channel, Origin, is_channel, misfit, needs_unit
+from inercal.units import parse_unit, shown
+
+EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
+
+
+_TITLE = re.compile(r"(\w+)\s*(?:\[(.*)\])?")
+
+
+def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -> tuple[Channel, ...]:
+    """The channels among titled columns; columns of other names are none of ours.
+
+    Parameters
+    ----------
+    titles : iterable of (origin, title, unit)
+        Where a column is found, what it is called, and the unit stated beside it, if any; one in brackets
+        within the title wins.
+    where : object
+        Named in the errors.
+
+    Raises
+    ------
+    RecordError
+        A channel twice, without a unit, or with one that it cannot have; or no channel at all.
+    QuantityError
+        Something else than a unit.
+    """
+    channels: dict[str, Channel] = {}
+    found = []
+    for origin, title, stated in titles:
+        found.append(title)
+        match = _TITLE.fullmatch(title)
+        if match is None or not is_channel(name := match[1]):
+            continue
+        unit_text = stated if match[2] is None else match[2]
+        if name in channels:
+            raise RecordError(where, f"found {name} twice, expected each column once")
+        if unit_text is None and needs_unit(name):
+            raise RecordError(
+                where,
+                f"found {shown(title)} without a unit, expected it in brackets or a map, as in {EXAMPLE}",
+            )
+        unit = parse_unit(unit_text or "1", f"{where}: {name}")
+        if problem := misfit(name, unit):
+            raise RecordError(where, f"{name}: {problem}")
+        channels[name] = Channel(name, origin, unit)
+    if not channels.keys() - {"label"}:
+        names = ", ".join(found)[:100]
+        raise RecordError(where, f"found the columns {names}, expected known ones as in {EXAMPLE}, or a map")
+    return tuple(channels.values())

@@ -1,0 +1,94 @@
+"""NPZ archives, the shipped table test among them."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inercal.errors import MapError, RecordError
+from inercal.records.guess import guess_map
+from inercal.records.read import read
+
+EXAMPLES = Path(str(files("inercal"))) / "examples"
+T = np.arange(50) / 100
+ACC = np.array([0.1, -0.2, 9.8]) + 0.01 * np.random.default_rng(22).standard_normal((50, 3))
+
+
+def mapped(path, text):
+    path.write_text(text)
+    return path
+
+
+def test_keys_are_canonical_titles(tmp_path):
+    path = tmp_path / "run.npz"
+    columns = {f"acc_{axis} [m/s^2]": column for axis, column in zip("xyz", ACC.T, strict=True)}
+    np.savez_compressed(path, **{"t [ms]": 1e3 * T}, **columns, gain=2.0, label=np.array(["up"] * 50))
+    record = read(path)
+    np.testing.assert_array_equal(record.triad("acc").values, ACC)
+    np.testing.assert_allclose(record["acc_x"].t, T)
+    assert record.labels == ("up",) * 50
+    text = '[columns.t]\nfrom = "t"\nunit = "ms"\n[columns.acc_y]\nfrom = "acc_y"\nunit = "g"\n'
+    np.testing.assert_array_equal(read(path, mapped(tmp_path / "m.toml", text))["acc_y"].values, ACC[:, 1])
+
+
+def test_dates_are_seconds(tmp_path):
+    stamps = np.datetime64("2024-05-06T07:08:09.5", "us") + (1e6 * T).astype("timedelta64[us]")
+    stamps[3] = np.datetime64("NaT")
+    path = tmp_path / "run.npz"
+    np.savez(path, when=stamps, data=np.array(list(zip(stamps, ACC[:, 2], strict=True)), "M8[us],f4"))
+    text = '[columns.t]\nfrom = "{}"\nunit = "s"\n[columns.acc_z]\nfrom = "data/f1"\nunit = "m/s^2"\n'
+    for name in ("when", "data/f0"):
+        t = read(path, mapped(tmp_path / "m.toml", text.format(name)))["acc_z"].t
+        np.testing.assert_allclose(np.delete(t, 3), np.delete(1714979289.5 + T, 3), atol=3e-7, rtol=0)
+        assert np.isnan(t[3])
+    with pytest.raises(RecordError, match='when holds dates, which are read in seconds, expected unit = "s"'):
+        read(path, mapped(tmp_path / "m.toml", text.replace('"s"', '"ms"').format("when")))
+
+
+def test_only_wanted_arrays_are_read_and_no_objects(tmp_path):
+    """An array of objects, which could run any code on loading, is as if it were not there."""
+    path = tmp_path / "run.npz"
+    np.savez(path, acc=ACC, t=T, evil=np.array([{"a": 1}, None], dtype=object))
+    text = '[columns.acc_x]\nfrom = ["acc", 0]\nunit = "g"\n[columns.t]\nfrom = "t"\nunit = "s"\n'
+    np.testing.assert_array_equal(read(path, mapped(tmp_path / "m.toml", text))["acc_x"].values, ACC[:, 0])
+    evil = mapped(tmp_path / "m.toml", text.replace('["acc", 0]', '"evil"'))
+    with pytest.raises(MapError, match=r"found no 'evil' in .*\(the arrays acc \(50 x 3\), t \(50 x 1\)\)"):
+        read(path, evil)
+
+
+def test_the_table_test_names_itself():
+    """26530 samples at 100 Hz on a two-axis table: gravity at any angle, and rates when it turns."""
+    record = read(EXAMPLES / "table.npz")
+    assert list(record.columns)[-2:] == ["phi1", "phi2"]
+    assert len(record["acc_x"].values) == 26530
+    assert record.triad("acc").rate == pytest.approx(100.0)
+    assert np.median(np.linalg.norm(record.triad("acc").values, axis=1)) == pytest.approx(9.815, rel=0.02)
+    turned = np.diff(record["phi2"].si())
+    assert np.abs(turned).max() * 100 == pytest.approx(np.abs(record.triad("gyro").values).max(), rel=0.05)
+
+
+def test_arrays_without_units_need_a_map(tmp_path):
+    path = tmp_path / "run.npz"
+    np.savez(path, t=T, accel=ACC.astype("f4"), slow=ACC[::10], label=np.array([b"up", b"down"] * 25))
+    with pytest.raises(RecordError, match="found 't' without a unit"):
+        read(path)
+    record_map = mapped(tmp_path / "m.toml", guess_map(path))
+    assert 'from = ["accel", 0]' in record_map.read_text()
+    record = read(path, record_map)
+    np.testing.assert_array_equal(record.triad("acc").values, ACC.astype("f4"))
+    assert record.labels == ("up", "down") * 25
+    record_map.write_text(record_map.read_text().replace('"accel"', '"slow"'))
+    with pytest.raises(RecordError, match=r"found 50 rows of t, .*5 rows of acc_x"):
+        read(path, record_map)
+
+
+def test_damaged_archives_end_in_one_sentence(tmp_path):
+    path = tmp_path / "run.npz"
+    np.savez(path, **{"t [s]": T, "acc_x [g]": ACC[:, 0]})
+    whole = path.read_bytes()
+    for content in (b"", whole[:40], whole[:-30], whole[:90] + bytes(40) + whole[130:]):
+        path.write_bytes(content)
+        with pytest.raises(RecordError, match="cannot be read as an NPZ file") as caught:
+            read(path)
+        assert "\n" not in str(caught.value)

@@ -1,0 +1,97 @@
+"""Parquet tables as pyarrow writes them."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+from inercal.errors import MissingExtraError, RecordError
+from inercal.records.guess import guess_map
+from inercal.records.read import canonical_units, read
+
+T = np.arange(40) / 50
+ACC = np.array([0.1, -0.2, 9.8]) + 0.01 * np.random.default_rng(23).standard_normal((40, 3))
+AXES = [f"acc_{axis}" for axis in "xyz"]
+
+
+def written(path, columns, units=None):
+    """A table of (name, array) pairs, with units in the metadata of the fields."""
+    arrays = [array if isinstance(array, pa.Array) else pa.array(array) for array in columns.values()]
+    fields = [
+        pa.field(name, array.type, metadata={"units": units[name]} if units and name in units else None)
+        for name, array in zip(columns, arrays, strict=True)
+    ]
+    parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path, row_group_size=15)
+    return path
+
+
+def mapped(path, text):
+    path.write_text(text)
+    return path
+
+
+def test_units_stand_in_the_titles_or_beside_them(tmp_path):
+    acc = dict(zip(AXES, ACC.T, strict=True))
+    beside = written(tmp_path / "a.parquet", {"t": T, **acc}, {"t": "s", **dict.fromkeys(AXES, "m/s^2")})
+    titled = {f"{name} [m/s^2]": column for name, column in acc.items()}
+    within = written(tmp_path / "b.parquet", {"time [ms]": 1e3 * T, **titled, "label": ["up"] * 40})
+    for path in (beside, within):
+        record = read(path)
+        np.testing.assert_array_equal(record.triad("acc").values, ACC)
+        np.testing.assert_allclose(record["acc_y"].t, T)
+        assert canonical_units([path])["acc_x"].symbol == "m/s^2"
+    assert record.labels == ("up",) * 40
+    with pytest.raises(RecordError, match="found 't' without a unit"):
+        read(written(tmp_path / "c.parquet", {"t": T, **acc}))
+
+
+def test_columns_go_by_number_or_name_and_may_be_of_many_types(tmp_path):
+    stamps = pa.array(10**9 * 1_700_000_000 + 20_000_000 * np.arange(40), pa.timestamp("ns", "UTC"))
+    imu = pa.StructArray.from_arrays([pa.array(ACC[:, 0]), pa.array(np.arange(40, dtype="i2"))], ["x", "y"])
+    part = pa.array(["up"] * 20 + ["down"] * 20).dictionary_encode()
+    gaps = pa.array([None, *range(1, 40)], pa.int32())
+    path = written(
+        tmp_path / "a.parquet", {"when": stamps, "imu": imu, "part": part, "n": gaps, "ok": [True] * 40}
+    )
+    text = (
+        '[columns.t]\nfrom = 0\nunit = "s"\n[columns.acc_x]\nfrom = "imu.x"\nunit = "g"\n'
+        '[columns.acc_y]\nfrom = 2\nunit = "count"\n[columns.acc_z]\nfrom = "n"\nunit = "count"\n'
+        '[columns.label]\nfrom = "part"\n[columns.trigger]\nfrom = "ok"\n'
+    )
+    record = read(path, mapped(tmp_path / "m.toml", text))
+    np.testing.assert_allclose(record["acc_x"].t, 1.7e9 + T, atol=3e-7, rtol=0)
+    np.testing.assert_array_equal(record["acc_x"].values, ACC[:, 0])
+    np.testing.assert_array_equal(record["acc_y"].values, np.arange(40))
+    np.testing.assert_array_equal(record["acc_z"].values, [np.nan, *range(1, 40)])
+    np.testing.assert_array_equal(record["trigger"].values, np.ones(40))
+    assert record.labels == ("up",) * 20 + ("down",) * 20
+    assert [finding.message for finding in record.findings if finding.code == "nan"] == [
+        "acc_z: 1 missing value"
+    ]
+
+
+def test_a_guess_reads_the_table(tmp_path):
+    path = written(
+        tmp_path / "a.parquet", {"ts_us": 1e6 * T, "ax": ACC[:, 0], "ay": ACC[:, 1], "az": ACC[:, 2]}
+    )
+    record_map = mapped(
+        tmp_path / "m.toml", guess_map(path).replace("PUT THE SAMPLE RATE HERE, such as 100 Hz", "50 Hz")
+    )
+    record = read(path, record_map)
+    np.testing.assert_array_equal(record.triad("acc").values, ACC)
+    assert record["acc_x"].unit.symbol == "m/s^2"
+
+
+def test_what_cannot_be_read_is_said(tmp_path, monkeypatch):
+    path = written(tmp_path / "a.parquet", {"t [s]": T, "acc_x [g]": ACC[:, 0]})
+    whole = path.read_bytes()
+    for content in (b"", whole[:-20], whole[:100], b"PAR1" + bytes(50) + b"PAR1"):
+        path.write_bytes(content)
+        with pytest.raises(RecordError, match="cannot be read as a Parquet file") as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(
+        MissingExtraError, match=r"Reading Parquet files needs .*pip install 'inercal\[files\]'"
+    ):
+        read(path)
