@@ -21,7 +21,7 @@ import numpy as np
 import plain_tedaldi
 
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.imu.task import calibrate
+from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.study.load import load_imu_study
@@ -45,7 +45,7 @@ def row(name: str, seconds: list[float], beside: float) -> str:
 def passes(calibration) -> dict:
     """One pass over all turns: in NumPy, with derivatives, and a compiled integration of as many intervals."""
     from inercal.geometry import kernels
-    from inercal.imu.task import _turns
+    from inercal.imu.multiposition import _turns
     from inercal.imu.turns import carried, carried_with_derivatives
 
     turns, _ = _turns(calibration.recording, calibration.poses, False)

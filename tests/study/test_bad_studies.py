@@ -49,8 +49,18 @@ def load(tmp_path):
         ('[[site]]\ngravity = "9.8 m/s^2"', "site: found [{'gravity': '9.8 m/s^2'}], expected a table"),
         ("site = 9.8", "site: found 9.8, expected a table"),
         (SITE + 'latitud = "1 deg"', "site.latitud: unknown key, did you mean latitude?"),
-        (IMU + 'method = "ferraris"', "found 'ferraris', which this version of inercal does not have yet"),
-        (IMU + 'method = "aided"', "imu.method: found 'aided', which this version"),
+        (
+            IMU + 'method = "ferraris"\nstatic_start = "50 s"',
+            "static_start: found with method = 'ferraris', expected it with multiposition only",
+        ),
+        (
+            IMU + "ferraris = { turn = '90 deg' }",
+            "ferraris: found with method = 'multiposition', expected it with ferraris only",
+        ),
+        (
+            IMU + 'method = "aided"\nbias_drift = true',
+            "bias_drift: found with method = 'aided', expected it with multiposition only",
+        ),
         (IMU + 'method = "six"', "imu.method: found 'six', expected 'multiposition'"),
         (IMU + 'static_start = "0 s"', "imu.static_start: found '0 s', expected a time above zero"),
         (IMU + 'static_start = "-1 h"', "found '-1 h', that is -3600 s, expected a time above zero"),

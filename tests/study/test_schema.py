@@ -50,7 +50,7 @@ def test_every_table_and_key_has_title_and_description():
         changed("site", "gravty", "9.8 m/s^2"),
         changed("site", "gravity", 9.8),
         changed("site", "gravity", "9.8"),
-        changed("imu", "method", "ferraris"),
+        changed("imu", "method", "by hand"),
         changed("imu", "g_sensitivity", "yes"),
         changed("traceability", "operator", 5),
         {**GOOD, "schema": 2},

@@ -54,15 +54,41 @@ def test_unedited_its_gravity_is_that_of_anywhere_on_earth(tmp_path):
     assert u < 0.03
 
 
-def test_every_key_is_there_and_loads_when_uncommented(tmp_path):
-    text = uncommented(imu_template())
+def of_method(method: str) -> str:
+    """The template for a method, with everything taken from its comment that is for it."""
+    kept = []
+    others = {"ferraris", "aided"} - {method}
+    skipped = False
+    for line in imu_template().splitlines():
+        if found := re.match(r"# \[imu\.(\w+)", line):
+            skipped = found[1] in others
+        elif line.startswith("[") or (line.startswith("# [") and not found):
+            skipped = False
+        if not skipped:
+            kept.append(re.sub(r"^# (\w+ = |\[)", r"\1", line))
+    text = "\n".join(kept).replace('method = "multiposition"', f'method = "{method}"')
+    unheeded = {"ferraris": "static_start|g_sensitivity|bias_drift", "aided": "static_start|bias_drift"}.get(method)
+    return re.sub(f"(?m)^({unheeded}) = .*$", "", text) if unheeded else text
+
+
+@pytest.mark.parametrize("method", ["multiposition", "ferraris", "aided"])
+def test_every_key_is_there_and_loads_when_uncommented(tmp_path, method):
+    text = of_method(method)
     study = load(tmp_path, text)
-    assert study.static_start == 50.0
     whole = tomllib.loads(text)
+    Draft202012Validator(json_schema()).validate(whole)
     assert list(whole) == list(SCHEMA["$defs"]["ImuStudyFile"]["properties"])
     for name, given in whole.items():
-        if name != "schema":
+        if name not in ("schema", "imu"):
             assert list(given) == list(SCHEMA["$defs"][f"{name.title()}Table"]["properties"])
+    if method == "multiposition":
+        assert study.static_start == 50.0
+        keys = list(SCHEMA["$defs"]["ImuTable"]["properties"])
+        assert list(whole["imu"]) == [key for key in keys if key not in ("ferraris", "aided")]
+    else:
+        table = "FerrarisTable" if method == "ferraris" else "AidedTable"
+        assert set(whole["imu"][method]) == set(SCHEMA["$defs"][table]["properties"])
+        assert type(study.method).__name__ == f"{method.title()}Settings"
 
 
 @pytest.mark.parametrize("template", [imu_template, turntable_template])

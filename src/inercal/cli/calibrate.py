@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -14,9 +14,11 @@ from inercal.cli.options import (
     MapFile,
     Overrides,
     ReportOutput,
+    RunFiles,
     StudyFile,
     of_study,
     read_record,
+    read_repeats,
     working,
 )
 from inercal.cli.outcome import hand_over
@@ -24,6 +26,7 @@ from inercal.cli.outcome import hand_over
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.records.record import Record
+    from inercal.report.html import Picture
 
 
 class Calibrated(Protocol):
@@ -47,7 +50,7 @@ C = TypeVar("C", bound=Calibrated)
 
 
 def calibrate_imu(
-    files: Files,
+    files: RunFiles,
     /,
     *,
     study: StudyFile,
@@ -55,21 +58,55 @@ def calibrate_imu(
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
-    """Calibrate an IMU that was held still in many poses by hand."""
+    """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
+    from inercal.estimate.repeat import combine_runs
     from inercal.imu.task import calibrate
     from inercal.study.load import load_imu_study
 
-    found, estimate = _solve(
-        files, study, map_file, output, lambda: load_imu_study(study, overrides or ()), calibrate
+    solved = _solve(
+        files,
+        study,
+        map_file,
+        output,
+        lambda: load_imu_study(study, overrides or ()),
+        read_repeats,
+        calibrate,
     )
+    runs = [estimate for _, estimate in solved]
+    estimate = runs[0] if len(runs) == 1 else combine_runs(runs)
+    estimate = replace(estimate, timing={**runs[-1].timing, "solve": estimate.timing["solve"]})
 
     def page() -> str:
-        from inercal.imu.figures import pictures
+        from inercal.report.figures import repeats
         from inercal.report.html import render
 
-        return render(estimate, pictures(found), "Calibration of an inertial measurement unit")
+        drawn = _imu_pictures(solved[0][0]) if len(runs) == 1 else repeats(estimate)
+        return render(estimate, drawn, "Calibration of an inertial measurement unit")
 
     return hand_over(estimate, estimate, page, output, estimate.status.advice)
+
+
+def _imu_pictures(found: Calibrated) -> list[Picture]:
+    """The pictures of whichever method was used."""
+    from inercal.imu.aided.calibration import AidedCalibration
+    from inercal.imu.ferraris.calibration import FerrarisCalibration
+    from inercal.imu.multiposition import Calibration
+
+    match found:
+        case FerrarisCalibration():
+            from inercal.imu.ferraris.figures import pictures as of_ferraris
+
+            return of_ferraris(found)
+        case AidedCalibration():
+            from inercal.imu.aided.figures import pictures as of_aided
+
+            return of_aided(found)
+        case Calibration():
+            from inercal.imu.figures import pictures
+
+            return pictures(found)
+        case _:
+            return []
 
 
 def calibrate_turntable(
@@ -86,8 +123,14 @@ def calibrate_turntable(
     from inercal.turntable.display import tolerances
     from inercal.turntable.task import Calibration, calibrate
 
-    found, estimate = _solve(
-        files, study, map_file, output, lambda: load_turntable_study(study, overrides or ()), calibrate
+    ((found, estimate),) = _solve(
+        files,
+        study,
+        map_file,
+        output,
+        lambda: load_turntable_study(study, overrides or ()),
+        lambda *one: [read_record(*one)],
+        calibrate,
     )
     shown = replace(found, estimate=estimate).shown
 
@@ -107,9 +150,10 @@ def _solve(
     map_file: Path | None,
     output: ReportOutput,
     settings: Callable[[], S],
+    read: Callable[[Sequence[Path], Path | None, ReportOutput], list[Record]],
     calibrate: Callable[[Record, S, Callable[[str], None]], C],
-) -> tuple[C, Estimate]:
-    """Read study and record and calibrate; the estimate comes with its times and inputs."""
+) -> list[tuple[C, Estimate]]:
+    """Read study and records and calibrate with each; the estimates come with their times and inputs."""
     from inercal.records.read import source_of
     from inercal.study.load import files_of
 
@@ -118,10 +162,15 @@ def _solve(
     studied = files_of(study, told.given)
     output.spare(studied)
     clock = time.perf_counter()
-    record = read_record(files, map_file, output)
+    records = read(files, map_file, output)
     read_s = time.perf_counter() - clock
+    solved = []
     with of_study(study), working(output) as progress:
-        found = calibrate(record, told, progress)
-    estimate = found.estimate
-    timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
-    return found, replace(estimate, timing=timing, inputs=(*estimate.inputs, *map(source_of, studied)))
+        for number, record in enumerate(records, start=1):
+            of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
+            found = calibrate(record, told, lambda text, of_run=of_run: progress(of_run + text))  # type: ignore[misc]
+            estimate = found.estimate
+            timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
+            inputs = (*estimate.inputs, *map(source_of, studied))
+            solved.append((found, replace(estimate, timing=timing, inputs=inputs)))
+    return solved

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 Files = Annotated[
     list[Path], Parameter(help="Recordings; several files with distinct channels are one record.")
 ]
+RunFiles = Annotated[
+    list[Path],
+    Parameter(
+        help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
+    ),
+]
 MapFile = Annotated[
     Path | None, Parameter(name="--map", help="Column map (TOML) for files without canonical headers.")
 ]
@@ -151,6 +157,18 @@ def read_record(files: Sequence[Path], map_file: Path | None, output: FileOutput
         record = read(files, record_map, progress)
     output.spare(source.path for source in record.sources)  # a map may have named others
     return record
+
+
+def read_repeats(files: Sequence[Path], map_file: Path | None, output: FileOutput) -> list[Record]:
+    """As `read_record`, but files with the same channels are the records of repeat runs."""
+    from inercal.records.maps import read_map
+    from inercal.records.read import read_runs
+
+    record_map = None if map_file is None else read_map(map_file)
+    with reading(output) as progress:
+        records = read_runs(files, record_map, progress)
+    output.spare(source.path for record in records for source in record.sources)
+    return records
 
 
 @contextmanager

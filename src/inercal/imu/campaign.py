@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site
+from inercal.imu.multiposition import calibrate_multiposition
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
-from inercal.imu.task import calibrate
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def _one(rng: np.random.Generator, g_sensitivity: float) -> dict[str, Array]:
     record, truth = simulate(truth, hand_poses(rng, 24), gravity, LATITUDE, rng, rate=50.0, clock=clock)
     site = Site(GRAVITY, (GravityInput("gravity", GRAVITY_U, "m/s^2", 1.0),), LATITUDE)
     settings = ImuSettings(site, g_sensitivity=g_sensitivity > 0.0, time_base_u=TIME_BASE_U)
-    estimate = calibrate(record, settings).estimate
+    estimate = calibrate_multiposition(record, settings).estimate
     true = truth.values()
     return {
         "error": estimate.values - np.array([true[name] for name in estimate.names]),

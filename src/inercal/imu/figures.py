@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from inercal.imu.gyro import GyroFit
-    from inercal.imu.task import Calibration
+    from inercal.imu.multiposition import Calibration
 
 Array = NDArray[np.float64]
 

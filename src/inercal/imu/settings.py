@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from inercal.geometry.site import Site
+from inercal.imu.aided.settings import AidedSettings
+from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.units import Quantity
 
 
 @dataclass(frozen=True)
 class ImuSettings:
-    """Settings of a multi-position calibration, in SI.
+    """Settings of a calibration, in SI.
 
     Attributes
     ----------
@@ -28,6 +30,8 @@ class ImuSettings:
         Relative standard uncertainty of the record's clock.
     traceability : mapping
         ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
+    method : FerrarisSettings, AidedSettings or None
+        Options of the method; None: multi-position, un-aided.
     temperature : Quantity or None
         Temperature of the instrument.
     given : mapping
@@ -40,5 +44,6 @@ class ImuSettings:
     bias_drift: bool = False
     time_base_u: float = 0.0
     traceability: Mapping[str, str] = field(default_factory=dict)
+    method: FerrarisSettings | AidedSettings | None = None
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

@@ -178,3 +178,39 @@ def dots(
         page.legend(handles, labels, loc="outside upper center", ncols=3)
         drawn = svg(page)
     return Picture(title, caption, drawn)
+
+
+def repeats(estimate: Estimate) -> list[Picture]:
+    """The coefficients of each run of combined runs, and the budget of the combination."""
+    names = estimate.names
+    if "by_run" not in estimate.result:
+        return []
+    by_run = [estimate.result["by_run"][name] for name in names]
+    values, u = (np.array([row[key] for row in by_run]).T for key in ("values", "u"))
+    U = np.array([p.U for p in estimate.parameters.values()])
+    with figure(WIDTH, 0.9 + 0.17 * len(names)) as page:
+        axes = page.subplots()
+        axes.axvspan(-1.0, 1.0, color=COLOURS[0], alpha=0.15, lw=0)
+        axes.axvline(0.0, color=QUIET, lw=0.6)
+        for number in range(len(values)):
+            off = values[number] - estimate.values
+            places = np.arange(len(names)) + 0.5 * (number - 0.5 * (len(values) - 1)) / len(values)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                axes.errorbar(
+                    off / U, places, xerr=2.0 * u[number] / U, fmt="o", ms=3, lw=0.8, color=COLOURS[number % len(COLOURS)],
+                    label=f"run {number + 1}",
+                )  # fmt: skip
+        axes.set_ylim(len(names) - 0.4, -0.6)
+        axes.set_yticks(range(len(names)), names, fontsize=7)
+        axes.tick_params(axis="y", length=0)
+        axes.set_xlabel("difference from the combined value / its U")
+        axes.grid(axis="x")
+        page.legend(loc="outside upper center", ncols=6)
+        drawn = svg(page)
+    shown = Picture(
+        "The runs about their combined value",
+        "Each sound run with a bar of two standard uncertainties; band: expanded uncertainty of the combined value. "
+        "Bars that do not meet are changes from run to run, and widen the band.",
+        drawn,
+    )
+    return [shown, correlation(estimate), budget(estimate)]

@@ -1,34 +1,40 @@
-"""The study of ``inercal calibrate imu``: a multi-position calibration without a turntable."""
+"""The study of ``inercal calibrate imu``, by any of its methods."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BeforeValidator, Field, StrictBool
+from pydantic import Field, StrictBool, model_validator
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
+from inercal.imu.aided.settings import AidedSettings
+from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
 from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_of
 from inercal.study.fields import Duration, RelativeUncertainty, refusal
+from inercal.study.imu_aided import AidedTable, aided_settings
+from inercal.study.imu_ferraris import FerrarisTable, ferraris_settings
 
-
-def _available(method: object) -> object:
-    """Refuse the methods that are still to come in words of their own."""
-    if method in ("ferraris", "aided"):
-        raise refusal(
-            f"found {method!r}, which this version of inercal does not have yet, expected 'multiposition'"
-        )
-    return method
+#: keys that not all methods heed -> those that do
+_METHODS = {
+    "static_start": ("multiposition",),
+    "g_sensitivity": ("multiposition", "aided"),
+    "bias_drift": ("multiposition",),
+    "ferraris": ("ferraris",),
+    "aided": ("aided",),
+}
 
 
 class ImuTable(Strict):
     """How to calibrate the IMU."""
 
-    method: Annotated[Literal["multiposition"], BeforeValidator(_available)] = Field(
-        default="multiposition", description="multiposition: many poses held still by hand, no turntable"
+    method: Literal["multiposition", "ferraris", "aided"] = Field(
+        default="multiposition",
+        description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
+        "turns by a known angle; aided: on a table whose angles are in the record",
     )
     static_start: Duration | None = Field(
         default=None, description="length of the still period at the start; found automatically if absent"
@@ -42,6 +48,21 @@ class ImuTable(Strict):
     time_base: RelativeUncertainty | None = Field(
         default=None, description="relative standard uncertainty of the record's clock; 0 if absent"
     )
+    ferraris: FerrarisTable = Field(
+        default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
+    )
+    aided: AidedTable = Field(default=AidedTable(), title="Aided", description="options of the method aided")
+
+    @model_validator(mode="after")
+    def _of_the_method(self) -> ImuTable:
+        """Refuse what the method does not heed."""
+        for key in self.model_fields_set - {"method"}:
+            methods = _METHODS.get(key, ())
+            if methods and self.method not in methods:
+                raise refusal(
+                    f"{key}: found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
+                )
+        return self
 
 
 class ImuStudyFile(Strict):
@@ -74,6 +95,11 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         The first thing wrong: file, key, what was found, what was expected.
     """
     file = check(ImuStudyFile, data, path, StudyError)
+    method: FerrarisSettings | AidedSettings | None = None
+    if file.imu.method == "ferraris":
+        method = ferraris_settings(file.imu.ferraris)
+    elif file.imu.method == "aided":
+        method = aided_settings(file.imu.aided, path)
     return ImuSettings(
         site=site_of(file.site, path),
         static_start=None if file.imu.static_start is None else file.imu.static_start.value,
@@ -81,6 +107,7 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         bias_drift=file.imu.bias_drift,
         time_base_u=0.0 if file.imu.time_base is None else file.imu.time_base.value,
         traceability=file.traceability.model_dump(),
+        method=method,
         temperature=file.conditions.temperature,
         given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
     )

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model, model_validator
 from pydantic_core import core_schema
 
@@ -196,8 +198,8 @@ class RigTable(Strict):
     )
 
 
-def chain_of(table: RigTable, where: object) -> Chain:
-    """The chain of a table with the errors that are given for it.
+def chain_of(table: RigTable, where: object, mounting: NDArray[np.float64] | None = None) -> Chain:
+    """The chain of a table with the errors that are given for it, and an instrument ``mounting`` (3, 3) on it.
 
     Raises
     ------
@@ -233,7 +235,7 @@ def chain_of(table: RigTable, where: object) -> Chain:
         errors |= dict.fromkeys(unnamed, default)
     base = (table.base.azimuth, table.base.tilt_north, table.base.tilt_west)
     return turntable(
-        table.kind, None, errors, scopes, [0.0 if angle is None else angle.value for angle in base]
+        table.kind, None, errors, scopes, [0.0 if angle is None else angle.value for angle in base], mounting
     )
 
 

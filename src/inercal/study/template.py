@@ -29,11 +29,25 @@ height = "0(300) m"                 # above sea level [m]; replace it: this is m
 # gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
 
 [imu]                               # how to calibrate
-method = "multiposition"            # many poses held still by hand, no turntable
+method = "multiposition"            # many poses by hand; or "ferraris", six poses; or "aided", on a table
 # static_start = "50 s"             # length of the still period at the start [s]; found if absent
 # g_sensitivity = true              # also estimate how gyro drift depends on specific force [true, false]
 # bias_drift = true                 # also estimate how the gyro's bias drifts with time [true, false]
 # time_base = "20 ppm"              # relative standard uncertainty of the record's clock; 0 if absent
+
+# [imu.ferraris]                    # with method = "ferraris": each axis up and down, and a turn about each axis
+# turn = "360(0.5) deg"             # angle of the turns, right-handed [deg]; 360 deg if absent
+# alignment = "0.5 deg"             # uncertainty of each position's direction [deg]; from their scatter if absent
+
+# [imu.ferraris.sections]           # start and end, as times or samples; by labels or detected if absent
+# x_p = ["5.2 s", "12.4 s"]         # +x up; likewise x_a (-x up), y_p, y_a, z_p, z_a
+# x_rot = ["70 s", "76 s"]          # the turn about x, from rest to rest; likewise y_rot, z_rot
+
+# [imu.aided]                       # with method = "aided": the record has the table's angles phi1, phi2 (phi3)
+# mounting = ["+x", "+y", "+z"]     # axes of the table, at zero angles, along which x, y, z of the instrument point
+
+# [imu.aided.rig]                   # the table; its errors and base as in a study of a turntable
+# kind = "two_axis_turntable"       # outer axis y, inner z; or three_axis_turntable: z, y, x
 """
 
 _TURNTABLE = """

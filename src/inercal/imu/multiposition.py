@@ -1,0 +1,208 @@
+"""Un-aided multi-position calibration of an IMU: a recording and settings in, an estimate out."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import Estimate
+from inercal.imu.drivers import drivers_of
+from inercal.imu.earth_rate import earth_rate_at
+from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
+from inercal.imu.joint import Scatter, force_error, join
+from inercal.imu.outcome import assemble, without_fit
+from inercal.imu.poses import Poses, choose, sweep
+from inercal.imu.recording import Recording, prepare
+from inercal.imu.settings import ImuSettings
+from inercal.imu.turns import Turns, cut_turns
+from inercal.imu.verdict import (
+    EXCESS,
+    WORST_MISS,
+    axis_findings,
+    gyro_findings,
+    rms_miss,
+    scatter_findings,
+)
+from inercal.instruments.triad import TriadModel
+from inercal.records.checks.values import saturated
+from inercal.records.findings import Finding
+from inercal.records.places import counted
+from inercal.records.record import Record
+
+Array = NDArray[np.float64]
+
+WORST_START = 0.5
+"""Miss [rad] of the first guess beyond which no fit is tried: large misalignments leave 0.3."""
+
+LOST = 3.5
+"""Longest step of time in a turn, in sample intervals: two lost samples hardly matter to its integral."""
+
+FEWEST_TURNS = 7
+"""Turns without which the gyro is not fitted: two equations each, for twelve parameters."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """An ``estimate`` and, where the fit came that far, the evidence behind it for pictures and tests."""
+
+    estimate: Estimate
+    recording: Recording
+    poses: Poses | None = None
+    gyro: GyroFit | None = None
+
+
+def calibrate_multiposition(
+    record: Record, settings: ImuSettings, progress: Callable[[str], None] = lambda _: None
+) -> Calibration:
+    """Calibrate the accelerometers, and the gyro if the record has one.
+
+    Parameters
+    ----------
+    record : Record
+        ``acc_x..z`` and perhaps ``gyro_x..z``, in any unit, counts included.
+    settings : ImuSettings
+        Site and options.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    Calibration
+        Its estimate's status says whether the values can be used; nothing is raised for a poor fit.
+
+    Raises
+    ------
+    InputError
+        The record has no accelerometer triad, or does not start at rest.
+    """
+    import scipy.optimize  # noqa: F401  (loading it is not part of the computation)
+
+    clock = time.perf_counter()
+    progress("finding static poses")
+    recording = prepare(record, settings.static_start)
+    gravity = settings.site.gravity
+    candidates = list(sweep(recording, gravity))
+    if not candidates:
+        return Calibration(_timed(without_fit(record, recording, settings), clock), recording)
+    poses = choose(candidates)
+    scatter = _scatter(poses)
+    progress("fitting the gyro to the turns")
+    gyro, of_gyro = _calibrate_gyro(recording, poses, scatter, settings)
+    findings = [*scatter_findings(poses, scatter), *of_gyro]
+    joint = join(poses.accelerometer, gyro)
+    estimate = assemble(record, recording, poses, scatter, joint, settings, findings)
+    return Calibration(_timed(estimate, clock), recording, poses, gyro)
+
+
+def _timed(estimate: Estimate, clock: float) -> Estimate:
+    """The estimate with the time since ``clock`` as that of the solution."""
+    return replace(estimate, timing={"solve": time.perf_counter() - clock})
+
+
+def _scatter(poses: Poses) -> Scatter:
+    """Residual scatter, pooled with the noise at rest unless it clearly exceeds it (F test)."""
+    from scipy.special import fdtrc
+
+    fit, noise = poses.accelerometer.fit, float(np.mean(poses.noise_variance))
+    own = fit.chi2 / fit.dof
+    ratio = own / noise if noise > 0 else np.inf
+    if noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < EXCESS:
+        return Scatter(float(np.sqrt(own)), fit.dof, True, float(np.sqrt(ratio)))
+    return Scatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
+
+
+def _gyro_index(recording: Recording, sample: int) -> int:
+    """The gyro's sample at the time of a sample of the accelerometers."""
+    gyro, acc = recording.gyro, recording.accelerometer
+    assert gyro is not None
+    if gyro.t is acc.t:
+        return sample
+    return int(np.clip(np.searchsorted(gyro.t, acc.t[sample]), 0, len(gyro.t) - 1))
+
+
+def _gyro_means(recording: Recording, poses: Poses) -> Array:
+    """Mean gyro output (n, 3) in each pose; NaN where it has no numbers."""
+    assert recording.gyro is not None
+    spans = [(_gyro_index(recording, d.start), _gyro_index(recording, d.stop - 1) + 1) for d in poses.dwells]
+    parts = [recording.gyro.values[a:b] for a, b in spans]
+    parts = [part[np.isfinite(part).all(axis=1)] for part in parts]
+    return np.array([part.mean(axis=0) if len(part) else np.full(3, np.nan) for part in parts])
+
+
+def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | None, list[Finding]]:
+    """The turns between neighbouring poses that can be integrated, and what is said of the others."""
+    gyro = recording.gyro
+    assert gyro is not None
+    longest = LOST / gyro.rate
+    clipped = np.zeros(len(gyro.t), dtype=bool)
+    for values in gyro.values.T:
+        clipped[saturated(values)] = True
+    spans, left_out = [], []
+    for k, (here, there) in enumerate(itertools.pairwise(poses.dwells)):
+        start, stop = _gyro_index(recording, here.stop - 1), _gyro_index(recording, there.start)
+        part = slice(start, stop + 1)
+        steps = np.diff(gyro.t[part])
+        if not (np.isfinite(gyro.values[part]).all() and np.isfinite(drivers[part]).all()):
+            why = "samples are missing"
+        elif len(steps) == 0 or not np.all((steps >= 0) & (steps <= longest)):
+            why = "the time axis breaks"
+        elif clipped[part].any():
+            why = "the gyro saturates"
+        else:
+            spans.append((k, start, stop))
+            continue
+        where = f"t {gyro.t[start]:.2f} to {gyro.t[stop]:.2f} s"
+        left_out.append(Finding("skipped_turn", f"a turn is left out: {why}", where))
+    if len(spans) < FEWEST_TURNS:
+        left_out.append(
+            Finding(
+                "gyro_missing",
+                f"found {counted(len(spans), 'turn')} between poses, expected at least {FEWEST_TURNS}: "
+                "the gyro is not calibrated",
+            )
+        )
+        return None, left_out
+    return cut_turns(gyro.t, gyro.values, drivers, spans), left_out
+
+
+def _calibrate_gyro(
+    recording: Recording, poses: Poses, scatter: Scatter, settings: ImuSettings
+) -> tuple[GyroFit | None, list[Finding]]:
+    """The gyro's fit, if it can be made, and what is to be said of it."""
+    if recording.gyro is None:
+        said = "the record has no gyro: only the accelerometers are calibrated"
+        return None, [Finding("gyro_missing", said)]
+    findings = []
+    if not poses.with_gyro:
+        said = "the gyro is so restless in most holds that the poses were found by the accelerometers alone"
+        findings.append(Finding("gyro_restless", said))
+    drivers = drivers_of(recording, poses, settings)
+    turns, skipped = _turns(recording, poses, drivers.at_samples)
+    findings += skipped
+    if turns is None:
+        return None, findings
+    acc, means = poses.accelerometer, _gyro_means(recording, poses)
+    if not np.isfinite(means).all():
+        said = "the gyro has no numbers in some poses: it is not calibrated"
+        return None, [*findings, Finding("gyro_missing", said)]
+    scale, miss = first_guess(turns, acc.directions, means[0])
+    start = TriadModel(np.full(3, scale), np.eye(3), means[0])
+    error, earth = force_error(acc), earth_rate_at(settings.site)
+    gyro = None
+    if miss < WORST_START:
+        gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, drivers, earth)
+        miss = rms_miss(gyro)
+    if gyro is None or not gyro.converged or miss > WORST_MISS:
+        said = (
+            f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
+            "carried through the turns): check the gyro's signs and order of axes; it is not calibrated"
+        )
+        axes = axis_findings(turns, acc.directions, means[0])
+        return None, [*findings, Finding("contradiction", said), *axes]
+    findings += gyro_findings(poses, drivers, means - gyro.by_earth, recording)
+    return gyro, findings
