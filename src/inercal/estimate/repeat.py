@@ -85,8 +85,9 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     Returns
     -------
     Estimate
-        Its ``result`` holds ``runs`` (values, u and status of each), ``between`` (standard deviation from run to run
-        and its probability by chance, by name), and what is the same in the results of all.
+        Its ``result`` holds ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones) and
+        ``between`` (standard deviation from run to run and its probability by chance), and what is the same in the
+        results of all.
 
     Raises
     ------
@@ -150,6 +151,10 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
         result={
             **_same([run.result for run in sound]),
             "runs": [_row(run) for run in runs],
+            "by_run": {
+                name: {"values": [run.values[p] for run in sound], "u": [run.u[p] for run in sound]}
+                for p, name in enumerate(names)
+            },
             "between": {
                 name: {"s": float(np.sqrt(part.between)), "probability": part.probability}
                 for name, part in zip(names, parts, strict=True)
@@ -221,10 +226,9 @@ def _same(tables: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _row(run: Estimate) -> dict[str, Any]:
     """A run in the result of all."""
     return {
-        "files": [source.path for source in run.inputs],
+        "files": ", ".join(source.path for source in run.inputs),
         "status": run.status.value,
-        "values": dict(zip(run.names, run.values.tolist(), strict=True)),
-        "u": dict(zip(run.names, run.u.tolist(), strict=True)),
+        "message": run.message,
     }
 
 
