@@ -27,7 +27,7 @@ def examples(
         if output.out is not None:
             raise InputError("--out", "found no example to copy, expected its name before")
         rows = [{"name": e.name, "title": e.title, "files": list(e.files)} for e in EXAMPLES.values()]
-        text = "\n".join(f"{e.name:10s} {e.title}" for e in EXAMPLES.values())
+        text = "\n".join(f"{e.name:11s} {e.title}" for e in EXAMPLES.values())
         output.emit(envelope("examples", f"{len(rows)} examples", {"examples": rows}), text)
         return
     if name not in EXAMPLES:

@@ -23,7 +23,9 @@ def new_imu(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -
     from inercal.records.guess import guess_map
     from inercal.study.template import imu_template
 
-    _new("imu", files or [], output, imu_template, guess_map(files) if files else None)
+    column_map = guess_map(files) if files else None
+    channels = [] if column_map is None else _mapped(column_map)
+    _new("imu", files or [], output, partial(imu_template, channels=channels), column_map)
 
 
 def new_turntable(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -> None:  # noqa: B008

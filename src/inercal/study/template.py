@@ -29,7 +29,7 @@ height = "0(300) m"                 # above sea level [m]; replace it: this is m
 # gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
 
 [imu]                               # how to calibrate
-method = "multiposition"            # many poses by hand; or "ferraris", six poses; or "aided", on a table
+method = "multiposition"            # many poses by hand; or "ferraris", six sides; or "aided", a table
 # static_start = "50 s"             # length of the still period at the start [s]; found if absent
 # g_sensitivity = true              # also estimate how gyro drift depends on specific force [true, false]
 # bias_drift = true                 # also estimate how the gyro's bias drifts with time [true, false]
@@ -123,6 +123,7 @@ def imu_template(
     record_paths: Sequence[str | Path] = (),
     study_path: str | Path = "STUDY.toml",
     map_path: str | Path | None = None,
+    channels: Iterable[str] = (),
 ) -> str:
     """A study for ``inercal calibrate imu`` with every key in it, each explained.
 
@@ -135,9 +136,14 @@ def imu_template(
         The recordings that the next command in the header names.
     study_path, map_path : str or Path
         The study and, if there is one, the column map that it names.
+    channels : iterable of str
+        Those of the recordings: a table's angles and labelled sections tell the method.
     """
     files = _files(record_paths or ["RECORD.csv"], study_path, map_path)
-    return _HEAD.format(what="for `inercal calibrate imu`", next=f"calibrate imu {files}") + _IMU + _COMMON
+    found = set(channels)
+    method = "aided" if "phi1" in found else "ferraris" if "label" in found else "multiposition"
+    body = re.sub('(?m)^method = "multiposition"', f'method = "{method}"'.ljust(24), _IMU)
+    return _HEAD.format(what="for `inercal calibrate imu`", next=f"calibrate imu {files}") + body + _COMMON
 
 
 def turntable_template(
