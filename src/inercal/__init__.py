@@ -34,14 +34,15 @@ Uncertainty
 Map, lower floors first; each imports only from those above its own line
     errors, units              what goes wrong; texts with units
     geometry                   rotations, earth, site
-    instruments                terms, triad, polynomial, by_angle
-    records                    record, findings, maps, read, write, dwells
+    instruments                terms, triad, polynomial, by_angle, noise
+    records                    record, findings, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
-    estimate                   result, status, budget, linear, nonlinear, runs, coverage, exchange
-    noise                      allan
+    estimate                   result, status, budget, linear, nonlinear, runs, coverage, exchange, repeat, compare,
+                               checkpoint
+    noise                      deviation, coefficients, running, outcome
     sensitivity                exact, sampled, local, dense, averages
     design                     candidates, criteria, exchange, comparison
-    imu                        multi-position calibration: poses, accelerometer, turns, gyro, simulate, task
+    imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, temperature, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     study, report, examples    files people write; pages people read; recordings that ship

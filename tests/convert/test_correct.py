@@ -12,10 +12,11 @@ from inercal.instruments.triad import TriadModel
 TRIAD = TriadModel(np.array([2.0, 3.0, 4.0]), np.eye(3) + 0.01 * np.triu(np.ones((3, 3)), 1), np.ones(3))
 
 
-def estimate(units=None, **values):
+def estimate(units=None, command="calibrate imu", **values):
     """As much of an estimate as is looked at."""
     values = {f"{name}_{axis}": 1.0 for name in ("K1", "S") for axis in "xyz"} | values
     return SimpleNamespace(
+        command=command,
         names=tuple(values),
         values=np.array(list(values.values())),
         parameters={name: SimpleNamespace(value=value) for name, value in values.items()},
@@ -31,6 +32,24 @@ def test_a_missing_specific_force_spoils_the_rate_only_where_it_takes_part(g_sen
     assert np.isnan(omega).all() == lost
     _, gyro = model.indicate(np.array([[np.nan, 0.0, 1.0]]), np.array([[1.0, 2.0, 3.0]]))
     assert np.isnan(gyro).all() == lost
+
+
+def test_a_sample_alone_has_the_digits_that_it_has_among_others():
+    """So that a stream gives what a file gives; the matrix product of NumPy does not."""
+    rng = np.random.default_rng(1)
+    triads = [
+        TriadModel(
+            rng.normal(400, 20, 3), np.eye(3) + 0.01 * rng.standard_normal((3, 3)), rng.normal(3e4, 9, 3)
+        )
+        for _ in range(2)
+    ]
+    model = ImuModel(*triads, 0.3 * rng.standard_normal((3, 3)), {})
+    acc, gyro = 3e4 + 500 * rng.standard_normal((2, 1000, 3))
+    for work in (model.correct, model.indicate):
+        together = work(acc, gyro)
+        alone = [work(a, w) for a, w in zip(acc, gyro, strict=True)]
+        for i in range(2):
+            np.testing.assert_array_equal([pair[i] for pair in alone], together[i])
 
 
 @pytest.mark.parametrize(
@@ -55,3 +74,10 @@ def test_a_calibration_of_one_axis_is_none_of_an_imu():
     del bad.parameters["K1_y"]
     with pytest.raises(InputError, match="expected the coefficients of an IMU"):
         imu_model(bad)
+
+
+@pytest.mark.parametrize("command", ["compare", "temperature"])
+def test_what_is_no_calibration_is_not_applied(command):
+    """A difference of scale factors is no scale factor."""
+    with pytest.raises(InputError, match=f"a result of `inercal {command}`, expected a calibration"):
+        imu_model(estimate(command=command), "c.json")

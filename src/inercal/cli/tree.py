@@ -50,7 +50,7 @@ COMMANDS = {
     ),
     ("allan", ""): (
         "inercal.cli.allan:allan",
-        "Tell the noise of an instrument from a recording at rest.\n\nOverlapping Allan deviation of every channel with "
+        "Tell the noise of an instrument from a recording at rest.\n\nOverlapping Allan deviation of each channel with "
         "confidence limits, and angle or velocity random walk N, bias instability B, rate random walk K, ramp R and "
         "quantisation Q with uncertainties. --out saves them (.json or .toml) or the curves (.csv), --report writes a "
         "page with pictures. Exit code 1: done, but the instrument was not at rest.",

@@ -51,6 +51,8 @@ class ImuModel:
 
 def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
     """The instrument of an estimate of `calibrate imu`; raises `InputError`, naming ``where``, for any other."""
+    if estimate.command in ("compare", "temperature"):
+        raise InputError(where, f"found a result of `inercal {estimate.command}`, expected a calibration")
     values = {name: p.value for name, p in estimate.parameters.items()}
     units = estimate.result.get("unit", {})
     axes = [f"{scale}_{axis}" for scale in ("K1", "S") if f"{scale}_x" in values for axis in "xyz"]

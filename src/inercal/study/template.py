@@ -35,7 +35,7 @@ method = "multiposition"            # many poses by hand; or "ferraris", six sid
 # bias_drift = true                 # also estimate how the gyro's bias drifts with time [true, false]
 # time_base = "20 ppm"              # relative standard uncertainty of the record's clock; 0 if absent
 
-# [imu.ferraris]                    # with method = "ferraris": each axis up and down, and a turn about each axis
+# [imu.ferraris]                    # method "ferraris": each axis up and down, and a turn about each axis
 # turn = "360(0.5) deg"             # angle of the turns, right-handed [deg]; 360 deg if absent
 # alignment = "0.5 deg"             # uncertainty of each position's direction [deg]; from their scatter if absent
 
@@ -43,7 +43,7 @@ method = "multiposition"            # many poses by hand; or "ferraris", six sid
 # x_p = ["5.2 s", "12.4 s"]         # +x up; likewise x_a (-x up), y_p, y_a, z_p, z_a
 # x_rot = ["70 s", "76 s"]          # the turn about x, from rest to rest; likewise y_rot, z_rot
 
-# [imu.aided]                       # with method = "aided": the record has the table's angles phi1, phi2 (phi3)
+# [imu.aided]                       # method "aided": the record has the table's angles phi1, phi2 (phi3)
 # mounting = ["+x", "+y", "+z"]     # axes of the table, at zero angles, along which x, y, z of the instrument point
 
 # [imu.aided.rig]                   # the table; its errors and base as in a study of a turntable
