@@ -85,9 +85,9 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     Returns
     -------
     Estimate
-        Its ``result`` holds ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones) and
-        ``between`` (standard deviation from run to run and its probability by chance), and what is the same in the
-        results of all.
+        Its ``result`` holds ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones)
+        and ``between`` (standard deviation from run to run and its probability by chance), and what is the same in
+        the results of all.
 
     Raises
     ------

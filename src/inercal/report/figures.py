@@ -197,9 +197,15 @@ def repeats(estimate: Estimate) -> list[Picture]:
             places = np.arange(len(names)) + 0.5 * (number - 0.5 * (len(values) - 1)) / len(values)
             with np.errstate(divide="ignore", invalid="ignore"):
                 axes.errorbar(
-                    off / U, places, xerr=2.0 * u[number] / U, fmt="o", ms=3, lw=0.8, color=COLOURS[number % len(COLOURS)],
+                    off / U,
+                    places,
+                    xerr=2.0 * u[number] / U,
+                    fmt="o",
+                    ms=3,
+                    lw=0.8,
+                    color=COLOURS[number % len(COLOURS)],
                     label=f"run {number + 1}",
-                )  # fmt: skip
+                )
         axes.set_ylim(len(names) - 0.4, -0.6)
         axes.set_yticks(range(len(names)), names, fontsize=7)
         axes.tick_params(axis="y", length=0)

@@ -37,7 +37,7 @@ method = "multiposition"            # many poses by hand; or "ferraris", six sid
 
 # [imu.ferraris]                    # method "ferraris": each axis up and down, and a turn about each axis
 # turn = "360(0.5) deg"             # angle of the turns, right-handed [deg]; 360 deg if absent
-# alignment = "0.5 deg"             # uncertainty of each position's direction [deg]; from their scatter if absent
+# alignment = "0.5 deg"             # uncertainty of each position's direction [deg]; by their scatter if absent
 
 # [imu.ferraris.sections]           # start and end, as times or samples; by labels or detected if absent
 # x_p = ["5.2 s", "12.4 s"]         # +x up; likewise x_a (-x up), y_p, y_a, z_p, z_a
