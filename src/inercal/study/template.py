@@ -37,14 +37,14 @@ method = "multiposition"            # many poses by hand; or "ferraris", six sid
 
 # [imu.ferraris]                    # method "ferraris": each axis up and down, and a turn about each axis
 # turn = "360(0.5) deg"             # angle of the turns, right-handed [deg]; 360 deg if absent
-# alignment = "0.5 deg"             # uncertainty of each position's direction [deg]; by their scatter if absent
+# alignment = "0.5 deg"             # uncertainty of their directions [deg]; by their scatter if absent
 
 # [imu.ferraris.sections]           # start and end, as times or samples; by labels or detected if absent
 # x_p = ["5.2 s", "12.4 s"]         # +x up; likewise x_a (-x up), y_p, y_a, z_p, z_a
 # x_rot = ["70 s", "76 s"]          # the turn about x, from rest to rest; likewise y_rot, z_rot
 
 # [imu.aided]                       # method "aided": the record has the table's angles phi1, phi2 (phi3)
-# mounting = ["+x", "+y", "+z"]     # axes of the table, at zero angles, along which x, y, z of the instrument point
+# mounting = ["+x", "+y", "+z"]     # table axes, at zero angles, along which x, y, z of the instrument lie
 
 # [imu.aided.rig]                   # the table; its errors and base as in a study of a turntable
 # kind = "two_axis_turntable"       # outer axis y, inner z; or three_axis_turntable: z, y, x
