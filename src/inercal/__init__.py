@@ -46,6 +46,7 @@ Map, lower floors first; each imports only from those above its own line
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     study, report, examples    files people write; pages people read; recordings that ship
+    stream                     line in, line out; state saved and resumed
     cli                        one module per verb
 """
 

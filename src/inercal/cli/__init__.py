@@ -65,7 +65,7 @@ def run(arguments: list[str] | None = None) -> int:
             f"unexpected {type(error).__name__} ({error}), a fault of inercal's own: please report it with "
             "the traceback that INERCAL_DEBUG=1 shows"
         )
-    _abandon_output()
+    abandon_output()
     _say(f"error: {' '.join(problem.split())}")
     return EXIT_BAD_INPUT
 
@@ -90,7 +90,7 @@ def _say(text: str) -> None:
         print(f"inercal: {text}", file=sys.stderr, flush=True)
 
 
-def _abandon_output() -> None:
+def abandon_output() -> None:
     """Drop what is left in standard output's buffer, so that nothing is raised again on the way out."""
     try:
         if sys.stdout is not None:

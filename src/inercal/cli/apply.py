@@ -3,42 +3,75 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, Files, MapFile, envelope, read_record, reading
-from inercal.errors import InputError
+from inercal.cli.options import FileOutput, MapFile, envelope, read_record, reading
+from inercal.cli.streaming import StreamOptions, run_stream
+from inercal.errors import InputError, UsageError
+
+if TYPE_CHECKING:
+    from inercal.convert.correct import ImuModel
 
 
 def apply(
     calibration: Annotated[Path, Parameter(help="Calibration that `inercal calibrate --out` wrote.")],
-    files: Files,
+    files: Annotated[
+        list[Path] | None, Parameter(help="Recordings; several files with distinct channels are one record.")
+    ] = None,
     /,
     *,
     map_file: MapFile = None,
     invert: Annotated[bool, Parameter(help="From true values to outputs of the instrument.")] = False,
+    stream: Annotated[
+        bool, Parameter(help="Lines in, from standard input or one FILE, and corrected lines out.")
+    ] = False,
+    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Correct a recording with a calibration."""
-    from inercal.convert.correct import apply_to, imu_model
-    from inercal.estimate.exchange import load
-    from inercal.estimate.status import Status
-    from inercal.records.read import source_of
-    from inercal.records.write import write_csv
+    paths = files or []
+    if stream:
+        from inercal.stream.apply import Apply
 
+        if len(paths) > 1:
+            raise InputError("--stream", f"found {len(paths)} files, expected one or standard input")
+        file = paths[0] if paths else None
+        streaming.check(output, (calibration, file, map_file))
+        model = _model(calibration, output)
+        run_stream(lambda lines: Apply(lines, model, invert), file, map_file, output, streaming)
+        return
+
+    from inercal.convert.correct import apply_to
+    from inercal.records.read import source_of
+    from inercal.records.write import SUFFIXES, write_record
+
+    if not paths:
+        raise UsageError("apply: FILES is missing, expected recordings, or --stream")
     if output.out is None:
         raise InputError("--out", "missing, expected the file to write, such as corrected.csv")
-    output.check((".csv",), (calibration, *files, map_file))
-    estimate = load(calibration)
-    if estimate.status is not Status.OK:
-        output.say(f"{estimate.status.value}: {estimate.message}")
-    model = imu_model(estimate, calibration)
-    record = apply_to(read_record(files, map_file, output), model, invert)
+    if streaming != StreamOptions():
+        raise InputError("--checkpoint", "found without --stream, expected them together")
+    output.check(SUFFIXES, (calibration, *paths, map_file))
+    model = _model(calibration, output)
+    record = apply_to(read_record(paths, map_file, output), model, invert)
     output.say_findings(record.findings)
     with reading(output) as progress:
-        write_csv(record, output.out, progress)
+        write_record(record, output.out, progress)
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
     output.emit(envelope("apply", words, result, inputs, record.findings), words)
+
+
+def _model(calibration: Path, output: FileOutput) -> ImuModel:
+    """The instrument of a calibration; a bad verdict of it is said."""
+    from inercal.convert.correct import imu_model
+    from inercal.estimate.exchange import load
+    from inercal.estimate.status import Status
+
+    estimate = load(calibration)
+    if estimate.status is not Status.OK:
+        output.say(f"{estimate.status.value}: {estimate.message}")
+    return imu_model(estimate, calibration)

@@ -23,7 +23,7 @@ _SENSORS = {
 }
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _TIME = (
-    r"(?:t|time)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds|time (?:s|ms|us|ns)"
+    r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds|time (?:s|ms|us|ns)"
     r"|timestamp (?:s|ms|us|ns)"
 )
 _LABEL = r"label|part|section|pose"

@@ -18,7 +18,7 @@ from inercal.errors import InercalError, RecordError
 from inercal.records.channels import Channel
 from inercal.records.checks import missing
 from inercal.records.findings import Finding
-from inercal.records.read.canonical import canonical
+from inercal.records.read.canonical import bare, canonical
 from inercal.records.read.table import FileOptions, Sample, Table
 from inercal.records.record import Array
 from inercal.units import parse_unit
@@ -266,7 +266,7 @@ def _named(title: str, contents: Contents, path: Path) -> str | None:
     """The array of that name; the end of its path will do, and the unit in brackets may be left out."""
     if title in contents.arrays:
         return title
-    plain = {name: name.partition(" [")[0].strip("/") for name in contents.arrays}
+    plain = {name: bare(name).strip("/") for name in contents.arrays}
     names = [name for name, bare in plain.items() if bare == title.strip("/")]
     names = names or [name for name, bare in plain.items() if bare.rpartition("/")[2] == title]
     if len(names) > 1:

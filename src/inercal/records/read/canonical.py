@@ -15,6 +15,11 @@ EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
 _TITLE = re.compile(r"(\w+)\s*(?:\[(.*)\])?")
 
 
+def bare(title: str) -> str:
+    """A title without the unit in brackets, square or round, behind it."""
+    return re.sub(r"(?<=\S)\s*[\[(].*", "", title).strip()
+
+
 def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -> tuple[Channel, ...]:
     """The channels among titled columns; columns of other names are none of ours.
 

@@ -20,7 +20,7 @@ from inercal.errors import RecordError
 from inercal.records.channels import Channel
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
-from inercal.records.read.canonical import EXAMPLE, canonical
+from inercal.records.read.canonical import EXAMPLE, bare, canonical
 from inercal.records.read.layout import Layout, find_layout
 from inercal.records.read.lines import Block, blocks
 from inercal.records.read.table import FileOptions, Sample, Table
@@ -139,7 +139,7 @@ def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
         case int(number):
             return number if number < layout.width else None
         case str(title):
-            plain = [name.partition("[")[0].strip() for name in layout.header]
+            plain = [bare(name) for name in layout.header]
             titles = layout.header if title in layout.header else plain
             if titles.count(title) > 1:
                 raise RecordError(

@@ -1,0 +1,106 @@
+"""What the commands that work on a stream share: its options, and running an estimator from lines to lines."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
+from dataclasses import dataclass
+from os.path import realpath
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from inercal.cli import abandon_output
+from inercal.cli.options import FileOutput, Output
+from inercal.errors import InputError, RecordError
+
+if TYPE_CHECKING:
+    from inercal.stream.lines import Lines
+    from inercal.stream.run import Recursive
+
+_STANDARD_INPUT = "standard input"
+
+StreamFile = Annotated[
+    Path | None, Parameter(help="Recording, pipe or device to read lines from; standard input if absent.")
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class StreamOptions:
+    """The options of a command that works on a stream."""
+
+    checkpoint: Annotated[
+        Path | None, Parameter(help="Save the state to this file, and go on from it where it exists.")
+    ] = None
+    checkpoint_every: Annotated[int, Parameter(help="Rows from one save to the next; 1000 if absent.")] = 1000
+
+    def check(self, output: Output, inputs: Iterable[Path | None]) -> None:
+        """Fail before any work is done where lines or state could not be written; raises `InputError`."""
+        given = {"--json": output.json, "--out": isinstance(output, FileOutput) and output.out is not None}
+        for option in (name for name, there in given.items() if there):
+            raise InputError(option, "found with a stream, expected its lines on standard output and no more")
+        if self.checkpoint_every < 1:
+            raise InputError("--checkpoint-every", f"found {self.checkpoint_every}, expected 1 or more rows")
+        if self.checkpoint is None:
+            return
+        if realpath(self.checkpoint) in {realpath(path) for path in inputs if path is not None}:
+            raise InputError(self.checkpoint, "is an input, expected another file for --checkpoint")
+        try:
+            with tempfile.TemporaryFile(dir=Path(realpath(self.checkpoint)).parent) as file:
+                file.write(b"0")
+        except OSError as error:
+            raise InputError(self.checkpoint, f"cannot be written ({error.strerror or error})") from error
+
+
+def run_stream(
+    estimator: Callable[[Lines], Recursive[Any]],
+    file: Path | None,
+    map_file: Path | None,
+    output: Output,
+    options: StreamOptions,
+) -> None:
+    """Run the estimator that is made for the columns of a stream, from its lines to lines on standard output.
+
+    A reader that leaves ends it in order; the lines it did not take are given again after a restart.
+    """
+    from inercal.stream.lines import Lines
+    from inercal.stream.run import Saving, run
+
+    record_map = None
+    if map_file is not None:
+        from inercal.records.maps import read_map  # brings a checker of files that is slow to load
+
+        record_map = read_map(map_file)
+    saving = None if options.checkpoint is None else Saving(options.checkpoint, options.checkpoint_every)
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # as in a file
+    with _opened(file) as stream:
+        where = _STANDARD_INPUT if file is None else str(file)
+        lines = Lines(stream, where, record_map, lambda finding: output.say_findings([finding]))
+        try:
+            run(estimator(lines), lines, _write, saving, output.say)
+        except BrokenPipeError:
+            abandon_output()
+            output.say("the reader of standard output has left")
+
+
+def _opened(file: Path | None) -> Any:
+    """The stream, as a context."""
+    if file is None:
+        if sys.stdin is None:
+            raise RecordError(_STANDARD_INPUT, "found it closed, expected lines")
+        return nullcontext(sys.stdin.buffer)
+    try:
+        return file.open("rb")
+    except OSError as error:
+        raise RecordError(file, f"cannot be read ({error.strerror or error})") from error
+
+
+def _write(text: str) -> None:
+    """A line on standard output, at once."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()

@@ -1,0 +1,1 @@
+"""Lines in, lines out: recursive estimators run on a stream, their state saved and resumed."""

@@ -1,0 +1,283 @@
+"""Samples from a stream of lines, read as the same lines in a file are read.
+
+The layout is found out from the header and the first row. A row is handed on as soon as its line has ended:
+nothing is read ahead. What is no number becomes NaN, and is said with its line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from inercal.errors import InputError, MapError, RecordError
+from inercal.records.channels import Channel
+from inercal.records.findings import Finding
+from inercal.records.read.join import FileTable, check_present, conversion, row_rate
+from inercal.records.read.layout import Layout, comment_marks, find_layout, sniff_decimal
+from inercal.records.read.table import Part, Table
+from inercal.records.read.text import contents, locate
+from inercal.records.record import Column, Record, Source
+
+if TYPE_CHECKING:
+    from inercal.records.maps import RecordMap
+
+_BOM = b"\xef\xbb\xbf"
+_LONGEST = 1 << 20
+_PATIENCE = 3
+_SAID = 5
+
+
+class Line(NamedTuple):
+    """A line: its bytes without the line end, its number from 1, and whether it has ended."""
+
+    data: bytes
+    number: int
+    whole: bool
+
+    @property
+    def text(self) -> str:
+        """UTF-8, else Latin-1."""
+        try:
+            return self.data.decode("utf-8")
+        except UnicodeDecodeError:
+            return self.data.decode("latin-1")
+
+
+class Sample(NamedTuple):
+    """A row: its number from 0, its time [s], the values in the order of the record's columns, and its label."""
+
+    row: int
+    t: float
+    values: list[float]
+    label: str
+
+
+class _Field(NamedTuple):
+    """Where a value is in a row, and what it is multiplied by, one factor after the other."""
+
+    name: str
+    column: int
+    factors: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """What is in the rows: ``time`` (None where rows are counted at ``rate`` [Hz]), values, and labels."""
+
+    layout: Layout
+    time: _Field | None
+    rate: float
+    fields: tuple[_Field, ...]
+    label: int | None
+    record: Record
+
+
+class Lines:
+    """The rows of a stream, as `Sample`.
+
+    Parameters
+    ----------
+    stream : binary file
+        Lines of text, under a canonical header unless there is a map.
+    where : str
+        What to call the stream in errors.
+    record_map : RecordMap or None
+        The columns of one file. Increments need its ``[time] rate``, for the median interval of a stream is
+        not known before its end.
+    say : callable
+        Told of rows and values that could not be read: the first few of a kind as they come, the number of
+        all others by `close`.
+
+    Raises
+    ------
+    RecordError, MapError, QuantityError
+        As in reading a file, from the first rows alone. The first row after a header may be cut, as where a
+        stream is joined in the middle.
+    """
+
+    def __init__(
+        self, stream: IO[bytes], where: str, record_map: RecordMap | None, say: Callable[[Finding], None]
+    ) -> None:
+        self._stream, self.where, self._say = stream, where, say
+        self._number = 0
+        self._flaws: Counter[tuple[str, str]] = Counter()
+        self._form, self._held = self._begin(record_map)
+        part = _part(record_map)
+        layout = self._form.layout
+        self._sniff = part.options.decimal is None and layout.delimiter != ","
+        self._layout = layout
+
+    @property
+    def record(self) -> Record:
+        """The columns that the samples have, without samples."""
+        return self._form.record
+
+    @property
+    def stamped(self) -> bool:
+        """True if the stream has a time column."""
+        return self._form.time is not None
+
+    @property
+    def labelled(self) -> bool:
+        """True if the rows have labels."""
+        return self._form.label is not None
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """What decides which numbers the samples hold: a state that has a fingerprint."""
+        form = self._form
+        units = {name: column.unit.symbol for name, column in form.record.columns.items()}
+        columns = [f"{field.name} [{units.get(field.name)}] {field.factors}" for field in form.fields]
+        return {
+            "columns": ", ".join(columns),
+            "time": repr(form.time and form.time.factors),
+            "rate": form.rate,
+        }
+
+    def next(self) -> Line | None:
+        """The next line that holds a row, None at the end; waits for it."""
+        if self._held:
+            return self._held.pop(0)
+        while (line := self._read()) is not None:
+            if self._layout.is_row(line.text):
+                return line
+        return None
+
+    def sample(self, line: Line, row: int) -> Sample:
+        """The sample in a line, as row ``row`` of the record."""
+        text, form = line.text, self._form
+        if self._sniff and ("," in text or "." in text):
+            # the first row may hold whole numbers alone, which do not tell
+            self._layout = replace(self._layout, decimal=sniff_decimal([text], self._layout.delimiter))
+            self._sniff = False
+        fields = self._layout.fields(text)
+        bad = fields is None
+        t, values = math.nan, [math.nan] * len(form.fields)
+        if fields is not None:
+            found = [self._layout.number(fields[field.column]) for field in form.fields]
+            stamp = 0.0 if form.time is None else self._layout.number(fields[form.time.column])
+            bad = stamp is None or None in found
+            t = self._value(form.time, stamp, bad, line) if form.time is not None else t
+            values = [
+                self._value(field, value, bad, line) for field, value in zip(form.fields, found, strict=True)
+            ]
+        if bad:
+            self._bad_row(line)
+        label = fields[form.label].strip() if fields is not None and form.label is not None else ""
+        return Sample(row, row / form.rate if form.time is None else t, values, label)
+
+    def close(self) -> None:
+        """Say how many rows and values more could not be read."""
+        for (code, text), count in self._flaws.items():
+            if count > _SAID:
+                self._say(Finding(code, f"{text}: {count - _SAID} more"))
+
+    def _value(self, field: _Field, value: float | None, bad: bool, line: Line) -> float:
+        """A value in its unit; NaN where there is none, which is said unless the row is bad anyway."""
+        if value is None or not math.isfinite(value):
+            if not bad:
+                self._flaw("nan", f"{field.name}: missing value", line)
+            return math.nan
+        for factor in field.factors:
+            value *= factor
+        return value
+
+    def _bad_row(self, line: Line) -> None:
+        """Say that a row could not be read."""
+        if line.whole:
+            text = f"row other than {self._layout.width} fields with numbers, left as NaN"
+            self._flaw("bad_row", text, line)
+        else:
+            self._flaw("truncated", "the stream ends within a row", line)
+
+    def _flaw(self, code: str, text: str, line: Line) -> None:
+        """Say what is wrong with a line, unless it has been said too often."""
+        self._flaws[code, text] += 1
+        if self._flaws[code, text] <= _SAID:
+            self._say(Finding(code, text, f"line {line.number}"))
+
+    def _read(self) -> Line | None:
+        """The next line of any content."""
+        data = self._stream.readline(_LONGEST)
+        if not data:
+            return None
+        self._number += 1
+        if self._number == 1:
+            data = data.removeprefix(_BOM)
+        if len(data) == _LONGEST and not data.endswith(b"\n"):
+            raise RecordError(
+                self.where, f"line {self._number}: longer than {_LONGEST} bytes, expected lines of text"
+            )
+        return Line(data.rstrip(b"\r\n"), self._number, data.endswith(b"\n"))
+
+    def _begin(self, record_map: RecordMap | None) -> tuple[_Form, list[Line]]:
+        """What the rows hold, from as few of them as tell, and the rows that had to be read for that."""
+        part, path = _part(record_map), Path(self.where)
+        marks, rows = comment_marks(part.options), list[Line]()
+        problem: InputError = RecordError(path, "ended without a row, expected a header and lines of numbers")
+        while len(rows) < _PATIENCE and (line := self._read()) is not None:
+            text = line.text.strip()
+            if self._number <= part.options.skip or not text or text.startswith(marks):
+                continue
+            rows.append(line)
+            # the first row or header, and the newest: one between may be cut; empty lines keep the numbers right
+            lines = [""] * (rows[0].number - 1) + [row.text for row in rows[:1] + rows[1:][-1:]]
+            try:
+                layout = find_layout(lines, part.options, path)
+                form = _form(layout, locate(part.channels, layout, lines, path), path, part, record_map)
+            except InputError as error:
+                problem = error
+            else:
+                return form, rows[1:] if layout.header else rows
+        raise problem
+
+
+def _part(record_map: RecordMap | None) -> Part:
+    """The part of a map that a stream is read by."""
+    if record_map is None:
+        return Part(channels=None)
+    if len(record_map.parts) != 1:
+        raise MapError(
+            record_map.path,
+            f"found columns of {len(record_map.parts)} files, expected those of one for a stream",
+        )
+    (part,) = record_map.parts
+    if not record_map.ignore_time:
+        return part
+    return replace(part, channels=tuple(channel for channel in part.channels or () if channel.name != "t"))
+
+
+def _form(
+    layout: Layout, found: Mapping[Channel, int], path: Path, part: Part, record_map: RecordMap | None
+) -> _Form:
+    """What is in the rows, checked as where files are joined."""
+    source = Source(str(path), "")
+    if record_map is not None:
+        table = Table(tuple(found), {}, contents(layout), 0)
+        check_present([FileTable(path, source, part, table)], record_map.path)
+    rate = None if record_map is None else record_map.rate
+    if rate is None and any(channel.increment for channel in found):
+        where = f"{record_map.path if record_map else path}: time.rate"
+        raise MapError(where, 'missing, expected a rate such as "100 Hz" for increments in a stream')
+    interval = 0.0 if rate is None else 1.0 / rate
+    time, label, fields, columns, t = None, None, [], {}, np.empty(0)
+    for channel, index in found.items():
+        factors, unit = conversion(channel, interval)
+        field = _Field(channel.name, index, tuple(factor for factor in factors if factor != 1.0))
+        if channel.name == "label":
+            label = index
+        elif channel.name == "t":
+            time = field
+        else:
+            fields.append(field)
+            columns[channel.name] = Column(channel.name, channel.sensor, channel.axis, unit, t, t, source)
+    if not columns:
+        raise RecordError(path, "found a time column alone, expected a channel")
+    counted_at = math.nan if time is not None else row_rate(tuple(found), rate, path)
+    return _Form(layout, time, counted_at, tuple(fields), label, Record(columns, (), (source,)))

@@ -1,0 +1,241 @@
+"""The loop over a stream: resumed anywhere, the digits are those of a run without interruption."""
+
+import contextlib
+import io
+import math
+import os
+import signal
+import threading
+import time
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inercal.errors import InputError
+from inercal.stream.lines import Lines
+from inercal.stream.run import Saving, run
+
+HEADER = "t [s],acc_x [g]\n"
+
+
+class State(NamedTuple):
+    x: np.ndarray
+    n: int
+
+
+class Smoother:
+    """A recursive mean that forgets, whose every digit depends on all samples before; changes its state in place."""
+
+    kind = "smoother"
+    columns = ("t [s]", "row", "x")
+
+    def __init__(self, gain=0.3, every=1):
+        self.gain, self.every = gain, every
+        self.stop_at = None
+
+    @property
+    def settings(self):
+        return {"gain": self.gain}
+
+    def initial(self):
+        return State(np.zeros(1), 0)
+
+    def step(self, state, sample):
+        if sample.row == self.stop_at:
+            raise RuntimeError("killed")
+        if math.isfinite(sample.values[0]):
+            state.x[:] += self.gain * (sample.values[0] - state.x)
+        output = [sample.t, sample.row, float(state.x[0])] if sample.row % self.every == 0 else None
+        return State(state.x, state.n + 1), output
+
+
+def recording(n, seed=1, t0=0.0):
+    rng = np.random.default_rng(seed)
+    return [f"{t0 + i / 100!r},{x!r}\n" for i, x in enumerate(rng.standard_normal(n).tolist())]
+
+
+def play(estimator, rows, saving=None, said=None, header=HEADER):
+    """Output lines of a stream, less the titles; those of a run that was killed too."""
+    out = []
+    data = (header + "".join(rows)).encode()
+    lines = Lines(io.BytesIO(data), "stdin", None, lambda finding: None)
+    with contextlib.suppress(RuntimeError):
+        run(estimator, lines, out.append, saving, (said if said is not None else []).append)
+    assert out[0] == "t [s],row,x"
+    return out[1:]
+
+
+def row_of(line):
+    return int(line.split(",")[1])
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(1, 60), st.integers(1, 20), st.lists(st.integers(0, 60), max_size=3), st.integers(1, 3))
+def test_killed_anywhere_and_resumed(tmp_path_factory, n, every, kills, thinned):
+    """Of the replayed stream each row is answered, those answered twice with the same digits, and none is lost."""
+    saving = Saving(tmp_path_factory.mktemp("loop") / "state", every)
+    rows, found = recording(n), {}
+    expected = play(Smoother(every=thinned), rows)
+    for kill in (*sorted(kills), None):
+        estimator = Smoother(every=thinned)
+        estimator.stop_at = kill
+        for line in play(estimator, rows, saving):
+            assert found.setdefault(row_of(line), line) == line
+    assert [found[row] for row in sorted(found)] == expected
+
+
+def test_after_the_end_there_is_nothing_more_to_say(tmp_path):
+    saving, said = Saving(tmp_path / "state", 1000), []
+    rows = recording(30)
+    assert len(play(Smoother(), rows, saving)) == 30
+    assert play(Smoother(), rows, saving, said) == []
+    assert said == [f"resumed after row 30 of {tmp_path / 'state'}"]
+    # the recording has grown since
+    more = recording(50)
+    assert play(Smoother(), more, saving) == play(Smoother(), more)[30:]
+
+
+def test_a_live_stream_goes_on(tmp_path):
+    """What is sent again is passed over, by its time; then the digits are as if nothing had happened."""
+    rows = recording(100)
+    whole = play(Smoother(), rows)
+    for begin in (40, 25, 1):
+        saving, said = Saving(tmp_path / f"{begin}", 7), []
+        assert play(Smoother(), rows[:40], saving) == whole[:40]
+        assert play(Smoother(), rows[begin:], saving, said) == whole[40:]
+        assert said[1].startswith("rows up to t = 0.39 s are passed over")
+
+
+def test_a_live_stream_without_stamps_goes_on(tmp_path):
+    """There every row of another stream is a new one, and rows are counted on."""
+    header = "position,y_x [deg/h]\n"
+    rows = [f"{i},{x}\n" for i, x in enumerate(np.random.default_rng(2).standard_normal(20))]
+
+    class Second(Smoother):
+        def step(self, state, sample):
+            return super().step(state, sample._replace(values=sample.values[1:]))
+
+    whole = play(Second(), rows, header=header)
+    saving = Saving(tmp_path / "state", 3)
+    assert play(Second(), rows[:8], saving, header=header) == whole[:8]
+    assert play(Second(), rows[8:], saving, header=header) == whole[8:]
+
+
+def test_another_stream_that_begins_alike_is_refused(tmp_path):
+    saving = Saving(tmp_path / "state", 5)
+    play(Smoother(), recording(20), saving)
+    other = recording(20)
+    other[11] = "0.11,5.0\n"
+    with pytest.raises(InputError, match="found other rows than the 20 of the checkpoint"):
+        play(Smoother(), other, saving)
+
+
+def test_a_replay_that_ends_too_soon_says_nothing(tmp_path):
+    saving = Saving(tmp_path / "state", 5)
+    play(Smoother(), recording(20), saving)
+    before = saving.path.read_bytes()
+    assert play(Smoother(), recording(20)[:10], saving) == []
+    assert saving.path.read_bytes() == before
+
+
+def test_a_row_without_its_end_is_answered_but_not_kept(tmp_path):
+    """`0.1,1.2` may have been the beginning of `0.1,1.25`: the longer row takes its place after a resumption."""
+    saving = Saving(tmp_path / "state", 5)
+    rows = recording(20)
+    cut = [*rows[:10], rows[10][:-4]]
+    assert len(play(Smoother(), cut, saving)) == 11
+    assert play(Smoother(), rows, saving) == play(Smoother(), rows)[10:]
+
+
+def test_bad_rows_count(tmp_path):
+    rows = recording(30)
+    rows[3] = "junk\n"
+    rows[12] = ",\n"
+    saving, expected = Saving(tmp_path / "state", 4), play(Smoother(), rows)
+    estimator = Smoother()
+    estimator.stop_at = 14
+    first = play(estimator, rows, saving)
+    again = play(Smoother(), rows, saving)
+    assert [*first[:12], *again] == expected
+    assert expected[3].startswith(",3,")
+
+
+@pytest.mark.parametrize(("gain", "header"), [(0.30000000000000004, HEADER), (0.3, "t [s],acc_x [m/s^2]\n")])
+def test_a_state_of_other_settings_or_columns_is_refused(gain, header, tmp_path):
+    saving = Saving(tmp_path / "state", 5)
+    play(Smoother(), recording(20), saving)
+    with pytest.raises(InputError, match="other settings or inputs"):
+        play(Smoother(gain), recording(20), saving, header=header)
+
+
+def test_a_state_that_cannot_be_saved_is_one_sentence(tmp_path):
+    with pytest.raises(InputError, match="cannot be written"):
+        play(Smoother(), recording(20), Saving(tmp_path / "none" / "state", 5))
+
+
+def test_a_reader_that_leaves_loses_no_row(tmp_path):
+    """Lines it did not take are in no saved state, and so are given again."""
+    saving, rows = Saving(tmp_path / "state", 4), recording(20)
+    taken = []
+
+    def write(text):
+        if len(taken) == 12:
+            raise BrokenPipeError
+        taken.append(text)
+
+    lines = Lines(io.BytesIO((HEADER + "".join(rows)).encode()), "stdin", None, print)
+    with pytest.raises(BrokenPipeError):
+        run(Smoother(), lines, write, saving)
+    again = play(Smoother(), rows, saving)
+    expected = play(Smoother(), rows)
+    assert taken[1:] == expected[:11]
+    assert again == expected[8:]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
+def test_an_interrupt_finishes_the_row_in_work_and_saves(tmp_path):
+    saving, rows = Saving(tmp_path / "state", 1000), recording(20)
+    out = []
+
+    def write(text):
+        out.append(text)
+        if len(out) == 8:
+            os.kill(os.getpid(), signal.SIGINT)
+            out.append(out.pop())  # still here: the interrupt waits
+
+    lines = Lines(io.BytesIO((HEADER + "".join(rows)).encode()), "stdin", None, print)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        run(Smoother(), lines, write, saving)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert out[1:] + play(Smoother(), rows, saving) == play(Smoother(), rows)
+    assert len(out) == 8
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
+def test_an_interrupt_does_not_wait_for_a_line(tmp_path):
+    """A silent stream is left at once, the state saved."""
+    read, write_end = os.pipe()
+    os.write(write_end, (HEADER + "".join(recording(5))).encode())
+    saving = Saving(tmp_path / "state", 1000)
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    with os.fdopen(read, "rb") as stream:
+        lines, clock = Lines(stream, "stdin", None, print), time.perf_counter()
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            run(Smoother(), lines, lambda text: None, saving)
+    os.close(write_end)
+    assert time.perf_counter() - clock < 5.0
+    assert play(Smoother(), recording(9), saving) == play(Smoother(), recording(9))[5:]
+
+
+def test_runs_in_another_thread_too():
+    """Where signals cannot be handled."""
+    out = []
+    thread = threading.Thread(target=lambda: out.extend(play(Smoother(), recording(5))))
+    thread.start()
+    thread.join(10.0)
+    assert out == play(Smoother(), recording(5))
