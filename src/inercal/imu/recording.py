@@ -63,7 +63,7 @@ def prepare(record: Record, static_start: float | None) -> Recording:
     variances = {"acc": windowed_variance(accelerometer.values, window)}
     if gyro is not None:
         own = windowed_variance(gyro.values, window_samples(gyro.rate))
-        variances["gyro"] = own if gyro.t is t else _on_other_clock(own, gyro.t, t)
+        variances["gyro"] = own if gyro.t is t else on_other_clock(own, gyro.t, t)
     # a lost sample does no harm to the mean of a hold; half a window lost may hide a movement
     cuts = breaks(t, 0.5 * window / accelerometer.rate)
     initial = _initial(t, variances["acc"], window, cuts, static_start, where)
@@ -74,7 +74,7 @@ def prepare(record: Record, static_start: float | None) -> Recording:
             size = float(np.linalg.norm(np.var(rest, axis=0, ddof=1)))
             restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
             noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
-            resolution[triad.sensor] = _coarse_steps(triad.values, rest)
+            resolution[triad.sensor] = coarse_steps(triad.values, rest)
     return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise, resolution)
 
 
@@ -113,7 +113,7 @@ def _stamped(accelerometer: Triad, gyro: Triad | None) -> tuple[Triad, Triad | N
     return accelerometer, gyro
 
 
-def _on_other_clock(values: Array, t: Array, other: Array) -> Array:
+def on_other_clock(values: Array, t: Array, other: Array) -> Array:
     """Values at the nearest sample of another time axis; infinite outside."""
     nearest = np.clip(np.searchsorted(t, other), 0, len(t) - 1)
     out = values[nearest]
@@ -135,7 +135,7 @@ def _at_rest(triad: Triad, begin: float, end: float, static_start: float | None)
     return rest
 
 
-def _coarse_steps(values: Array, rest: Array) -> Array:
+def coarse_steps(values: Array, rest: Array) -> Array:
     """The output's step on axes (3,) whose standard deviation at ``rest`` is below half of it, else 0."""
     steps = np.zeros(3)
     for i in range(3):

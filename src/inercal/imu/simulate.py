@@ -161,20 +161,20 @@ def simulate(
     omega = np.concatenate(rates) + rotate(to_body, np.array([float(north), 0.0, float(up)]))
     f = rotate(to_body, np.array([0.0, 0.0, gravity])) + np.concatenate(moving)
     n = len(q_nb)
-    f_error, f_wander = _noise(truth.accelerometer_noise, n, rate, rng)
-    w_error, w_wander = _noise(truth.gyro_noise, n, rate, rng)
+    f_error, f_wander = wandering_noise(truth.accelerometer_noise, n, rate, rng)
+    w_error, w_wander = wandering_noise(truth.gyro_noise, n, rate, rng)
     acc = truth.accelerometer.indicate(f + f_error)
     gyro = truth.gyro.indicate(omega + w_error) + f @ truth.g_sensitivity.T
     t = np.arange(n, dtype=np.float64) * (clock / rate)
-    return _record(t, acc, gyro), replace(
+    return record_of_counts(t, acc, gyro), replace(
         truth,
         accelerometer=_with_mean(truth.accelerometer, f_wander, holds),
         gyro=_with_mean(truth.gyro, w_wander, holds),
     )
 
 
-def _noise(noise: Noise, n: int, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """White noise plus wandering bias, and the latter alone, (n, 3) each, in SI units."""
+def wandering_noise(noise: Noise, n: int, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """White noise plus wandering bias, and the latter alone, (n, 3) each, in SI units, at a sample ``rate`` [Hz]."""
     from scipy.signal import lfilter
 
     white = rng.normal(0.0, noise.white * np.sqrt(rate), (n, 3))
@@ -191,8 +191,8 @@ def _with_mean(model: TriadModel, wander: Array, holds: list[slice]) -> TriadMod
     return replace(model, bias=model.bias + model.gain @ mean)
 
 
-def _record(t: Array, acc: Array, gyro: Array) -> Record:
-    """A record in counts."""
+def record_of_counts(t: Array, acc: Array, gyro: Array) -> Record:
+    """A record of accelerometer and gyro outputs (n, 3) in counts at times ``t`` (n,) [s]."""
     source = Source("simulated", "")
     count = parse_unit("count")
     return Record(

@@ -74,7 +74,7 @@ def rms_miss(gyro: GyroFit) -> float:
     return float(np.sqrt(np.mean(np.sum(gyro.miss**2, axis=1))))
 
 
-def _unit_words(triad: Triad, model: TriadModel) -> str:
+def unit_words(triad: Triad, model: TriadModel) -> str:
     """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
     if triad.unit.dimension in ("count", "voltage"):
         return ""
@@ -100,7 +100,7 @@ def verdict(
     acc = poses.accelerometer
     of_gyro = None if gyro is None else gyro.model
     for triad, model in ((recording.accelerometer, acc.model), (recording.gyro, of_gyro)):
-        wrong = "" if triad is None or model is None else _unit_words(triad, model)
+        wrong = "" if triad is None or model is None else unit_words(triad, model)
         if wrong:
             return Status.INCONSISTENT, wrong
     known = acc.fit.identifiability

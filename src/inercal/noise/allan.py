@@ -6,15 +6,15 @@ not average out. So the variance of a mean over tau is read off the fitted Allan
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inercal.instruments.noise import allan_terms
 
-BIAS_FLOOR = 2.0 * np.log(2.0) / np.pi
-"""Allan variance of bias instability per B^2, so that B = floor / 0.664."""
+Array = NDArray[np.float64]
 
 
 def overlapping_variance(x: Array, m: int) -> Array:
@@ -35,7 +35,16 @@ def overlapping_variance(x: Array, m: int) -> Array:
     ----------
     Riley and Howe, NIST SP 1065 (2008), section 5.2.4.
     """
-    sums = np.concatenate([np.zeros_like(x[:1]), np.cumsum(x - x.mean(axis=0), axis=0)])
+    return _of_sums(_sums(x), m)
+
+
+def _sums(x: Array) -> Array:
+    """Running sums (n + 1, *channels) of samples, less their mean."""
+    return np.concatenate([np.zeros_like(x[:1]), np.cumsum(x - x.mean(axis=0), axis=0)])
+
+
+def _of_sums(sums: Array, m: int) -> Array:
+    """`overlapping_variance` from running sums."""
     second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
     return np.asarray(np.mean(second**2, axis=0) / (2.0 * m**2))
 
@@ -71,29 +80,39 @@ class AllanFit:
 
 
 def fit(x: Array, interval: float) -> AllanFit:
-    """Fit noise coefficients to a static recording.
+    """Fit noise coefficients to a static recording: `fit_pooled` of a single stretch, n >= 16."""
+    return fit_pooled([x], interval)
+
+
+def fit_pooled(stretches: Sequence[Array], interval: float) -> AllanFit:
+    """Fit noise coefficients to static stretches of a recording, whose own means say nothing.
 
     Parameters
     ----------
-    x : (n, channels), n >= 16
-        Equally spaced samples of an instrument at rest.
+    stretches : sequence of (n, channels)
+        Equally spaced samples of an instrument at rest, the longest with n >= 16.
     interval : float
         Sample interval [s].
 
     Notes
     -----
-    Octaves of averaging time from n/512 samples (the noise of shorter means is shaped by the instrument's
-    filters) to n/4; weighted by the degrees of freedom and the fitted size of each value. (Weights from the
-    values themselves would favour those that happen to be small, and understate drift by a fifth.)
+    Octaves of averaging time from n/512 samples of the longest stretch (the noise of shorter means is shaped by the
+    instrument's filters) to n/4, of several stretches to n/2; weighted by the degrees of freedom and the fitted size of
+    each value. (Weights from the values themselves would favour those that happen to be small, and understate drift by
+    a fifth.)
     """
     from scipy.optimize import nnls
 
-    n = len(x)
-    lengths = np.unique([max(1, n // 2**k) for k in range(2, 10)])
-    variances = np.array([overlapping_variance(x, int(m)) for m in lengths])
-    dof = np.array([equivalent_dof(n, int(m)) for m in lengths])
+    n = max(map(len, stretches))
+    longest = 2 if len(stretches) == 1 else 1
+    lengths = np.unique([max(1, n // 2**k) for k in range(longest, 10)])
+    sums = [_sums(x) for x in stretches]
+    variances = np.array([_pooled_variance(sums, int(m)) for m in lengths])
+    dof = np.array(
+        [sum(equivalent_dof(len(x), int(m)) for x in stretches if len(x) >= 2 * m) for m in lengths]
+    )
     A = _terms(lengths * interval)
-    coefficients = np.zeros((3, x.shape[1]))
+    coefficients = np.zeros((3, stretches[0].shape[1]))
     for channel, values in enumerate(variances.T):
         if np.all(values > 0):
             scale = A[-1]  # keeps the columns of comparable size
@@ -103,9 +122,16 @@ def fit(x: Array, interval: float) -> AllanFit:
                 found, _ = nnls(A / scale * weight[:, None], values * weight)
                 size = A / scale @ found
             coefficients[:, channel] = found / scale
-    return AllanFit(coefficients, n, interval)
+    return AllanFit(coefficients, sum(map(len, stretches)), interval)
+
+
+def _pooled_variance(sums: Sequence[Array], m: int) -> Array:
+    """Overlapping Allan variance (channels) over the stretches that are long enough, by the number of differences."""
+    long_enough = [each for each in sums if len(each) > 2 * m]
+    counts = np.array([len(each) - 2 * m for each in long_enough])
+    return np.asarray(counts @ [_of_sums(each, m) for each in long_enough] / counts.sum())
 
 
 def _terms(tau: Array) -> Array:
     """Allan variance (*tau.shape, 3) of unit N, B and K."""
-    return np.stack([1.0 / tau, np.full_like(tau, BIAS_FLOOR), tau / 3.0], axis=-1)
+    return allan_terms(tau)[..., :3]

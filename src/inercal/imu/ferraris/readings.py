@@ -1,0 +1,165 @@
+"""What the sections say: mean outputs, integrals of the turns, the noise at rest, and what is wrong with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.geometry.site import Site
+from inercal.imu.ferraris.method import Inputs
+from inercal.imu.ferraris.names import POSITIONS, TURNS
+from inercal.imu.ferraris.sections import Sections
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.recording import coarse_steps
+from inercal.noise.allan import AllanFit, fit_pooled
+from inercal.records.checks.values import saturated
+from inercal.records.findings import Finding
+from inercal.records.record import Triad
+
+Array = NDArray[np.float64]
+
+LOST = 3.5
+"""Longest step of time in a turn, in sample intervals: two lost samples hardly matter to its integral."""
+
+RESTLESS = 30.0
+"""Variance in a position over the median of all from which the instrument certainly moves."""
+
+CUT = 0.03
+"""Rate at an end of a turn, as a part of its largest, from which it was not at rest there."""
+
+MIDST = 0.3
+"""Part of the largest rate at an end from which the angle is not known at all."""
+
+_EDGE = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of the nine sections.
+
+    ``inputs`` of the method and the ``weights`` (6,) of the positions in the gyro's bias; ``lengths`` (6,) of the
+    positions [s]; ``noise`` the Allan fit of each sensor at rest;
+    ``resolution`` (3,) of each sensor the step of those axes whose noise is below half a step, else 0 [output];
+    ``swing`` (3, 2) the mean cosine and sine of the angle over each turn; ``findings`` what is wrong with a section.
+    """
+
+    inputs: Inputs
+    weights: Array
+    lengths: Array
+    noise: dict[str, AllanFit]
+    resolution: dict[str, Array]
+    swing: Array
+    findings: tuple[Finding, ...]
+
+
+def read_sections(
+    acc: Triad, gyro: Triad, sections: Sections, site: Site, options: FerrarisSettings
+) -> Readings:
+    """Average and integrate the sections, all nine of them."""
+    at_rest = {
+        triad.sensor: [triad.values[rows[name]] for name in POSITIONS]
+        for triad, rows in ((acc, sections.acc), (gyro, sections.gyro))
+    }
+    counts = np.array([len(part) for part in at_rest["gyro"]], dtype=float)
+    rate = np.array([part.mean(axis=0) for part in at_rest["gyro"]])
+    weights = counts / counts.sum()
+    bias = weights @ rate
+    clipped, longest = clipped_rows(gyro), LOST / gyro.rate
+    turned, durations, swing, findings = [], [], [], list(_moving(at_rest))
+    for axis, name in enumerate(TURNS):
+        t, output = gyro.t[sections.gyro[name]], gyro.values[sections.gyro[name]]
+        cells = _cells(t)
+        turned.append(cells @ output / cells.sum())
+        durations.append(cells.sum())
+        passed = np.cumsum(cells * (output[:, axis] - bias[axis]))
+        angle = options.turn * passed / passed[-1] if passed[-1] else np.zeros(len(t))
+        swing.append([cells @ np.cos(angle) / cells.sum(), cells @ np.sin(angle) / cells.sum()])
+        findings += _of_turn(name, t, output - bias, bool(clipped[sections.gyro[name]].any()), longest)
+    inputs = Inputs(
+        force=np.array([part.mean(axis=0) for part in at_rest["acc"]]),
+        rate=rate,
+        turned_force=np.array([acc.values[sections.acc[name]].mean(axis=0) for name in TURNS]),
+        turned_rate=np.array(turned),
+        durations=np.array(durations),
+        angles=np.full(3, options.turn),
+        gravity=np.array(site.gravity),
+        vertical_rate=np.array(site.vertical_rate),
+    )
+    return Readings(
+        inputs,
+        weights,
+        np.array([len(sections.acc[name]) for name in POSITIONS]) / acc.rate,
+        {triad.sensor: _noise(triad, at_rest[triad.sensor]) for triad in (acc, gyro)},
+        {
+            triad.sensor: coarse_steps(triad.values, max(at_rest[triad.sensor], key=len))
+            for triad in (acc, gyro)
+        },
+        np.array(swing),
+        tuple(findings),
+    )
+
+
+def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
+    """Rows (n,) in which an axis saturates."""
+    clipped = np.zeros(len(gyro.t), dtype=bool)
+    for values in gyro.values.T:
+        clipped[saturated(values)] = True
+    return clipped
+
+
+def _noise(triad: Triad, parts: list[Array]) -> AllanFit:
+    """Allan fit of the positions together; none of them is long enough for one: white noise from their scatter."""
+    if max(map(len, parts)) >= 16:
+        return fit_pooled(parts, 1.0 / triad.rate)
+    white = np.mean([part.var(axis=0, ddof=1) for part in parts], axis=0) / triad.rate
+    return AllanFit(np.stack([white, 0.0 * white, 0.0 * white]), sum(map(len, parts)), 1.0 / triad.rate)
+
+
+def _cells(t: Array) -> Array:
+    """What each sample stands for [s]: half the way to its neighbours, at the ends a whole interval as inside.
+
+    With even stamps all are equal, and the integral is the sum over the rate, as Ferraris and imucal take it.
+    """
+    steps = np.diff(t)
+    padded = np.concatenate([steps[:1], steps, steps[-1:]])
+    return np.asarray(0.5 * (padded[:-1] + padded[1:]))
+
+
+def _moving(at_rest: dict[str, list[Array]]) -> Iterator[Finding]:
+    """Positions in which the instrument was not still."""
+    for sensor, parts in at_rest.items():
+        sizes = np.array([np.linalg.norm(np.var(part, axis=0)) for part in parts])
+        usual = float(np.median(sizes))
+        for name, size in zip(POSITIONS, sizes, strict=True):
+            if size > RESTLESS * usual > 0.0:
+                yield Finding(
+                    "poor_section",
+                    f"the instrument moves in section {name}: {sensor} varies {math.sqrt(size / usual):.0f} times as "
+                    "much as in the others",
+                )
+
+
+def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) -> Iterator[Finding]:
+    """What is wrong with a turn: ``rate`` (n, 3) its output less the bias, ``longest`` step of time [s] allowed."""
+    where = f"t {t[0]:.2f} to {t[-1]:.2f} s"
+    steps = np.diff(t)
+    if not np.all((steps > 0.0) & (steps <= longest)):
+        yield Finding(
+            "poor_section", f"samples are missing in the turn {name}: its angle is not known", where
+        )
+    if clipped:
+        yield Finding(
+            "saturation", f"the gyro saturates in the turn {name}: its integral is too small", where
+        )
+    largest = float(np.max(np.abs(rate)))
+    edges = [float(np.max(np.abs(part.mean(axis=0)))) / largest for part in (rate[:_EDGE], rate[-_EDGE:])]
+    if max(edges) > CUT:
+        end = "beginning" if edges[0] == max(edges) else "end"
+        code = "poor_section" if max(edges) > MIDST else "turn_cut"
+        part = f"{100 * max(edges):.0f} % of its largest rate"
+        said = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
+        yield Finding(code, said, where)

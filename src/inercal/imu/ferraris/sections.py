@@ -1,0 +1,125 @@
+"""The nine sections of a Ferraris recording: six positions and three turns, labelled, named or detected."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import RecordError, StudyError
+from inercal.imu.ferraris.detection import detect
+from inercal.imu.ferraris.names import NAMES
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.records.places import places
+from inercal.records.record import Record, Triad
+
+Integers = NDArray[np.int64]
+
+_SIGNED = re.compile(r"([+-])([xyz])")
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """The rows of each section, by name, for the accelerometers and for the gyro; ``found_by`` says how: labels,
+    study or detection."""
+
+    acc: Mapping[str, Integers]
+    gyro: Mapping[str, Integers]
+    found_by: str
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the sections there are not."""
+        return tuple(name for name in NAMES if name not in self.acc)
+
+
+def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSettings) -> Sections:
+    """Find the sections: as the study names them, else by the labels of the record, else by the data.
+
+    Raises
+    ------
+    StudyError
+        A section that lies outside the record.
+    RecordError
+        Labels that do not belong to the rows, or a turn labelled in several places.
+    """
+    if options.sections:
+        rows, found_by = {name: _rows(name, ends, acc) for name, ends in options.sections.items()}, "study"
+    elif any(_canonical(label) for label in set(record.labels)):
+        rows, found_by = _labelled(record.labels, acc), "labels"
+    else:
+        spans = detect(acc, gyro, options.turn)
+        rows, found_by = {name: np.arange(start, stop) for name, (start, stop) in spans.items()}, "detection"
+    known = {name: _finite(found, acc) for name, found in rows.items()}
+    for name, found in known.items():
+        if len(found) < 2:
+            raise RecordError(
+                acc.source.path, f"section {name} has {len(found)} rows of numbers, expected a recording"
+            )
+    other = {name: _finite(_on(gyro, acc, found), gyro) for name, found in known.items()}
+    return Sections(known, other, found_by)
+
+
+def _canonical(label: str) -> str:
+    """The name of a section by its label: ``X_P``, ``+x`` and ``x_p`` are one; empty for any other."""
+    plain = label.strip().lower()
+    signed = _SIGNED.fullmatch(plain)
+    if signed:
+        plain = f"{signed[2]}_{'p' if signed[1] == '+' else 'a'}"
+    return plain if plain in NAMES else ""
+
+
+def _labelled(labels: Sequence[str], acc: Triad) -> dict[str, Integers]:
+    """Rows by label."""
+    path = acc.source.path
+    if len(labels) != len(acc.t):
+        raise RecordError(
+            path, f"has {len(acc.t)} rows and {len(labels)} labels, expected the labels in the file of acc_x"
+        )
+    canonical = {label: _canonical(label) for label in set(labels)}
+    names = np.array([canonical[label] for label in labels])
+    found = {}
+    for name in NAMES:
+        rows = np.flatnonzero(names == name)
+        starts = rows[np.flatnonzero(np.diff(rows, prepend=-2) > 1)]
+        if name.endswith("_rot") and len(starts) > 1:
+            raise RecordError(path, f"found {name} in several {places('row', starts + 1)}, expected one turn")
+        if len(rows):
+            found[name] = rows
+    return found
+
+
+def _rows(name: str, ends: tuple[float, float], acc: Triad) -> Integers:
+    """Rows between two times or two sample numbers."""
+    start, end = ends
+    key = f"imu.ferraris.sections.{name}"
+    if isinstance(start, int) and isinstance(end, int):
+        if end > len(acc.t):
+            raise StudyError(key, f"found samples {start} to {end}, expected at most {len(acc.t)}")
+        return np.arange(start, end)
+    inside = np.flatnonzero((acc.t >= start) & (acc.t < end))
+    if not inside.size or end > acc.t[-1] + 1.0 / acc.rate or start < acc.t[0]:
+        raise StudyError(
+            key, f"found {start:g} s to {end:g} s, expected times within {acc.t[0]:g} s to {acc.t[-1]:g} s"
+        )
+    return inside
+
+
+def _finite(rows: Integers, triad: Triad) -> Integers:
+    """Rows that hold numbers."""
+    return rows[np.isfinite(triad.values[rows]).all(axis=1) & np.isfinite(triad.t[rows])]
+
+
+def _on(gyro: Triad, acc: Triad, rows: Integers) -> Integers:
+    """The rows of the gyro at the times of rows of the accelerometers."""
+    if gyro.t is acc.t:
+        return rows
+    half = 0.5 / acc.rate
+    covered = np.zeros(len(gyro.t), dtype=bool)
+    edges = np.flatnonzero(np.diff(rows) > 1)
+    for first, last in zip(rows[np.r_[0, edges + 1]], rows[np.r_[edges, -1]], strict=True):
+        covered |= (gyro.t >= acc.t[first] - half) & (gyro.t < acc.t[last] + half)
+    return np.flatnonzero(covered)

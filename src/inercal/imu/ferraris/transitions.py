@@ -1,0 +1,66 @@
+"""Between the positions the instrument was turned over: whether its gyro then moved the vertical as it should.
+
+That tells in which sense the turns were made, which they cannot tell themselves.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.geometry.rotations import angle_between
+from inercal.imu.ferraris.method import Matrices
+from inercal.imu.ferraris.names import POSITIONS
+from inercal.imu.ferraris.readings import LOST, clipped_rows
+from inercal.imu.ferraris.sections import Sections
+from inercal.imu.turns import carried, cut_turns
+from inercal.records.record import Triad
+
+Array = NDArray[np.float64]
+
+LONGEST = 60.0
+"""Longest way between two positions that is followed [s]."""
+
+SHORTEST = 0.25
+"""Shortest way that can be one [s]: in a recording cut down to its sections there is none left between them."""
+
+FEWEST = 2
+"""Ways between positions without which nothing is said."""
+
+
+def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tuple[float, float] | None:
+    """Root-mean-square angle [rad] between carried and measured verticals after the ways between the positions.
+
+    Returns
+    -------
+    (as stated, with all turns in the other sense), or None where the ways were not recorded.
+    """
+    order = sorted(POSITIONS, key=lambda name: int(sections.acc[name][0]))
+    f = np.array([found.accelerometer.correct(acc.values[sections.acc[name]].mean(axis=0)) for name in order])
+    verticals = f / np.linalg.norm(f, axis=1, keepdims=True)
+    spans, clipped, longest = [], clipped_rows(gyro), LOST / gyro.rate
+    for k, (here, there) in enumerate(itertools.pairwise(order)):
+        start, stop = int(sections.gyro[here][-1]), int(sections.gyro[there][0])
+        steps = np.diff(gyro.t[start : stop + 1])
+        whole = bool(np.all((steps > 0.0) & (steps <= longest))) and start < stop
+        part = slice(start, stop + 1)
+        known = bool(np.isfinite(gyro.values[part]).all()) and not clipped[part].any()
+        if whole and known and SHORTEST < steps.sum() < LONGEST:
+            spans.append((k, start, stop))
+    if len(spans) < FEWEST:
+        return None
+    turns = cut_turns(gyro.t, gyro.values, np.zeros_like(gyro.values), spans)
+    model, none = found.gyro, np.zeros((3, 3))
+    as_stated, reversed_ = (
+        carried(turns, verticals, each, none) for each in (model, replace(model, scale=-model.scale))
+    )
+    ends = verticals[turns.last]
+    return _rms(angle_between(as_stated, ends)), _rms(angle_between(reversed_, ends))
+
+
+def _rms(angles: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(angles**2)))

@@ -1,0 +1,160 @@
+"""What to say of a Ferraris calibration: contradictions, findings, status in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.status import Status
+from inercal.imu.ferraris.method import Inputs, Matrices
+from inercal.imu.ferraris.names import NAMES, POSITIONS, TURNS, in_words
+from inercal.imu.ferraris.readings import Readings
+from inercal.imu.ferraris.scatter import Scatter
+from inercal.imu.ferraris.sections import Sections
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.verdict import WORST_MISS, unit_words
+from inercal.records.findings import Finding
+from inercal.records.record import Triad
+
+Array = NDArray[np.float64]
+
+FAINT = 0.3
+"""Least part of the largest response of an output that a position or turn has to show."""
+
+LARGEST_TILT = math.radians(10.0)
+"""Scatter of the positions [rad] beyond which the sections can hardly be what they are said to be."""
+
+
+def too_few(sections: Sections) -> str:
+    """Which sections there are not, and what to do."""
+    missing = sections.missing
+    found = len(NAMES) - len(missing)
+    wanted = ", ".join(f"{name} ({in_words(name)})" for name in missing)
+    how = {
+        "labels": "label it in the recording",
+        "study": "name it under imu.ferraris.sections",
+        "detection": "record it, or name it under imu.ferraris.sections",
+    }[sections.found_by]
+    plural = how if len(missing) == 1 else how.replace(" it", " them")
+    return f"found {found} of the nine sections, not {wanted}: {plural}"
+
+
+def contradictions(
+    triads: tuple[Triad, Triad],
+    found: Matrices,
+    misses: tuple[float, float] | None,
+    options: FerrarisSettings,
+) -> Iterator[Finding]:
+    """What in the data contradicts the sections or the stated turn: findings that make a result inconsistent."""
+    for triad, model in zip(triads, (found.accelerometer, found.gyro), strict=True):
+        wrong = unit_words(triad, replace(model, scale=np.abs(model.scale)))
+        if wrong:
+            yield Finding("unit_suspect", wrong)
+    sign = np.sign(np.diag(found.rate_gain))
+    if np.ptp(sign) > 0.0:
+        odd = 1.0 if np.sum(sign > 0.0) == 1 else -1.0
+        axis = "xyz"[int(np.argmax(sign == odd))]
+        yield Finding(
+            "sign_suspect",
+            f"gyro_{axis} runs against the other two in the turns: check its sign in the map, or whether {axis}_rot "
+            "was turned the other way",
+        )
+    elif misses is not None and misses[0] > WORST_MISS:
+        if misses[1] < min(WORST_MISS, 0.5 * misses[0]):
+            yield Finding(
+                "sign_suspect",
+                f"the motion between the positions shows that the turns were made against the stated sense: state "
+                f'imu.ferraris.turn = "{-math.degrees(options.turn):g} deg"',
+            )
+        else:
+            yield Finding(
+                "contradiction",
+                f"gyro and accelerometers contradict each other by {math.degrees(misses[0]):.0f} deg (rms of the "
+                "verticals carried from position to position): check the order and signs of the gyro's axes, and the "
+                "angle of the turns",
+            )
+
+
+def wrong_axes(x: Inputs, weights: Array) -> Iterator[Finding]:
+    """Positions and turns that show on another axis than they should, upside down, or not at all."""
+    force = (x.force[0::2] - x.force[1::2]).T
+    turned = ((x.turned_rate - weights @ x.rate) * x.durations[:, None]).T
+    for sensor, gain in (("acc", force), ("gyro", turned)):
+        size = np.max(np.abs(gain), axis=1, keepdims=True)
+        by_axis = gain / np.where(size > 0.0, size, 1.0)
+        for j, axis in enumerate("xyz"):
+            what = f"the positions {axis}_p and {axis}_a" if sensor == "acc" else f"the turn {axis}_rot"
+            shows = "show" if sensor == "acc" else "shows"
+            seen = int(np.argmax(np.abs(by_axis[:, j])))
+            if abs(by_axis[seen, j]) < FAINT:
+                yield Finding(
+                    "contradiction", f"{what} {shows} hardly on any axis of {sensor}: check the sections"
+                )
+            elif seen != j:
+                yield Finding(
+                    "channel_swap",
+                    f"{what} {shows} on {sensor}_{'xyz'[seen]}: check the order of the channels and the sections",
+                )
+            elif sensor == "acc" and by_axis[j, j] < 0.0:
+                yield Finding(
+                    "sign_suspect",
+                    f"acc_{axis} reads downward in {axis}_p and upward in {axis}_a: check its sign in the map, and the "
+                    "sections",
+                )
+
+
+def sense_finding(found: Matrices, misses: tuple[float, float] | None) -> Iterator[Finding]:
+    """A gyro that runs against the stated sense on all axes: negative scale factors, and what they may mean."""
+    if np.any(np.diag(found.rate_gain) > 0.0):
+        return
+    said = "all three gyro axes run against the stated sense of the turns, so that the scale factors S are negative: "
+    if misses is None:
+        yield Finding(
+            "sign_suspect",
+            said
+            + "the gyro counts against the right-hand rule, or the turns were made the other way (then change "
+            "the sign of imu.ferraris.turn); the recording lacks the motion between the positions that would tell",
+        )
+    else:
+        yield Finding("sign_suspect", said + "the gyro counts against the right-hand rule")
+
+
+def scatter_findings(scatter: Scatter, options: FerrarisSettings) -> Iterator[Finding]:
+    """Findings about the six equations left over in the positions of each sensor."""
+    if options.alignment is not None and scatter.excess["acc"]:
+        yield Finding(
+            "excess_scatter",
+            f"the positions scatter by {math.degrees(scatter.tilt):.2g} deg, more than the stated alignment of "
+            f"{math.degrees(options.alignment):.2g} deg explains; the uncertainties use the scatter",
+        )
+    if scatter.excess["gyro"]:
+        yield Finding(
+            "excess_scatter",
+            f"the gyro's output at rest scatters from position to position {scatter.over_expected['gyro']:.1f} times "
+            "as much as its noise within them explains; the uncertainties use the scatter",
+        )
+
+
+def verdict(
+    readings: Readings, scatter: Scatter, against: list[Finding], options: FerrarisSettings
+) -> tuple[Status, str]:
+    """Status and message; ``against`` what contradicts the result."""
+    poor = [*(finding for finding in readings.findings if finding.code != "turn_cut"), *against]
+    if poor:
+        return Status.INCONSISTENT, poor[0].message
+    if scatter.tilt > LARGEST_TILT and not math.isinf(scatter.tilt_dof):
+        worst = int(np.argmax(np.max(np.abs(scatter.left["acc"]), axis=1)))
+        pair = f"{POSITIONS[2 * worst]} and {POSITIONS[2 * worst + 1]}"
+        return Status.INCONSISTENT, (
+            f"the positions scatter by {math.degrees(scatter.tilt):.0f} deg from upright, most of all {pair}: check "
+            "the sections"
+        )
+    seen = "as stated" if math.isinf(scatter.tilt_dof) else "by their scatter"
+    return Status.OK, (
+        f"{3 + 9 + 12 + 9} coefficients from {len(POSITIONS)} positions and {len(TURNS)} turns of "
+        f"{math.degrees(options.turn):g} deg; positions upright to {math.degrees(scatter.tilt):.2g} deg ({seen})"
+    )

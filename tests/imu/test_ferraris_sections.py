@@ -1,0 +1,319 @@
+"""The nine sections: labelled, named, detected; missing, wrong and contradictory ones are said to be so."""
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from ferraris_sessions import (
+    SETTINGS,
+    SHIPPED,
+    UNSURE,
+    options_of,
+    record_of,
+    renamed,
+    session,
+    unlabelled,
+    with_values,
+)
+
+from inercal.errors import InputError, StudyError
+from inercal.estimate.status import Status
+from inercal.imu.ferraris.calibration import calibrate_ferraris
+from inercal.imu.ferraris.names import NAMES, POSITIONS
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.records.record import Record
+from inercal.units import parse_unit
+
+OPTIONS = FerrarisSettings()
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """A simulated session."""
+    return session(21, noisy=True)[0]
+
+
+def relabelled(record, **names):
+    """The same recording under other labels."""
+    return replace(record, labels=tuple(names.get(label, label) for label in record.labels))
+
+
+def codes(found):
+    return {finding.code for finding in found.estimate.findings}
+
+
+# Where they are.
+
+
+def test_labels_may_be_written_as_signed_axes_and_in_capitals(whole):
+    plain = calibrate_ferraris(whole, SETTINGS, OPTIONS)
+    other = relabelled(whole, x_p="+X", x_a="-x", y_p=" Y_P ", z_rot="Z_ROT")
+    assert np.array_equal(calibrate_ferraris(other, SETTINGS, OPTIONS).estimate.values, plain.estimate.values)
+    assert plain.estimate.result["found_by"] == "labels"
+
+
+@pytest.mark.parametrize("in_time", [False, True])
+def test_sections_named_in_samples_or_in_time_are_those_labelled(whole, in_time):
+    rows = {name: np.flatnonzero(np.array(whole.labels) == name) for name in NAMES}
+    ends = {name: (int(each[0]), int(each[-1]) + 1) for name, each in rows.items()}
+    if in_time:
+        ends = {name: (start / 50.0, stop / 50.0 - 0.01) for name, (start, stop) in ends.items()}
+    named = calibrate_ferraris(unlabelled(whole), SETTINGS, FerrarisSettings(sections=ends))
+    assert named.estimate.result["found_by"] == "study"
+    assert np.array_equal(named.estimate.values, calibrate_ferraris(whole, SETTINGS, OPTIONS).estimate.values)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_detected_sections_give_the_values_of_the_named_ones(name):
+    """The margins of a hold are a matter of taste: values move by less than half their standard uncertainty."""
+    record = record_of(name)
+    named = calibrate_ferraris(record, UNSURE, options_of(name)).estimate
+    found = calibrate_ferraris(unlabelled(record), UNSURE, options_of(name, sections=None)).estimate
+    assert found.result["found_by"] == "detection"
+    assert found.status is Status.OK
+    assert np.max(np.abs(found.values - named.values) / named.u) < 0.5
+
+
+@pytest.mark.parametrize("seed", [22, 23, 24])
+def test_detection_finds_the_positions_and_turns_of_a_session(seed):
+    record, _ = session(seed, noisy=True, alignment=math.radians(1.0), turn=-2.0 * math.pi)
+    found = calibrate_ferraris(unlabelled(record), SETTINGS, FerrarisSettings(turn=-2.0 * math.pi))
+    labels = np.array(record.labels)
+    for name in NAMES:
+        own = np.flatnonzero(labels == name)
+        rows = found.sections.acc[name]
+        if name in POSITIONS:
+            assert set(rows.tolist()) <= set(own.tolist())
+            assert len(rows) > 0.6 * len(own)
+        else:  # a turn may begin and end at rest
+            assert abs(rows[0] - own[0]) < 75
+            assert abs(rows[-1] - own[-1]) < 75
+    assert found.estimate.status is Status.OK
+
+
+def test_a_gyro_with_its_own_clock(whole):
+    """The sections of the accelerometers are carried over by time."""
+    half = with_values(whole)
+    t = half["gyro_x"].t[::2].copy()
+    columns = {
+        name: replace(column, values=column.values[::2], t=t) if name.startswith("gyro") else column
+        for name, column in half.columns.items()
+    }
+    slow = Record(columns, (), half.sources, half.labels)
+    a, b = (calibrate_ferraris(each, SETTINGS, OPTIONS).estimate for each in (whole, slow))
+    assert b.status is Status.OK
+    for name in a.names:
+        assert abs(a[name].value - b[name].value) < 3.0 * math.hypot(a[name].u, b[name].u)
+        if name.startswith("S_"):
+            assert b[name].value == pytest.approx(a[name].value, rel=2e-3)
+    detected = calibrate_ferraris(unlabelled(slow), SETTINGS, OPTIONS)
+    assert detected.sections.missing == ()
+
+
+# What is missing.
+
+
+@pytest.mark.parametrize("name", ["y_a", "z_rot"])
+@pytest.mark.parametrize("way", ["labels", "detection"])
+def test_a_missing_section_is_named(whole, name, way):
+    rows = np.array(whole.labels) != name
+    if way == "detection" and name == "y_a":  # with the ways to it
+        start = np.flatnonzero(~rows)[0] - 100
+        rows[start : np.flatnonzero(~rows)[-1] + 101] = False
+    columns = {n: replace(c, values=c.values[rows]) for n, c in whole.columns.items()}
+    t = whole["acc_x"].t[rows]
+    columns = {n: replace(c, t=t) for n, c in columns.items()}
+    labels = tuple(np.array(whole.labels)[rows].tolist()) if way == "labels" else ()
+    found = calibrate_ferraris(Record(columns, (), whole.sources, labels), SETTINGS, OPTIONS)
+    assert found.estimate.status is Status.TOO_FEW_INTERVALS
+    assert found.sections.missing == (name,)
+    assert f"found 8 of the nine sections, not {name} (" in found.estimate.message
+    assert found.estimate.names == ()
+
+
+def test_a_recording_at_rest_has_no_sections(whole):
+    rows = np.array(whole.labels) == "x_p"
+    t = whole["acc_x"].t[rows]
+    columns = {n: replace(c, values=c.values[rows], t=t) for n, c in whole.columns.items()}
+    found = calibrate_ferraris(Record(columns, (), whole.sources), SETTINGS, OPTIONS)
+    assert found.estimate.status is Status.TOO_FEW_INTERVALS
+
+
+def test_a_section_outside_the_record_is_an_error(whole):
+    for ends in ((0, 10**9), (0.0, 1e9)):
+        with pytest.raises(StudyError, match=r"imu.ferraris.sections.x_p: found .* expected"):
+            calibrate_ferraris(whole, SETTINGS, FerrarisSettings(sections={"x_p": ends}))
+
+
+def test_a_turn_labelled_twice_and_a_dead_sensor_are_errors(whole):
+    with pytest.raises(InputError, match="expected one turn"):
+        calibrate_ferraris(relabelled(whole, x_p="x_rot"), SETTINGS, OPTIONS)
+    with pytest.raises(InputError, match="acc_y never changes"):
+        calibrate_ferraris(with_values(whole, acc_y=np.zeros_like), SETTINGS, OPTIONS)
+    columns = {name: column for name, column in whole.columns.items() if name.startswith("acc")}
+    without_gyro = Record(columns, (), whole.sources, whole.labels)
+    with pytest.raises(InputError, match="gyro_x"):
+        calibrate_ferraris(without_gyro, SETTINGS, OPTIONS)
+
+
+# What contradicts itself.
+
+
+def test_exchanged_channels_are_named(whole):
+    swapped = calibrate_ferraris(renamed(whole, gyro_x="gyro_y", gyro_y="gyro_x"), SETTINGS, OPTIONS)
+    assert swapped.estimate.status is Status.INCONSISTENT
+    assert "the turn x_rot shows on gyro_y" in swapped.estimate.message
+    swapped = calibrate_ferraris(renamed(whole, acc_z="acc_y", acc_y="acc_z"), SETTINGS, OPTIONS)
+    assert "channel_swap" in codes(swapped)
+    assert "the positions y_p and y_a show on acc_z" in swapped.estimate.message
+
+
+def test_positions_exchanged_with_their_opposites_are_named(whole):
+    found = calibrate_ferraris(relabelled(whole, x_p="x_a", x_a="x_p"), SETTINGS, OPTIONS)
+    assert found.estimate.status is Status.INCONSISTENT
+    assert "acc_x reads downward in x_p" in found.estimate.message
+
+
+def test_one_gyro_axis_that_runs_against_the_others_is_named(whole):
+    found = calibrate_ferraris(with_values(whole, gyro_z=np.negative), SETTINGS, OPTIONS)
+    assert found.estimate.status is Status.INCONSISTENT
+    assert "gyro_z runs against the other two" in found.estimate.message
+
+
+def test_the_ways_between_the_positions_tell_turns_made_backward_from_a_reversed_gyro(whole):
+    """Turns alone cannot: a gyro that counts backward turned backward reads as one that counts forward."""
+    reverse = FerrarisSettings(turn=-2.0 * math.pi)
+    backward = calibrate_ferraris(whole, SETTINGS, reverse)
+    assert backward.estimate.status is Status.INCONSISTENT
+    assert 'state imu.ferraris.turn = "360 deg"' in backward.estimate.message
+    flipped = with_values(whole, **{f"gyro_{i}": np.negative for i in "xyz"})
+    gyro = calibrate_ferraris(flipped, SETTINGS, OPTIONS)
+    assert gyro.estimate.status is Status.OK
+    assert gyro.estimate["S_x"].value < 0.0
+    assert any("counts against the right-hand rule" in f.message for f in gyro.estimate.findings)
+    # without the ways nothing tells, and it is left to the reader
+    cut = np.isin(whole.labels, NAMES)
+    t = np.arange(np.count_nonzero(cut)) / 50.0
+    columns = {n: replace(c, values=c.values[cut], t=t) for n, c in whole.columns.items()}
+    labels = tuple(np.array(whole.labels)[cut].tolist())
+    silent = calibrate_ferraris(Record(columns, (), whole.sources, labels), SETTINGS, reverse)
+    assert silent.estimate.status is Status.OK
+    assert any("lacks the motion between the positions" in f.message for f in silent.estimate.findings)
+
+
+def test_the_shipped_sessions_say_how_they_were_turned():
+    """Session 1 keeps no ways: its reference treats counter-clockwise readings as clockwise turns. Session 2 does."""
+    first = calibrate_ferraris(record_of("ferraris"), UNSURE, options_of("ferraris")).estimate
+    assert first.status is Status.OK
+    assert sum(f.code == "sign_suspect" for f in first.findings) == 1
+    second = calibrate_ferraris(record_of("ferraris-si"), UNSURE, options_of("ferraris-si")).estimate
+    assert second.status is Status.OK
+    assert not any(f.code == "sign_suspect" for f in second.findings)
+    wrong = calibrate_ferraris(
+        record_of("ferraris-si"), UNSURE, options_of("ferraris-si", turn="360 deg")
+    ).estimate
+    assert wrong.status is Status.INCONSISTENT
+    assert 'turn = "-360 deg"' in wrong.message
+
+
+def test_a_motion_in_a_position_a_gap_and_saturation_in_a_turn_spoil_them(whole):
+    labels = np.array(whole.labels)
+    x_p, x_rot = np.flatnonzero(labels == "x_p"), np.flatnonzero(labels == "x_rot")
+    rng = np.random.default_rng(3)
+
+    def shaken(values):
+        out = values.copy()
+        out[x_p] += 300.0 * rng.normal(size=len(x_p))
+        return out
+
+    def lost(values):
+        out = values.copy()
+        out[x_rot[100:110]] = np.nan
+        return out
+
+    turned = whole["gyro_x"].values[x_rot]
+    top = float(turned[80] + 0.8 * (turned[81] - turned[80]))  # the sample before is well below it
+    for changes, words in (
+        ({"acc_x": shaken}, "the instrument moves in section x_p"),
+        ({"gyro_x": lost}, "samples are missing in the turn x_rot"),
+        ({"gyro_x": lambda v: np.minimum(v, top)}, "the gyro saturates in the turn x_rot"),
+    ):
+        found = calibrate_ferraris(with_values(whole, **changes), SETTINGS, OPTIONS)
+        assert found.estimate.status is Status.INCONSISTENT
+        assert words in found.estimate.message
+
+
+def test_a_turn_that_is_cut_off_is_said_to_be(whole):
+    labels = np.array(whole.labels, dtype=object)
+    rows = np.flatnonzero(labels == "z_rot")
+    for part, status in ((20, Status.OK), (100, Status.INCONSISTENT)):
+        short = labels.copy()
+        short[rows[-part:]] = ""
+        found = calibrate_ferraris(replace(whole, labels=tuple(short)), SETTINGS, OPTIONS)
+        said = [f.message for f in found.estimate.findings if f.code in ("turn_cut", "poor_section")]
+        assert len(said) == 1
+        assert "z_rot is under way at the end of its section" in said[0]
+        assert found.estimate.status is status
+
+
+def test_sections_that_do_not_differ_are_named():
+    """The same rows under two names; a turn that is none: nothing to be solved, and no warning from the algebra."""
+    record, _ = session(25, noisy=True)
+    rows = {name: np.flatnonzero(np.array(record.labels) == name) for name in NAMES}
+    ends = {name: (int(each[0]), int(each[-1]) + 1) for name, each in rows.items()}
+    for name, other, words in (
+        ("x_a", "x_p", "the positions x_p and x_a show hardly on any axis of acc"),
+        ("y_rot", "y_p", "the turn y_rot shows hardly on any axis of gyro"),
+    ):
+        found = calibrate_ferraris(record, SETTINGS, FerrarisSettings(sections=ends | {name: ends[other]}))
+        assert found.estimate.status is Status.INCONSISTENT
+        assert words in found.estimate.message
+        assert found.estimate.names == ()
+
+
+def test_a_turn_with_a_pause_for_a_new_grip_is_one_turn():
+    """Two halves with rest between them: their sum is the stated angle, of physical outputs."""
+    halves, truth = session(26, noisy=True, turn=math.pi)
+    labels = np.array(halves.labels)
+    twice = []
+    for name in ("x_rot", "y_rot", "z_rot"):
+        rows = np.flatnonzero(labels == name)
+        around = np.arange(rows[0] - 100, rows[-1] + 101)  # with the rests before and after it
+        twice += [around, around]
+    first = np.flatnonzero(labels == "x_rot")[0] - 100
+    order = np.concatenate([np.arange(first), *twice])
+    t = np.arange(len(order)) / 50.0
+    unit = parse_unit("deg/s")
+    scale = math.degrees(1.0) / 4775.0
+    columns = {
+        name: replace(
+            column,
+            t=t,
+            values=column.values[order] * (scale if name.startswith("gyro") else 1.0),
+            unit=unit if name.startswith("gyro") else column.unit,
+        )
+        for name, column in halves.columns.items()
+    }
+    found = calibrate_ferraris(Record(columns, (), halves.sources), SETTINGS, OPTIONS)
+    assert found.sections.missing == ()
+    for i, axis in enumerate("xyz"):
+        assert found.estimate[f"S_{axis}"].value == pytest.approx(truth.gyro.scale[i] * scale, rel=1e-3)
+
+
+def test_rows_without_a_time_stamp_do_not_count():
+    record, _ = session(27, noisy=True)
+    t = record["acc_x"].t.copy()
+    t[np.flatnonzero(np.array(record.labels) == "x_p")[10:13]] = np.nan
+    columns = {name: replace(column, t=t) for name, column in record.columns.items()}
+    a, b = (
+        calibrate_ferraris(each, SETTINGS, OPTIONS)
+        for each in (record, Record(columns, (), record.sources, record.labels))
+    )
+    assert len(b.sections.acc["x_p"]) == len(a.sections.acc["x_p"]) - 3
+    assert b.estimate.status is Status.OK
+    assert abs(a.estimate["K1_x"].value - b.estimate["K1_x"].value) < a.estimate["K1_x"].u

@@ -1,0 +1,162 @@
+"""Ferraris calibration against imucal: its own run on the shipped sessions, and its published result files.
+
+Its model is w_cal = R_g^-1 K_g^-1 (w - K_ga a_cal - b_g), a_cal = R_a^-1 K_a^-1 (a - b_a) in m/s^2 and deg/s, so that
+K_a R_a is our K1 M and K_g R_g our S T pi/180. It takes turns as clockwise (-360 deg) unless told otherwise, and its
+g-sensitivity still holds the earth rate, as ours without a latitude does.
+"""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
+from ferraris_sessions import SETTINGS, options_of, record_of
+
+from inercal.examples import FOLDER
+from inercal.imu.ferraris.calibration import calibrate_ferraris
+
+imucal = pytest.importorskip("imucal")
+
+#: imucal 2.6.0, equal to tests/snapshots/example_cal.json of its repository (mad-lab-fau/imucal 8716e4c)
+REFERENCE = {
+    "ferraris": {
+        "K_a": [208.54567263762615, 208.0011341167055, 214.78455364603022],
+        "R_a": [
+            [0.9999125214309234, 0.007122056140390757, -0.011145662922687352],
+            [-0.007947378455060604, 0.9996887358297629, 0.023648903373787954],
+            [0.021342900724016442, -0.010781879507682177, 0.9997140749549175],
+        ],
+        "b_a": [-6.018868019671572, -48.287874016760156, -28.96636637224333],
+        "K_g": [16.67769558952488, 16.187895200550262, 16.253362639451936],
+        "R_g": [
+            [-0.9999143756542296, -0.0006142300632876558, 0.013071498821540703],
+            [0.0055057030733027396, -0.9992594967426224, -0.03808077472097593],
+            [-0.01314650914177706, 0.0365074524847183, -0.9992469040284595],
+        ],
+        "K_ga": [
+            [0.0022926499308660976, -0.016134632407810497, 0.018465435717563698],
+            [0.013873705024757028, 0.005443610335094903, -0.008812480865044459],
+            [-0.00925910567448679, 0.008506306471459087, -0.003935382156556474],
+        ],
+        "b_g": [1.960686204431737, -4.472837741243746, -3.6511794138670477],
+    },
+    "ferraris-si": {
+        "K_a": [0.9967458650887003, 1.0024376185894108, 1.0233953475452096],
+        "R_a": [
+            [0.9998620291746435, -0.014830571004926794, -0.007481763056406514],
+            [0.008576740442555632, 0.9999615197419686, 0.0018435180263559792],
+            [0.01333118773067902, 0.002003617949970859, 0.9999091283455711],
+        ],
+        "b_a": [0.5371174244458201, -0.6162029930860964, 0.3988673423902682],
+        "K_g": [1.0279243264288036, 0.9824277738468916, 0.9983104874451514],
+        "R_g": [
+            [0.999979342528037, -0.00045421361799804057, -0.006411568231274507],
+            [-0.00022220540636464124, 0.9999961009525417, -0.002783649487862618],
+            [0.009714004498496572, 0.0076410932929403316, 0.9999236229882218],
+        ],
+        "K_ga": [
+            [0.00038961109153281214, -0.00045815544407725904, -2.9844819440802578e-05],
+            [0.0004320123104123373, 0.0004871099695542217, 0.0006178601683550832],
+            [9.966554956457076e-05, -9.110691206112818e-05, 0.0002356473632041452],
+        ],
+        "b_g": [-0.5996686296674446, -0.36984313466306884, 0.0587739354671091],
+    },
+}
+
+ROUNDING = 1e-11
+
+
+def ours(name, turn="-360 deg"):
+    """Gains, biases and g-sensitivity of ours in imucal's units, from the coefficients of the estimate."""
+    estimate = calibrate_ferraris(record_of(name), SETTINGS, options_of(name, turn=turn)).estimate
+
+    def triad(scale, cross, bias):
+        size = np.array([estimate[f"{scale}_{i}"].value for i in "xyz"])
+        shape = [[1.0 if i == j else estimate[f"{cross}_{i}{j}"].value for j in "xyz"] for i in "xyz"]
+        return size[:, None] * np.array(shape), np.array([estimate[f"{bias}_{i}"].value for i in "xyz"])
+
+    (K, b), (S, d) = triad("K1", "M", "K0"), triad("S", "T", "D_F")
+    G = np.array([[estimate[f"G_{i}{j}"].value for j in "xyz"] for i in "xyz"])
+    return {"K_a R_a": K, "b_a": b, "K_g R_g": S * math.pi / 180.0, "b_g": d, "K_ga": G}
+
+
+def products(found):
+    """The same of imucal's matrices (``K`` as diagonals)."""
+    return {
+        "K_a R_a": np.diag(found["K_a"]) @ found["R_a"],
+        "b_a": np.array(found["b_a"]),
+        "K_g R_g": np.diag(found["K_g"]) @ found["R_g"],
+        "b_g": np.array(found["b_g"]),
+        "K_ga": np.array(found["K_ga"]),
+    }
+
+
+def run_imucal(name, angle):
+    """imucal on the same file, read by pandas."""
+    data = pd.read_csv(FOLDER / f"{name}.csv.gz")
+    if name == "ferraris":
+        regions, rate = imucal.ferraris_regions_from_df(data.set_index("part")), 204.8
+    else:
+        spans = options_of(name).sections
+        table = pd.DataFrame({key: {"start": a, "end": b} for key, (a, b) in spans.items()}).T
+        regions, rate = imucal.ferraris_regions_from_section_list(data, table), 102.4
+    found = imucal.FerrarisCalibration(grav=9.81, expected_angle=angle).compute(
+        regions, rate, from_acc_unit="a.u.", from_gyr_unit="a.u."
+    )
+    known = {
+        key: np.asarray(getattr(found, key)) for key in ("K_a", "R_a", "b_a", "K_g", "R_g", "K_ga", "b_g")
+    }
+    return known | {key: np.diag(known[key]) for key in ("K_a", "K_g")}
+
+
+def equal(ours, theirs):
+    for key, values in theirs.items():
+        scale = np.max(np.abs(values))
+        assert np.max(np.abs(ours[key] - values)) < ROUNDING * scale, key
+
+
+@pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
+@pytest.mark.parametrize("angle", [-360.0, 360.0, -720.0])
+def test_equal_to_imucal_run_on_the_same_session(name, angle):
+    equal(ours(name, f"{angle:g} deg"), products(run_imucal(name, angle)))
+
+
+@pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
+def test_equal_to_its_published_results(name):
+    equal(ours(name), products(REFERENCE[name]))
+
+
+@pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
+def test_corrected_outputs_are_equal(name):
+    """The whole correction, applied to the recording by either."""
+    from inercal.convert.correct import imu_model
+
+    record = record_of(name)
+    estimate = calibrate_ferraris(record, SETTINGS, options_of(name, turn="-360 deg")).estimate
+    f, omega = imu_model(estimate).correct(record.triad("acc").values, record.triad("gyro").values)
+    found = REFERENCE[name]
+    info = imucal.FerrarisCalibrationInfo.from_json(
+        json.dumps(
+            {
+                **{key: np.diag(found[key]).tolist() for key in ("K_a", "K_g")},
+                **{key: found[key] for key in ("R_a", "b_a", "R_g", "K_ga", "b_g")},
+                "acc_unit": "m/s^2",
+                "gyr_unit": "deg/s",
+                "from_acc_unit": "a.u.",
+                "from_gyr_unit": "a.u.",
+                "comment": None,
+                "cal_type": "Ferraris",
+                "_format_version": "2.0.0",
+            }
+        )
+    )
+    theirs = info.calibrate(
+        record.triad("acc").values, record.triad("gyro").values, acc_unit="a.u.", gyr_unit="a.u."
+    )
+    assert np.allclose(f, theirs[0], rtol=0.0, atol=1e-10 * np.max(np.abs(theirs[0])))
+    assert np.allclose(np.degrees(omega), theirs[1], rtol=0.0, atol=1e-10 * np.max(np.abs(theirs[1])))
