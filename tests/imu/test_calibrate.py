@@ -10,11 +10,11 @@ from inercal.errors import InputError
 from inercal.estimate.status import Status
 from inercal.geometry.rotations import conjugate, exp, rotate
 from inercal.geometry.site import GravityInput, Site
+from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.poses import sweep
 from inercal.imu.recording import prepare
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
-from inercal.imu.task import calibrate
 
 SITE = Site(9.81, (), 0.8)
 SETTINGS = ImuSettings(SITE)

@@ -11,9 +11,9 @@ from inercal.estimate.status import Status
 from inercal.geometry.rotations import conjugate, exp
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.figures import pictures
+from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, simulate
-from inercal.imu.task import calibrate
 from inercal.records.record import Column, Record, Source
 from inercal.report.html import render
 from inercal.units import parse_unit

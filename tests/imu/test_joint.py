@@ -8,9 +8,9 @@ from recordings import arrays, record_of
 
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.gyro import _excess
+from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
-from inercal.imu.task import calibrate
 
 SETTINGS = ImuSettings(Site(9.81, (), 0.8), g_sensitivity=True)
 

@@ -180,6 +180,17 @@ def test_scatter_beyond_the_stated_uncertainty_widens_it():
     assert np.all(np.abs(found.values - TRUTH) < 5 * found.u)
 
 
+def test_a_known_common_error_that_dominates_has_the_factor_of_a_known_one():
+    """Scatter of five values about four coefficients has one degree of freedom, k = 14; gravity is not of it."""
+    T = np.array([-20.0, 0.0, 20.0, 40.0, 60.0])
+    y = cubic(T) + np.array([0.03, -0.05, 0.02, 0.05, -0.04])
+    found = fit_calibrations(
+        [calibration(x, [v], 0.01, 1.0) for x, v in zip(T, y, strict=True)], files(5)
+    ).estimate
+    assert found["K1_x_T1"].k == pytest.approx(13.97, abs=0.01)
+    assert pytest.approx(2.0, rel=0.01) == found["K1_x"].U
+
+
 def test_few_temperatures_carry_a_polynomial_of_lower_degree():
     T = np.array([0.0, 20.0, 40.0])
     found = fit_calibrations([calibration(x, [1.0 + 0.1 * x]) for x in T], files(3)).estimate

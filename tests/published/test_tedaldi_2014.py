@@ -15,9 +15,9 @@ from recordings import shipped
 
 from inercal.convert.other_tools import to_tool
 from inercal.estimate.status import Status
+from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.poses import choose, sweep
 from inercal.imu.recording import prepare
-from inercal.imu.task import calibrate
 
 IMU_TK = {
     "scale": [414.4588739254017, 412.01046845347594, 414.6486622431341],
