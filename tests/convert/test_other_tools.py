@@ -63,8 +63,8 @@ def test_degrees_of_freedom_are_the_fewest_of_what_a_term_is_made_of():
 
 def test_what_comes_from_elsewhere_goes_along_as_a_part_of_the_covariance():
     estimate = estimate_of(instrument(18, sensitive=False), np.random.default_rng(18))
-    converted = to_tool(replace(estimate, type_b=estimate.covariance / 4), "imu_tk").estimate
-    np.testing.assert_allclose(converted.type_b, converted.covariance / 4, rtol=1e-12)
+    converted = to_tool(replace(estimate, common=estimate.covariance / 4), "imu_tk").estimate
+    np.testing.assert_allclose(converted.common, converted.covariance / 4, rtol=1e-12)
 
 
 def test_a_coefficient_for_which_there_is_no_place_is_named():

@@ -264,6 +264,12 @@ def refused(path):
     return message
 
 
+def test_a_file_of_another_tool_is_told_where_to_go(tmp_path):
+    path = tmp_path / "imucal.json"
+    path.write_text('{"K_a": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "cal_type": "Ferraris"}')
+    assert "inercal convert --from" in refused(path)
+
+
 FOREIGN = [
     b"", b" ", b"null", b"5", b'"text"', b"[]", b"{}", b"[[[[", b"{" * 100_000, b"[" * 100_000, b"\xff\xfe\x00",
     b"\x00" * 50, b'{"parameters": []}', b'{"parameters": 5, "covariance": 5}', b"nan", b"t [s],acc_x [g]\n0,1\n",

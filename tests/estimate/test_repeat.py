@@ -20,11 +20,11 @@ from inercal.records.record import Source
 def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:
     """A run with independent type A variances (p,) and a type B covariance (p, p)."""
     p = len(values)
-    type_b = np.zeros((p, p)) if elsewhere is None else np.asarray(elsewhere, dtype=float)
+    shared = np.zeros((p, p)) if elsewhere is None else np.asarray(elsewhere, dtype=float)
     names = ("K0_x", "K0_y", "K1_x")[:p]
     return Estimate(
-        "calibrate imu", names, ("count",) * p, np.asarray(values, dtype=float), np.diag(own) + type_b,
-        np.full(p, dof), np.full(p, 2.0), Status.OK, "", type_b=type_b, **more,
+        "calibrate imu", names, ("count",) * p, np.asarray(values, dtype=float), np.diag(own) + shared,
+        np.full(p, dof), np.full(p, 2.0), Status.OK, "", common=shared, **more,
     )  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def test_what_comes_from_elsewhere_does_not_average_out():
     runs = [run_of([0.0, 0.0], [1.0, 1.0], elsewhere) for _ in range(4)]
     found = combine_runs(runs)
     np.testing.assert_allclose(found.covariance, elsewhere + np.eye(2) / 4.0, rtol=1e-9)
-    np.testing.assert_allclose(found.type_b, elsewhere)
+    np.testing.assert_allclose(found.common, elsewhere)
 
 
 def test_a_coefficient_that_changes_between_runs_says_so_and_has_few_degrees_of_freedom():
@@ -172,4 +172,4 @@ def test_the_budget_adds_up():
 def test_the_part_from_elsewhere_survives_the_file():
     found = combine_runs([run_of([1.0], [1.0], [[0.25]]), run_of([2.0], [1.0], [[0.25]])])
     again = from_json(to_json(found))
-    np.testing.assert_array_equal(again.type_b, found.type_b)
+    np.testing.assert_array_equal(again.common, found.common)

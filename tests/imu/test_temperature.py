@@ -137,10 +137,10 @@ def test_a_steady_temperature_is_unobservable_and_a_missing_one_an_error():
 
 def calibration(temperature, values, u=0.01, common=0.0) -> Estimate:
     p = len(values)
-    type_b = np.full((p, p), common**2)
+    shared = np.full((p, p), common**2)
     return Estimate(
         "calibrate imu", ("K1_x", "K0_x")[:p], ("count/(m/s^2)", "count")[:p], np.asarray(values, dtype=float),
-        np.eye(p) * u**2 + type_b, np.full(p, 50.0), np.full(p, 2.0), Status.OK, "", type_b=type_b,
+        np.eye(p) * u**2 + shared, np.full(p, 50.0), np.full(p, 2.0), Status.OK, "", common=shared,
         conditions={"temperature": f"{temperature} degC"},
     )  # fmt: skip
 

@@ -32,13 +32,14 @@ class TypeB:
 
     ``u`` [``unit``] its standard uncertainty, ``sensitivity`` (p,) the derivative of each parameter with
     respect to it; one value for the whole test, so that it is common to all observations. (p, q) stands for q
-    independent components of equal u.
+    independent components of equal u. It is the same in repeat runs, unless it is ``redrawn`` (set up anew by hand).
     """
 
     source: str
     u: float
     unit: str
     sensitivity: Array
+    redrawn: bool = False
 
     @property
     def covariance(self) -> Array:
@@ -84,6 +85,12 @@ def combine(
         dof = np.where(weight > 0, np.maximum(variance**2 / weight, 1.0), np.inf)
     budget = tuple(_item(names, source, variance) for source in sources)
     return total, dof, budget
+
+
+def common(sources: Sequence[TypeA | TypeB], parameters: int) -> Array:
+    """(p, p) covariance by those sources that are the same error in repeat runs."""
+    alike = (s.covariance for s in sources if isinstance(s, TypeB) and not s.redrawn)
+    return sum(alike, np.zeros((parameters, parameters)))
 
 
 def _item(names: Sequence[str], source: TypeA | TypeB, variance: Array) -> BudgetItem:

@@ -38,7 +38,7 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
         "covariance": {
             "names": list(estimate.names),
             "matrix": estimate.covariance,
-            **({} if estimate.type_b is None else {"type_b": estimate.type_b}),
+            **({} if estimate.common is None else {"common": estimate.common}),
         },
         "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in estimate.findings],
         "statistics": estimate.statistics,
@@ -110,7 +110,7 @@ def from_json(data: Mapping[str, Any]) -> Estimate:
         timing=dict(data.get("timing_s", {})),
         result=dict(data.get("result", {})),
         references=tuple(data.get("references", ())),
-        type_b=None if "type_b" not in covariance else _square(covariance["type_b"], len(names)),
+        common=None if "common" not in covariance else _square(covariance["common"], len(names)),
     )
 
 
@@ -154,7 +154,8 @@ def load(path: str | Path) -> Estimate:
             return from_json(plain_objects(tomllib.loads(text)))
         return from_json(json.loads(text))
     except KeyError as error:
-        raise InputError(path, f"the key {error} is missing, {expected}") from error
+        hint = "; `inercal convert --from` reads those of other tools"
+        raise InputError(path, f"the key {error} is missing, {expected}{hint}") from error
     except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise InputError(path, f"{str(error)[:120]}, {expected}") from error
 

@@ -114,7 +114,7 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
             )
     x = np.array([run.values for run in sound])
     elsewhere = np.array(
-        [np.zeros_like(run.covariance) if run.type_b is None else run.type_b for run in sound]
+        [np.zeros_like(run.covariance) if run.common is None else run.common for run in sound]
     )
     own = np.array([run.covariance for run in sound]) - elsewhere
     known = np.mean(elsewhere, axis=0)
@@ -137,7 +137,7 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
         first,
         values=np.sum(weights * x, axis=0),
         covariance=covariance,
-        type_b=known,
+        common=known,
         dof=dof,
         k=np.array([coverage_factor(float(value)) for value in dof]),
         status=status,

@@ -60,8 +60,8 @@ class Estimate:
 
     ``values`` (p,), ``covariance`` (p, p), ``dof`` and ``k`` (p,) belong to ``names`` and ``units``. The
     other fields are the keys of the JSON result of the same names; ``result`` is the command's own part.
-    ``type_b`` (p, p) is the part of the covariance that comes from elsewhere (gravity, the clock, a table) and is
-    the same in repeat runs; None where it was not told apart.
+    ``common`` (p, p) is the part of the covariance that is one and the same error in repeat runs (gravity, the clock, a
+    table); None where it was not told apart.
     """
 
     command: str
@@ -84,7 +84,7 @@ class Estimate:
     timing: Mapping[str, float] = field(default_factory=dict)
     result: Mapping[str, Any] = field(default_factory=dict)
     references: tuple[str, ...] = ()
-    type_b: Array | None = None
+    common: Array | None = None
 
     @property
     def u(self) -> Array:

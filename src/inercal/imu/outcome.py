@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.budget import combine
+from inercal.estimate.budget import combine, common
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
@@ -108,7 +108,7 @@ def assemble(
             "bias_time_s": float(poses.times.mean()),
         },
         references=REFERENCES,
-        type_b=sum((source.covariance for source in known), np.zeros_like(covariance)),
+        common=common(known, len(joint.names)),
     )
 
 

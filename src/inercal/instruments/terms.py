@@ -121,6 +121,9 @@ TERMS: dict[str, Term] = {
 ACCELEROMETER_TRIAD = tuple(term.symbol for term in _ACCELEROMETER)
 """K0, K1 and the upper-triangular M of an accelerometer triad that defines the frame."""
 
+ACCELEROMETERS_IN_A_FRAME = (*ACCELEROMETER_TRIAD, "M_yx", "M_zx", "M_zy")
+"""K0, K1 and all of M, where positions or a table define the frame."""
+
 GYRO_TRIAD = tuple(term.symbol for term in _GYRO if not term.symbol.startswith(("G_", "D_R_")))
 """D_F, S and the six T of a gyro triad."""
 

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
 
-NAMES = (*ACCELEROMETER_TRIAD, "M_yx", "M_zx", "M_zy", *GYRO_TRIAD, *GYRO_G_SENSITIVITY)
+NAMES = (*ACCELEROMETERS_IN_A_FRAME, *GYRO_TRIAD, *GYRO_G_SENSITIVITY)
 """The 33 coefficients in the order of results."""
 
 _MISALIGNMENTS = [("xyz".index(i), "xyz".index(j)) for i, j in ("xy", "xz", "yz", "yx", "zx", "zy")]

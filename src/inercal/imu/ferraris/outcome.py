@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.budget import combine
+from inercal.estimate.budget import combine, common
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.ferraris.method import NAMES, coefficients
@@ -103,6 +103,7 @@ def assemble(
             "unit": {"acc": acc_unit, "gyro": gyro_unit},
         },
         references=REFERENCES,
+        common=common(known, len(NAMES)),
     )
 
 

@@ -109,9 +109,9 @@ def type_b(
     by, scatter = p.by, p.scatter
     sources = [TypeB(i.source, i.u, i.unit, by["gravity"] * i.sensitivity) for i in site.inputs]
     if options.turn_u > 0.0:
-        sources.append(TypeB("turn angle", options.turn_u, "rad", by["angles"]))
+        sources.append(TypeB("turn angle", options.turn_u, "rad", by["angles"], redrawn=True))
     if scatter.tilt > 0.0 and math.isinf(scatter.tilt_dof):
-        sources.append(TypeB("alignment", scatter.tilt, "rad", alignment(p, scatter.tilt)))
+        sources.append(TypeB("alignment", scatter.tilt, "rad", alignment(p, scatter.tilt), redrawn=True))
     if time_base_u > 0.0:
         scaled = by["durations"] @ p.readings.inputs.durations
         sources.append(TypeB("time base", time_base_u, "1", scaled))
@@ -119,7 +119,13 @@ def type_b(
         sources.append(TypeB("vertical earth rate", site.vertical_rate_u, "rad/s", by["vertical_rate"]))
     if site.horizontal_rate_u > 0.0:
         sources.append(
-            TypeB("horizontal earth rate", site.horizontal_rate_u, "rad/s", _horizontal_earth_rate(p))
+            TypeB(
+                "horizontal earth rate",
+                site.horizontal_rate_u,
+                "rad/s",
+                _horizontal_earth_rate(p),
+                redrawn=True,
+            )
         )
     return [*sources, *_coarse(p, acc_unit, gyro_unit), *_unequal_holds(p)]
 
@@ -162,4 +168,4 @@ def _unequal_holds(p: Propagation) -> list[TypeB]:
     if size == 0.0:
         return []
     shift = p.by["rate"].sum(axis=1) @ p.found.apparent_g @ mean / size
-    return [TypeB("unequal holds", size, "m/s^2", shift)]
+    return [TypeB("unequal holds", size, "m/s^2", shift, redrawn=True)]

@@ -75,7 +75,7 @@ def fit_calibrations(
     for k, name in enumerate(first.names):
         y = np.array([estimate.values[k] for estimate in estimates])
         # what comes from elsewhere moves all alike: it belongs to the values, not to their change
-        known = np.array([0.0 if e.type_b is None else e.type_b[k, k] for e in estimates])
+        known = np.array([0.0 if e.common is None else e.common[k, k] for e in estimates])
         variances = np.array([e.covariance[k, k] for e in estimates])
         own = np.maximum(variances - known, 1e-12 * variances)
         fits = [

@@ -104,7 +104,8 @@ def fit_points(
     """Fit values (n,) with variances (n,) at single temperatures (n,) [degC].
 
     Scatter beyond the variances widens the covariance (Birge's ratio), with n - p degrees of freedom; scatter below
-    does not narrow it. All values share an error of variance ``common``, which goes to the constant.
+    does not narrow it. All values share an error of variance ``common``, which goes to the constant and is known: the
+    degrees of freedom of the constant are those of both together (Welch-Satterthwaite).
     """
     d = temperature - reference
     size = float(np.max(np.abs(d)))
@@ -113,12 +114,14 @@ def fit_points(
     scale = np.concatenate([size ** -np.arange(float(terms)), np.ones(more.shape[1])])
     birge = max(1.0, fit.s2) if fit.dof > 0 else 1.0
     covariance = birge * fit.unit_covariance * np.outer(scale, scale)
+    dof = np.full(len(scale), float(fit.dof) if birge > 1.0 else np.inf)
+    dof[0] *= (1.0 + common / covariance[0, 0]) ** 2
     covariance[0, 0] += common
     return Cubic(
         reference,
         fit.beta * scale,
         covariance,
-        np.full(len(scale), float(fit.dof) if birge > 1.0 else np.inf),
+        dof,
         fit.residuals,
         terms=terms,
     )

@@ -1,0 +1,134 @@
+"""Calibration of an IMU against a table's angles: a record and settings in, an estimate out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import Estimate
+from inercal.estimate.status import Status
+from inercal.imu.aided.blocks import Blocks, cut
+from inercal.imu.aided.coefficients import gain_names
+from inercal.imu.aided.fit import Fit, fit
+from inercal.imu.aided.model import side_of, unknowns
+from inercal.imu.aided.outcome import assemble, timed, without_fit
+from inercal.imu.aided.settings import AidedSettings
+from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, tells, travel
+from inercal.imu.aided.table import Motion, motion_of, shifted
+from inercal.imu.aided.walk import whiten
+from inercal.imu.settings import ImuSettings
+from inercal.records.findings import Finding
+from inercal.records.record import Record
+
+Array = NDArray[np.float64]
+
+
+LEAST_TRAVEL = np.radians(10.0)
+"""Travel of a table's axes [rad] below which nothing is to be calibrated."""
+
+
+@dataclass(frozen=True, eq=False)
+class AidedCalibration:
+    """An ``estimate``, the table's ``motion`` and ``rests`` (k, 2) [s], and the ``fit`` if there is one."""
+
+    estimate: Estimate
+    motion: Motion
+    rests: Array
+    fit: Fit | None = None
+
+
+def calibrate_aided(
+    record: Record,
+    settings: ImuSettings,
+    options: AidedSettings,
+    progress: Callable[[str], None] = lambda _: None,
+) -> AidedCalibration:
+    """Calibrate the accelerometers, and the gyro if the record has one, against the angles of a table.
+
+    Parameters
+    ----------
+    record : Record
+        ``acc_x..z`` and perhaps ``gyro_x..z``, in any unit, counts included, and the chain's joints ``phi1``,
+        ``phi2`` (``phi3``), on the same or another clock.
+    settings : ImuSettings
+        Site and options.
+    options : AidedSettings
+        The table.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    AidedCalibration
+        Its estimate's status says whether the values can be used; nothing is raised for a poor fit.
+
+    Raises
+    ------
+    RecordError
+        The record has no accelerometers or no angles, or not of the same test.
+    """
+    _warm_up()
+    clock = time.perf_counter()
+    progress("comparing the sensors with the table's angles")
+    motion = motion_of(record, options.chain)
+    rests = motion.rests()
+    triads = [record.triad("acc")]
+    said = []
+    if any(f"gyro_{axis}" in record for axis in "xyz"):
+        triads.append(record.triad("gyro"))
+    else:
+        said.append(Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated"))
+    blocks = [cut(triad, motion, rests) for triad in triads]
+    late = lag(blocks[1], motion) if len(blocks) > 1 else 0.0
+    if late != 0.0:
+        motion, rests = shifted(motion, -late), rests - late
+        blocks = [cut(triad, motion, rests) for triad in triads]
+    scales: dict[str, float] = {}
+    wrong = []
+    for each in blocks:
+        sensor, x = each.triad.sensor, expected(each, motion)
+        scales[sensor] = 1.0 / each.triad.unit.factor
+        if tells(sensor, x):
+            found = agreement(each.y, x)
+            if found.miss > MISFIT:
+                wrong.append(f"{sensor} leaves {100.0 * found.miss:.0f} %")
+            scales[sensor] = found.scale / (settings.site.gravity if sensor == "acc" else 1.0)
+    bad = None
+    if travel(motion) < LEAST_TRAVEL:
+        said_of_it = (
+            f"the table turns by {np.degrees(travel(motion)):.2g} deg only: turn each axis of the instrument up and "
+            "down (and check whether the angles are in deg or rad)"
+        )
+        bad = Status.UNOBSERVABLE, said_of_it
+    elif wrong:
+        bad = Status.INCONSISTENT, _contradiction(wrong, blocks, motion)
+    if bad is not None:
+        estimate = without_fit(record, settings, *bad)
+        return AidedCalibration(timed(estimate, time.perf_counter() - clock), motion, rests)
+    progress("fitting all sensors")
+    known = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
+    sides = [side_of(each, motion, rests, known) for each in blocks]
+    names = {side.sensor: gain_names(side.sensor, settings.g_sensitivity) for side in sides}
+    done = fit(sides, motion, known, settings.site.gravity, names)
+    estimate = assemble(record, motion, rests, done, late, settings, said)
+    return AidedCalibration(timed(estimate, time.perf_counter() - clock), motion, rests, done)
+
+
+def _contradiction(wrong: list[str], blocks: list[Blocks], motion: Motion) -> str:
+    """Outputs that do not follow the table, and what would make sense of them."""
+    found = list(cures(blocks, motion))
+    what = "check the order, signs and units of the angles and of the sensors' axes, and the mounting"
+    if found:
+        what = "all would fit if " + ", or if ".join(found)
+    unexplained = f"{' and '.join(wrong)} of its variation unexplained"
+    return f"the outputs do not follow the table's angles ({unexplained}): {what}"
+
+
+def _warm_up() -> None:
+    """Load or compile the kernels: no part of the computation."""
+    t = np.arange(3.0)
+    whiten(np.ones((3, 1)), t, np.ones(3), 1.0).information()

@@ -1,0 +1,189 @@
+"""Everything that is not known of an IMU on a table, and the linear equations of each sensor in it.
+
+    accelerometer i :  y = B_i (f + A r_i) + bias ,    gyro i :  y = B_i (omega + C h) + G_i f + bias
+
+B = S M and S T are the gains; f, omega, C the table's force, rate and attitude, for angles that come late by a shift;
+A r the acceleration of a sensor that sits r beside the crossing of the axes; h earth rate in n; and all of them turned
+by the errors of the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.geometry.earth import EARTH_RATE
+from inercal.geometry.site import Site
+from inercal.imu.aided.blocks import Blocks, Reference
+from inercal.imu.aided.settings import AidedSettings
+from inercal.imu.aided.table import Motion, error_nodes
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+SHIFT_U = 1.0
+"""Prior standard deviation [s] of what the angles come late by, after a search in whole blocks."""
+
+ARM_U = 0.5
+"""Prior standard deviation [m] of the place of a sensor beside the crossing of the axes, along each axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """All unknowns (P,) but the biases: where each group is, prior ``mean`` and ``sd``, both (P,).
+
+    The priors of ``stated`` groups are knowledge: earth rate, and the errors of the table.
+    """
+
+    places: Mapping[str, Indices]
+    mean: Array
+    sd: Array
+    units: Mapping[str, str]
+    stated: frozenset[str]
+
+
+def unknowns(
+    site: Site, options: AidedSettings, scales: Mapping[str, float], rests: int, g_sensitivity: bool
+) -> Unknowns:
+    """Lay out the unknowns.
+
+    Parameters
+    ----------
+    site : Site
+    options : AidedSettings
+    scales : mapping
+        Scale factor [output per SI unit] to begin with, of ``acc`` and, where there is a gyro, ``gyro``.
+    rests : int
+        How many rests the table has: its errors have a value in each.
+    g_sensitivity : bool
+    """
+    groups: list[tuple[str, Array, Array, str]] = [
+        (f"time shift of {sensor}", np.zeros(1), np.full(1, SHIFT_U), "s") for sensor in scales
+    ]
+    groups.append(("lever arm", np.zeros(9), np.full(9, ARM_U), "m"))
+    if "gyro" in scales:
+        groups.append(("earth rate", *_earth(site, options), "rad/s"))
+    for error in options.chain.errors:
+        if error.is_offset or error.scope.value == "sample":
+            continue
+        count = 1 if error.scope.constant else max(rests, 1)
+        groups.append((error.name, np.zeros(count), np.full(count, error.distribution.std), "rad"))
+    for sensor, scale in scales.items():
+        groups.append((f"gain {sensor}", scale * np.eye(3).ravel(), np.full(9, scale), "1"))
+    if g_sensitivity and "gyro" in scales:
+        groups.append(("gain G", np.zeros(9), np.full(9, 0.1 * scales["gyro"] / site.gravity), "1"))
+    ends = np.cumsum([0, *(len(mean) for _, mean, _, _ in groups)])
+    places = {name: np.arange(a, b) for (name, *_), a, b in zip(groups, ends[:-1], ends[1:], strict=True)}
+    return Unknowns(
+        places,
+        np.concatenate([mean for _, mean, _, _ in groups]),
+        np.concatenate([sd for _, _, sd, _ in groups]),
+        {name: unit for name, _, _, unit in groups},
+        frozenset(name for name in places if name == "earth rate" or name in options.chain.factors),
+    )
+
+
+def _earth(site: Site, options: AidedSettings) -> tuple[Array, Array]:
+    """Mean and standard deviation (3,) of earth rate north, west and up [rad/s]."""
+    up, up_u = site.vertical_rate, site.vertical_rate_u
+    least = 1e-9 * EARTH_RATE
+    if options.azimuth_u is None or site.latitude is None:
+        across = max(site.horizontal_rate_u, least)
+        return np.array([0.0, 0.0, up]), np.array([across, across, max(up_u, least)])
+    north = EARTH_RATE * math.cos(site.latitude)
+    north_u = EARTH_RATE * abs(math.sin(site.latitude)) * site.latitude_u
+    west_u = min(options.azimuth_u, 1.0) * north
+    return np.array([north, 0.0, up]), np.maximum([north_u, west_u, up_u], least)
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One triad on the table: its blocks, and the turns ``errors`` (n, 3, Q) that unit errors of the table make.
+
+    They act on the mean force as ``force x errors``, on the mean rate as ``rate_errors`` (n, 3, Q).
+    """
+
+    sensor: str
+    blocks: Blocks
+    errors: Array
+    rate_errors: Array
+    error_places: Indices
+
+    def rate_change(self, rate: Array) -> Array:
+        """(n, 3, Q): change of the mean rate by the errors, ``phi' + omega x phi``."""
+        return self.rate_errors + np.cross(rate[:, :, None], self.errors, axis=1)
+
+
+def side_of(blocks: Blocks, motion: Motion, rests: Array, known: Unknowns) -> Side:
+    """Prepare a triad."""
+    at = {
+        k: _turns(motion, t, rests)
+        for k, t in enumerate((blocks.nodes[:, 0], blocks.middle, blocks.nodes[:, -1]))
+    }
+    names = [error.name for error in motion.chain.errors if error.name in known.places]
+    places = np.concatenate([known.places[name] for name in names]) if names else np.zeros(0, dtype=np.int64)
+    change = (at[2] - at[0]) / blocks.length[:, None, None]
+    return Side(blocks.triad.sensor, blocks, at[1], change, places)
+
+
+def _turns(motion: Motion, t: Array, rests: Array) -> Array:
+    """(n, 3, Q): turn of the instrument by unit errors at times t."""
+    found = [nodes.slopes[:, :, None] * nodes.hats[:, None, :] for nodes in error_nodes(motion, t, rests)]
+    return np.concatenate(found, axis=-1) if found else np.zeros((len(t), 3, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """One sensor: ``residual`` (n,) of its blocks, ``columns`` (n, a) their derivatives by the unknowns ``index``."""
+
+    index: Indices
+    columns: Array
+    residual: Array
+
+
+def equations(side: Side, ref: Reference, known: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
+    """The three sensors of a triad at unknowns ``x`` (P,)."""
+    places = known.places
+    B = x[places[f"gain {side.sensor}"]].reshape(3, 3)
+    force = gravity * ref.C_bn[:, :, 2]
+    if side.sensor == "acc":
+        errors = np.cross(force[:, :, None], side.errors, axis=1)
+        slope = gravity * ref.C_slope[:, :, 2]
+    else:
+        h = x[places["earth rate"]]
+        errors = side.rate_change(ref.rate)
+        slope = ref.rate_slope + ref.C_slope @ h
+    turned = errors @ x[side.error_places]
+    for i in range(3):
+        if side.sensor == "acc":
+            own, label = ref.arm, places["lever arm"][3 * i : 3 * i + 3]
+            # the gain does not act on the lever arm in the derivatives: else an arm would seem to tell of it
+            true = force + turned
+        else:
+            own, label = ref.C_bn, places["earth rate"]
+            true = ref.rate + turned + ref.C_bn @ h
+        index = [
+            places[f"gain {side.sensor}"][3 * i : 3 * i + 3],
+            places[f"time shift of {side.sensor}"],
+            label,
+            side.error_places,
+        ]
+        columns = [
+            true,
+            (slope @ B[i])[:, None],
+            np.einsum("j,njk->nk", B[i], own),
+            np.einsum("j,njq->nq", B[i], errors),
+        ]
+        predicted = true @ B[i]
+        if side.sensor == "acc":
+            predicted = predicted + columns[2] @ x[label]
+        if side.sensor == "gyro" and "gain G" in places:
+            G_i = places["gain G"][3 * i : 3 * i + 3]
+            index.append(G_i)
+            columns.append(force)
+            predicted = predicted + force @ x[G_i]
+        yield Equation(np.concatenate(index), np.hstack(columns), side.blocks.y[:, i] - predicted)

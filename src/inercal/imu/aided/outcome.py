@@ -1,0 +1,191 @@
+"""The estimate of a calibration on a table: values, covariance, budget, tables, conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.budget import combine, common
+from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.estimate.status import Status
+from inercal.imu.aided.coefficients import (
+    coefficients,
+    names_of,
+    of_triad,
+    standard_uncertainty,
+    type_a,
+    type_b,
+)
+from inercal.imu.aided.fit import Fit
+from inercal.imu.aided.table import Motion
+from inercal.imu.aided.verdict import findings, verdict
+from inercal.imu.settings import ImuSettings
+from inercal.instruments.terms import TERMS
+from inercal.records.findings import Finding
+from inercal.records.record import Record
+
+Array = NDArray[np.float64]
+
+COMMAND = "calibrate imu"
+
+MODEL = (
+    "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along frame "
+    "axis j), all of M; accelerometers: K1, M, K0; gyro: S, T, D_F, and + G f where g-sensitivity is estimated. The "
+    "biases take random walks; K0 and D_F are their means over the test."
+)
+
+FRAME = "b, nominal axes of the instrument on the inner axis of the table"
+
+REFERENCES = (
+    "A. C. Harvey, Forecasting, structural time series models and the Kalman filter, Cambridge University Press (1989)",
+    "S. J. Koopman, Disturbance smoother for state space models, Biometrika 80 (1993) 117",
+    "H. D. Patterson, R. Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58 "
+    "(1971) 545",
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+)
+
+
+def assemble(
+    record: Record,
+    motion: Motion,
+    rests: Array,
+    fit: Fit,
+    lag: float,
+    settings: ImuSettings,
+    said: list[Finding],
+) -> Estimate:
+    """Put the estimate together."""
+    triads = tuple(fit.known)
+    names = names_of(triads, settings.g_sensitivity)
+    values, rows, own = coefficients(fit, names)
+    sources_a = type_a(fit, rows, own, names)
+    sources_b = type_b(fit, rows, names, values, settings.site, settings.time_base_u)
+    covariance, dof, budget = combine(names, [*sources_a, *sources_b])
+    u = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    status, message = verdict(fit, dict(zip(names, values.tolist(), strict=True)), u, len(rests))
+    symbols = {triad: of_triad(fit, triad)[0].side.blocks.triad.unit.symbol for triad in triads}
+    units = [
+        TERMS[name].unit_for(symbols["acc" if name.startswith(("K", "M")) else "gyro"]) for name in names
+    ]
+    return Estimate(
+        command=COMMAND,
+        names=names,
+        units=tuple(units),
+        values=values,
+        covariance=covariance,
+        dof=dof,
+        k=np.array([coverage_factor(float(value)) for value in dof]),
+        status=status,
+        message=message,
+        findings=(*record.findings, *said, *findings(fit, lag)),
+        statistics=_statistics(fit, rests),
+        budget=budget,
+        model=MODEL,
+        conditions=_conditions(fit, settings),
+        traceability=settings.traceability,
+        inputs=record.sources,
+        provenance=provenance(settings.given),
+        result={
+            "method": "aided",
+            "rests": rest_table(fit, motion, rests),
+            "time_shift_s": {triad: _with_u(fit, f"time shift of {triad}", lag) for triad in triads},
+            "lever_arm_m": _with_u(fit, "lever arm"),
+            "noise": {triad: _noise(fit, triad) for triad in triads},
+            "unit": symbols,
+        },
+        references=REFERENCES,
+        common=common(sources_b, len(names)),
+    )
+
+
+def without_fit(record: Record, settings: ImuSettings, status: Status, message: str) -> Estimate:
+    """The estimate of a test that cannot be fitted: no parameters, but why."""
+    return without_parameters(
+        COMMAND,
+        status,
+        message,
+        findings=record.findings,
+        model=MODEL,
+        traceability=settings.traceability,
+        inputs=record.sources,
+        provenance=provenance(settings.given),
+        result={"method": "aided", "rests": []},
+        references=REFERENCES,
+    )
+
+
+def _statistics(fit: Fit, rests: Array) -> dict[str, float]:
+    """Numbers about the fit."""
+    found: dict[str, float] = {"rests": float(len(rests))}
+    for triad, prefix in (("acc", ""), ("gyro", "gyro_")):
+        if triad in fit.known:
+            sensors = of_triad(fit, triad)
+            squares = [np.mean(sensor.residual**2) for sensor in sensors]
+            found |= {
+                f"{prefix}dof": float(3 * (len(sensors[0].residual) - 1) - len(fit.known[triad].names)),
+                f"{prefix}condition": fit.known[triad].condition,
+                f"{prefix}residual_rms": float(np.sqrt(np.mean(squares))),
+            }
+    return found
+
+
+def _with_u(fit: Fit, group: str, offset: float = 0.0) -> dict[str, list[float]]:
+    """A group of unknowns with its standard uncertainties."""
+    values = fit.x[fit.unknowns.places[group]] + offset
+    return {"value": values.tolist(), "u": standard_uncertainty(fit, group).tolist()}
+
+
+def _noise(fit: Fit, triad: str) -> dict[str, list[float]]:
+    """Levels of noise of the three sensors [output]."""
+    levels = [sensor.noise for sensor in of_triad(fit, triad)]
+    return {
+        "white_at_rest": [level.resting for level in levels],
+        "white_turning": [level.moving for level in levels],
+        "walk": [level.walk for level in levels],
+    }
+
+
+def rest_table(fit: Fit, motion: Motion, rests: Array) -> list[Mapping[str, Any]]:
+    """One row for each rest: time, angles, and the mean residuals of the sensors."""
+    rows: list[Mapping[str, Any]] = []
+    for start, end in rests:
+        row: dict[str, Any] = {"start_s": float(start), "end_s": float(end)}
+        row["angles_rad"] = motion.at(np.array(0.5 * (start + end))).tolist()
+        for triad in fit.known:
+            sensors = of_triad(fit, triad)
+            blocks = sensors[0].side.blocks
+            inside = (blocks.middle >= start) & (blocks.middle <= end)
+            if inside.any():
+                row[f"residual_{triad}"] = [float(np.mean(sensor.residual[inside])) for sensor in sensors]
+        rows.append(row)
+    return rows
+
+
+def _conditions(fit: Fit, settings: ImuSettings) -> dict[str, Any]:
+    """Conditions and ranges over which the result is valid, as recorded."""
+    temperature, g = settings.temperature, settings.site.gravity
+    blocks = of_triad(fit, "acc")[0].side.blocks
+    ranges: dict[str, Any] = {
+        "specific_force_along_an_axis_m_s2": [-g, g],
+        "duration_s": float(blocks.nodes[-1, -1] - blocks.nodes[0, 0]),
+        "rate_hz": blocks.triad.rate,
+    }
+    if "gyro" in fit.known:
+        rate = fit.references["gyro"].rate
+        ranges["rate_about_an_axis_rad_s"] = [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()]
+    return {
+        "frame": FRAME,
+        "temperature": None if temperature is None else temperature.text,
+        "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
+        "date": settings.traceability.get("date", ""),
+        "ranges": ranges,
+    }
+
+
+def timed(estimate: Estimate, seconds: float) -> Estimate:
+    """The estimate with the time of its solution."""
+    return replace(estimate, timing={"solve": seconds})

@@ -1,0 +1,154 @@
+"""Whether the sensors and the table's angles agree at all, and what would make them: units, signs, axes, clocks."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.imu.aided.blocks import Blocks, small_turn
+from inercal.imu.aided.settings import mountings
+from inercal.imu.aided.table import Motion
+
+Array = NDArray[np.float64]
+
+MISFIT = 0.35
+"""Part of the output's variation that a sound table leaves unexplained at most; misalignments leave some 0.05."""
+
+SLOWEST = np.radians(0.5)
+"""Fastest turn [rad/s] below which the gyro says nothing about the angles."""
+
+LEAST_FORCE = 0.3
+"""Change of the specific force, over gravity, below which the accelerometers say nothing about the angles."""
+
+LONGEST_LAG = 60.0
+"""Time [s] by which the clocks of table and instrument are searched for a shift."""
+
+_FACTORS = ((1.0, ""), (180.0 / np.pi, "57.3 times as large"), (np.pi / 180.0, "57.3 times as small"))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How an output follows what the table says: ``scale`` [output per SI unit], and ``miss``, the rms it leaves over
+    the rms of the output's variation."""
+
+    scale: float
+    miss: float
+
+
+def agreement(y: Array, x: Array) -> Agreement:
+    """Fit ``y = scale x + bias``, one scale for the three axes of (n, 3)."""
+    dy, dx = y - y.mean(axis=0), x - x.mean(axis=0)
+    scale = float(np.sum(dx * dy) / max(float(np.sum(dx * dx)), 1e-300))
+    size = float(np.sum(dy * dy))
+    if scale <= 0.0 or size == 0.0:
+        return Agreement(scale, 1.0)
+    return Agreement(scale, float(np.sqrt(np.sum((dy - scale * dx) ** 2) / size)))
+
+
+def expected(blocks: Blocks, motion: Motion) -> Array:
+    """Specific force in units of gravity, or rate [rad/s], (n, 3) on the instrument's axes, roughly."""
+    if blocks.triad.sensor == "acc":
+        return motion.attitude(blocks.middle)[:, 2, :]
+    first, last = motion.attitude(blocks.nodes[:, 0]), motion.attitude(blocks.nodes[:, -1])
+    return np.asarray(small_turn(np.swapaxes(first, 1, 2) @ last) / blocks.length[:, None])
+
+
+def travel(motion: Motion) -> float:
+    """Largest angle [rad] between two attitudes about one axis of the table."""
+    return float(np.max(np.ptp(motion.angles, axis=0)))
+
+
+def tells(sensor: str, x: Array) -> bool:
+    """Whether what the table says of a triad, as from `expected`, varies enough for its output to be compared."""
+    return bool(np.max(np.ptp(x, axis=0)) > (LEAST_FORCE if sensor == "acc" else SLOWEST))
+
+
+def lag(blocks: Blocks, motion: Motion) -> float:
+    """Time [s] in whole blocks by which the angles come late, by when table and gyro turn; 0 unless clearly better."""
+    told = np.linalg.norm(expected(blocks, motion), axis=1)
+    seen = np.linalg.norm(blocks.y - np.median(blocks.y, axis=0), axis=1)
+    told, seen = told - told.mean(), seen - seen.mean()
+    size = np.linalg.norm(told) * np.linalg.norm(seen)
+    if size == 0.0:
+        return 0.0
+    both = np.correlate(told, seen, mode="full") / size
+    middle, length = len(seen) - 1, float(np.median(blocks.length))
+    reach = min(int(LONGEST_LAG / length), len(seen) // 2)
+    near = both[middle - reach : middle + reach + 1]
+    best = int(np.argmax(near)) - reach
+    return best * length if near[best + reach] > both[middle] + 0.1 else 0.0
+
+
+def cures(sides: list[Blocks], motion: Motion) -> Iterator[str]:
+    """What, in words, would make sense of outputs that do not follow the table."""
+    found = []
+    for words, other in _angles(motion):
+        misses = [agreement(each.y, expected(each, other)).miss for each in sides]
+        if max(misses) < MISFIT:
+            found.append((sum(misses), words))
+    identity = ("+x", "+y", "+z")
+    told = [expected(each, motion) for each in sides]
+    for axes, turn in mountings().items():
+        misses = [agreement(each.y, x @ turn).miss for each, x in zip(sides, told, strict=True)]
+        if axes != identity and max(misses) < MISFIT:
+            found.append((sum(misses), _mounted(motion, turn)))
+    if found:
+        yield from (words for _, words in sorted(found)[:3])
+        return
+    for each, x in zip(sides, told, strict=True):
+        yield from _channels(each, x)
+
+
+def _angles(motion: Motion) -> Iterator[tuple[str, Motion]]:
+    """Other readings of the angles, and what they say."""
+    joints = motion.chain.joints
+    for factor, size in _FACTORS:
+        for order in itertools.permutations(range(len(joints))):
+            for signs in itertools.product((1.0, -1.0), repeat=len(joints)):
+                said = []
+                if size:
+                    said.append(f"the angles are {size} (check whether they are in deg or rad)")
+                if order != tuple(range(len(joints))):
+                    said.append(f"the columns {', '.join(joints)} are exchanged")
+                wrong = [name for name, sign in zip(joints, signs, strict=True) if sign < 0.0]
+                if wrong:
+                    said.append(f"the sign of {' and '.join(wrong)} is reversed")
+                if said and len(said) < 3:
+                    angles = factor * motion.angles[:, order] * np.array(signs)
+                    yield " and ".join(said), replace(motion, angles=angles)
+
+
+def _mounted(motion: Motion, turn: Array) -> str:
+    """The mounting that turns the nominal axes by a rotation, as the study would say it."""
+    from inercal.rigs.chain import Fixed
+
+    last = [each.rotation for each in motion.chain.elements if isinstance(each, Fixed)]
+    whole = (last[-1] if last else np.eye(3)) @ turn
+    axes = [
+        f"{'+' if column.sum() > 0 else '-'}{'xyz'[int(np.argmax(np.abs(column)))]}" for column in whole.T
+    ]
+    quoted = ", ".join(f'"{axis}"' for axis in axes)
+    return f"the instrument is mounted with imu.aided.mounting = [{quoted}]"
+
+
+def _channels(blocks: Blocks, x: Array) -> Iterator[str]:
+    """Other signs or another order of a triad's own axes."""
+    sensor = blocks.triad.sensor
+    if agreement(blocks.y, x).miss < MISFIT:
+        return
+    miss, order, signs = min(
+        (agreement(blocks.y, x[:, order] * np.array(signs)).miss, order, signs)
+        for order in itertools.permutations(range(3))
+        for signs in itertools.product((1.0, -1.0), repeat=3)
+    )
+    if miss < MISFIT:
+        measured = ", ".join(
+            f"{sensor}_{name} measures {'+' if sign > 0 else '-'}{'xyz'[axis]}"
+            for name, axis, sign in zip("xyz", order, signs, strict=True)
+            if axis != "xyz".index(name) or sign < 0
+        )
+        yield f"{measured} of the mounting that is stated"

@@ -1,0 +1,153 @@
+"""The table during a test: its angles over time, where it rests, and how its errors turn the instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import RecordError
+from inercal.records.record import Record
+from inercal.rigs.chain import Chain, Error, Scope
+
+Array = NDArray[np.float64]
+
+STILL = np.radians(0.1)
+"""Speed of an axis [rad/s] below which the table rests."""
+
+WINDOW = 0.5
+"""Time [s] over which that speed is taken, so that the noise of encoders does not show as speed."""
+
+SHORTEST = 1.0
+"""Shortest rest [s]."""
+
+FASTEST = np.radians(3000.0)
+"""Speed [rad/s] that no table has: the angle jumps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Angles (m, joints) [rad] of the chain's joints at times ``t`` (m,) [s], without jumps at full turns."""
+
+    chain: Chain
+    t: Array
+    angles: Array
+    path: str
+
+    def at(self, t: Array) -> Array:
+        """Angles (*t.shape, joints) [rad]; held beyond the ends.
+
+        By cubics through neighbouring angles: straight lines would cut the corners of every turn, and a rate that
+        is always found too small or too large is a scale factor.
+        """
+        return np.asarray(self._cubics(np.clip(t, self.t[0], self.t[-1])))
+
+    @cached_property
+    def _cubics(self) -> Callable[[Array], Array]:
+        """Cubic through each pair of angles, with the slopes of parabolas through three."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        slopes = np.gradient(self.angles, self.t, axis=0, edge_order=1)
+        return CubicHermiteSpline(self.t, self.angles, slopes)
+
+    def attitude(self, t: Array) -> Array:
+        """Nominal attitude C_nb (*t.shape, 3, 3)."""
+        return self._nominal.attitude(self.at(t))
+
+    @cached_property
+    def _nominal(self) -> Chain:
+        """The table without its errors."""
+        return Chain(tuple(each for each in self.chain.elements if not isinstance(each, Error)))
+
+    @property
+    def step(self) -> float:
+        """Median interval of the angles [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    def rests(self) -> Array:
+        """Begin and end (k, 2) [s] of the rests."""
+        half = 0.5 * WINDOW
+        moved = self.at(self.t + half) - self.at(self.t - half)
+        still = np.all(np.abs(moved) < STILL * WINDOW, axis=1)
+        edges = np.diff(still.astype(np.int8), prepend=0, append=0)
+        starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+        spans = np.column_stack([self.t[starts], self.t[stops]])
+        return spans[spans[:, 1] - spans[:, 0] >= SHORTEST]
+
+
+def motion_of(record: Record, chain: Chain) -> Motion:
+    """The table's motion in a record.
+
+    Raises
+    ------
+    RecordError
+        An angle is missing, or jumps faster than any table turns.
+    """
+    path = record.sources[0].path if record.sources else "record"
+    missing = [name for name in chain.joints if name not in record]
+    if missing:
+        raise RecordError(
+            path,
+            f"found no column {' and no column '.join(missing)}, expected the table's angles "
+            f'{", ".join(chain.joints)} (a calibration without a table has imu.method = "multiposition")',
+        )
+    columns = [record[name] for name in chain.joints]
+    t = columns[0].t
+    values = np.column_stack([np.interp(t, c.t, c.si()) if c.t is not t else c.si() for c in columns])
+    known = np.isfinite(values).all(axis=1) & np.isfinite(t)
+    t, values = t[known], values[known]
+    rising = np.r_[True, np.diff(t) > 0]
+    t, values = t[rising], values[rising]
+    if len(t) < 10:
+        raise RecordError(path, f"found {len(t)} rows with angles, expected the table's angles over the test")
+    angles = np.unwrap(values, axis=0)
+    speed = np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None]
+    row, joint = np.unravel_index(int(np.argmax(speed)), speed.shape)
+    if speed[row, joint] > FASTEST:
+        jump = np.degrees(angles[row + 1, joint] - angles[row, joint])
+        raise RecordError(
+            path,
+            f"{chain.joints[joint]} jumps by {jump:.4g} deg at t {t[row]:.2f} s, expected the angles that the table "
+            "passes through, as its encoders give them",
+        )
+    return Motion(chain, t, angles, path)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorNodes:
+    """An error of the table as unknowns: one for the test, or one for each rest with straight lines between.
+
+    ``slopes`` (n, 3) [rad/rad] turn of the instrument, in its own axes, by the error at its nodes' times;
+    ``hats`` (n, q) the part of each unknown in the error at those times.
+    """
+
+    error: Error
+    slopes: Array
+    hats: Array
+
+
+def error_nodes(motion: Motion, t: Array, rests: Array) -> Iterator[ErrorNodes]:
+    """The errors of the table at times ``t`` (n,); offsets turn nothing and are left out."""
+    chain = motion.chain
+    if not chain.errors:
+        return
+    angles = motion.at(t)
+    C_nb = motion.attitude(t)
+    turned = np.einsum("nji,nkjl->nkil", C_nb, chain.slopes(angles))
+    vectors = np.stack([turned[..., 2, 1], turned[..., 0, 2], turned[..., 1, 0]], axis=-1)
+    each_rest = np.stack(
+        [np.interp(t, rests.ravel(), np.repeat(row, 2)) for row in np.eye(len(rests))], axis=-1
+    ) if len(rests) else np.ones((len(t), 1))  # fmt: skip
+    for k, error in enumerate(chain.errors):
+        if error.is_offset or error.scope is Scope.SAMPLE:
+            continue
+        hats = np.ones((len(t), 1)) if error.scope.constant else each_rest
+        yield ErrorNodes(error, vectors[:, k], hats)
+
+
+def shifted(motion: Motion, by: float) -> Motion:
+    """The motion ``by`` [s] later."""
+    return replace(motion, t=motion.t + by)

@@ -1,0 +1,137 @@
+"""What to say of a calibration on a table: its status in words, and its findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import rounded
+from inercal.estimate.status import Status
+from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
+from inercal.imu.aided.fit import Fit
+from inercal.records.findings import Finding
+from inercal.records.places import counted
+
+Array = NDArray[np.float64]
+
+WORST_CONDITION = 50.0
+"""Condition of what the data tell of a triad's gains, beyond which it is called ill-conditioned; good tests have 1
+to 5."""
+
+HARDLY = 0.1
+"""Standard uncertainty of a scale factor over its value, or of a misalignment [rad], beyond which the data say next to
+nothing of it."""
+
+DRIFT = 10.8
+"""Twice the gain of the log likelihood beyond which a bias wanders for certain (chi-square of 1, p = 0.001)."""
+
+_WORDS = {"acc": "accelerometers", "gyro": "gyro"}
+_INPUT = {"acc": "specific force", "gyro": "rate"}
+_CURE = {
+    "acc": "add rests with each axis of the instrument up and down",
+    "gyro": "add turns about each axis of the instrument",
+}
+
+
+def verdict(fit: Fit, values: Mapping[str, float], u: Mapping[str, float], rests: int) -> tuple[Status, str]:
+    """Status and message; ``values`` and standard uncertainties ``u`` of the coefficients by name."""
+    triads = tuple(fit.known)
+    for triad in triads:
+        wrong = _unit_words(fit, triad)
+        if wrong:
+            return Status.INCONSISTENT, wrong
+    for triad in triads:
+        known = fit.known[triad]
+        weak = [name for name in known.names if _relative(name, values, u) > HARDLY]
+        if weak:
+            return (
+                Status.UNOBSERVABLE,
+                f"the test says next to nothing of {_listed(weak)} ({_least(fit, triad)}): {_CURE[triad]}",
+            )
+    for triad in triads:
+        known = fit.known[triad]
+        if known.condition > WORST_CONDITION:
+            term = known.leading_term()
+            return (
+                Status.ILL_CONDITIONED,
+                f"the test hardly fixes {term} ({' ± '.join(rounded(values[term], u[term]))}; weak combination "
+                f"{known.weakest()}, condition {known.condition:.0f}; {_least(fit, triad)}): {_CURE[triad]}",
+            )
+    if not fit.converged:
+        return Status.NOT_CONVERGED, "the fit of all sensors together did not settle: look at the residuals"
+    conditions = ", ".join(f"{fit.known[triad].condition:.1f} ({_WORDS[triad]})" for triad in triads)
+    return (
+        Status.OK,
+        f"{len(values)} coefficients from {counted(rests, 'rest')} and the turns between; condition {conditions}",
+    )
+
+
+def _relative(name: str, values: Mapping[str, float], u: Mapping[str, float]) -> float:
+    """Uncertainty of a scale factor over its value, of a misalignment as it is; g-sensitivities do not count."""
+    if name.startswith("G_"):
+        return 0.0
+    return u[name] / abs(values[name]) if name.startswith(("K1", "S")) else u[name]
+
+
+def _listed(names: list[str]) -> str:
+    """Up to four names."""
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+
+
+def _least(fit: Fit, triad: str) -> str:
+    """Along which axis the input varies least, in words."""
+    blocks = of_triad(fit, triad)[0].side.blocks
+    ref = fit.references[triad]
+    x = ref.C_bn[:, :, 2] if triad == "acc" else ref.rate
+    spread = np.sqrt(np.average((x - np.average(x, axis=0)) ** 2, axis=0, weights=blocks.length))
+    axis = int(np.argmin(spread))
+    size = f"{spread[axis]:.2g} g" if triad == "acc" else f"{np.degrees(spread[axis]):.2g} deg/s"
+    along = "along" if triad == "acc" else "about"
+    return f"the {_INPUT[triad]} {along} {'xyz'[axis]} varies by {size} rms only"
+
+
+def _unit_words(fit: Fit, triad: str) -> str:
+    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
+    unit = of_triad(fit, triad)[0].side.blocks.triad.unit
+    if unit.dimension in ("count", "voltage"):
+        return ""
+    gain = fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
+    ratio = float(np.median(np.abs(np.diag(gain)))) * unit.factor
+    if 0.5 < ratio < 2.0:
+        return ""
+    return (
+        f"the output of {triad} is {ratio:.3g} times what the table's angles make of it in {unit.symbol}: check the "
+        f"unit of {triad}{', of the angles and of the time stamps' if triad == 'gyro' else ''} in the map or header"
+    )
+
+
+def findings(fit: Fit, lag: float) -> Iterator[Finding]:
+    """Findings about clocks and biases."""
+    for triad in fit.known:
+        group = f"time shift of {triad}"
+        own = float(fit.x[fit.unknowns.places[group][0]])
+        shift, u = own + lag, float(standard_uncertainty(fit, group)[0])
+        if abs(shift) > max(5.0 * u, 1e-3):
+            value, digits = rounded(1e3 * abs(shift), 1e3 * u)
+            yield Finding(
+                "command_shift",
+                f"the table's angles come {value} ± {digits} ms {'late' if shift > 0 else 'early'} against the "
+                f"{_WORDS[triad]}: corrected",
+            )
+    for triad in fit.known:
+        sensors = of_triad(fit, triad)
+        moved = [
+            f"{axis} {sensor.noise.walk * np.sqrt(np.ptp(sensor.side.blocks.middle)):.2g}"
+            for axis, sensor in zip("xyz", sensors, strict=True)
+            if sensor.noise.drift > DRIFT
+        ]
+        if moved:
+            name = "K0" if triad == "acc" else "D_F"
+            yield Finding(
+                "bias_drift",
+                f"the bias of the {_WORDS[triad]} wanders over the test, by about {', '.join(moved)} "
+                f"{sensors[0].side.blocks.triad.unit.symbol}; {name} is its mean, and the wander is in the "
+                "uncertainties",
+            )
