@@ -22,6 +22,9 @@ test: .venv/dev/installed
 bench: .venv/dev/installed
 	$(DEV)/python benchmarks/imu_calibration.py
 	$(DEV)/python benchmarks/sensitivity.py
+	$(DEV)/python benchmarks/ferraris.py
+	$(DEV)/python benchmarks/allan.py
+	$(DEV)/python benchmarks/streaming.py
 
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network.
 .venv/run/installed: requirements/run.txt pyproject.toml

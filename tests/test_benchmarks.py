@@ -12,9 +12,11 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
 @pytest.mark.parametrize(
     ("command", "says"),
     [
+        (["ferraris.py", "--smoke"], "inercal, with uncertainties"),
         (["imu_calibration.py", "--smoke"], "inercal, solve"),
         (["imu_coverage.py", "--runs", "2"], "all together"),
         (["sensitivity.py", "--smoke"], "inercal, exact"),
+        (["streaming.py", "--smoke"], "lines a second"),
         (["turntable_coverage.py", "--runs", "2"], "all together"),
     ],
 )

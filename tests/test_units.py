@@ -78,6 +78,8 @@ def test_format_and_parse_round_trip(unit_of, value):
         ("m/s**2", "m/s^2"),
         ("ug s", "ug*s"),
         ("LSB", "count"),
+        ("mdps", "mdeg/s"),
+        ("Grad/s", "deg/s"),
         ("", "1"),
     ],
 )

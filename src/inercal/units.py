@@ -57,6 +57,25 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
         {"m/s/sqrt(s)": 1.0, "m/s^2/sqrt(Hz)": 1.0, "m/s/sqrt(h)": 1 / 60, "ug/sqrt(Hz)": 1e-6 * _G,
          "mg/sqrt(Hz)": 1e-3 * _G},
     ),
+    "rate random walk": (
+        "rad/s/sqrt(s)",
+        {"rad/s/sqrt(s)": 1.0, "deg/s/sqrt(s)": _DEG, "deg/h/sqrt(s)": _DEG / 3600,
+         "deg/h/sqrt(h)": _DEG / 3600 / 60},
+    ),
+    "rate ramp": (
+        "rad/s^2",
+        {"rad/s^2": 1.0, "deg/s^2": _DEG, "deg/h/s": _DEG / 3600, "deg/h/h": _DEG / 3600**2,
+         "deg/h^2": _DEG / 3600**2},
+    ),
+    "acceleration random walk": (
+        "m/s^2/sqrt(s)",
+        {"m/s^2/sqrt(s)": 1.0, "m/s^2/sqrt(h)": 1 / 60, "ug/sqrt(s)": 1e-6 * _G, "ug/sqrt(h)": 1e-6 * _G / 60,
+         "mg/sqrt(h)": 1e-3 * _G / 60},
+    ),
+    "acceleration ramp": (
+        "m/s^3",
+        {"m/s^3": 1.0, "ug/s": 1e-6 * _G, "ug/h": 1e-6 * _G / 3600, "mg/h": 1e-3 * _G / 3600},
+    ),
 }  # fmt: skip
 
 #: zero of the temperature scales [degC]
@@ -75,7 +94,10 @@ _ALIASES = {
     "degrees": "deg",
     '"': "arcsec",
     "'": "arcmin",
+    "Grad": "deg",  # the German degree, to pint a billion rad
     "dps": "deg/s",
+    "mdps": "mdeg/s",
+    "Grad/s": "deg/s",
     "°/s": "deg/s",
     "°/h": "deg/h",
     "°/√h": "deg/sqrt(h)",
@@ -92,6 +114,7 @@ _ALIASES = {
 _PINT_DIMENSIONS = {
     "second": "time", "1 / second": "frequency", "meter": "length", "radian": "angle",
     "radian / second": "rate", "meter / second ** 2": "acceleration", "meter / second": "velocity",
+    "radian / second ** 2": "rate ramp", "meter / second ** 3": "acceleration ramp",
     "kilogram * meter ** 2 / ampere / second ** 3": "voltage", "dimensionless": "number",
 }  # fmt: skip
 

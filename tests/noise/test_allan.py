@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.noise.allan import BIAS_FLOOR, AllanFit, equivalent_dof, fit, overlapping_variance
+from inercal.instruments.noise import BIAS_FLOOR
+from inercal.noise.allan import AllanFit, equivalent_dof, fit, overlapping_variance
 
 
 def flicker(rng, n, channels, B, interval):

@@ -1,0 +1,288 @@
+"""The noise of an instrument at rest: a record's Allan deviations and noise coefficients as an estimate."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import InputError, RecordError
+from inercal.estimate.result import Estimate, coverage_factor, provenance
+from inercal.estimate.status import Status
+from inercal.instruments.noise import SYMBOLS
+from inercal.instruments.terms import noise_term
+from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
+from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
+from inercal.noise.rest import unrest
+from inercal.records.findings import Finding
+from inercal.records.places import counted
+from inercal.records.record import Column, Record
+
+Array = NDArray[np.float64]
+
+COMMAND = "allan"
+
+LEVEL = 0.683
+"""Confidence of the limits of the curves."""
+
+FEWEST = 16
+"""Samples of a channel, below which there is no curve worth the name."""
+
+ONE_SIDED = 1.6449
+"""Standard uncertainties to the one-sided 95 % limit of a normal distribution."""
+
+MODEL = (
+    "sigma^2(tau) = R^2 tau^2/2 + K^2 tau/3 + B^2 (2 ln 2)/pi + N^2/tau + 3 Q^2/tau^2, sigma the overlapping Allan "
+    "deviation of means over tau: N at 1 s on the slope -1/2, K at 3 s on +1/2, B = floor/0.664"
+)
+
+REFERENCES = (
+    "W. J. Riley, D. A. Howe, Handbook of frequency stability analysis, NIST SP 1065 (2008)",
+    "C. A. Greenhall, W. J. Riley, Uncertainty of stability variances based on finite differences, 35th PTTI (2003)",
+    "IEEE Std 952, Specification format guide and test procedure for single-axis interferometric fiber optic gyros",
+)
+
+_IN_ORDER = 0.9
+"""Share of the rows whose time stamps go forward, from which the others are left out."""
+
+_CHANNELS = re.compile(r"acc_[xyz]|a[1-9]\d*|gyro(_[xyz]|_roll|_yaw)?|y_[xy]")
+_DIMENSIONS = ("acceleration", "rate", "count", "voltage", "number")
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelNoise:
+    """One channel: its ``unit`` (SI), ``curve`` and where it is ``at`` in it, and the fit (None: there is no noise)."""
+
+    name: str
+    sensor: str
+    unit: str
+    curve: AllanDeviation
+    at: int
+    fit: NoiseCoefficients | None
+
+    @property
+    def deviation(self) -> Array:
+        """Allan deviation (k,) at ``curve.tau``."""
+        return self.curve.deviation[:, self.at]
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Its confidence limits (k,), (k,)."""
+        return self.curve.lower[:, self.at], self.curve.upper[:, self.at]
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The ``estimate`` and what it was made from."""
+
+    estimate: Estimate
+    channels: tuple[ChannelNoise, ...]
+
+
+def noise_of(record: Record, given: Mapping[str, Any] | None = None) -> Noise:
+    """Allan deviations and noise coefficients of every channel of a record at rest that measures motion.
+
+    Raises
+    ------
+    RecordError
+        No such channel, hardly any samples, or time stamps that do not increase.
+    """
+    groups = _groups(record)
+    noise_coefficients(allan_deviation(np.sin(np.arange(64.0) ** 2), 1.0))  # loads or compiles kernels
+    clock = time.perf_counter()
+    channels: list[ChannelNoise] = []
+    said: dict[tuple[str, str], list[str]] = {}
+    findings: list[Finding] = []
+    moving: list[str] = []
+    for columns in groups:
+        interval, samples = _on_a_grid(columns)
+        curve = allan_deviation(samples, interval, level=LEVEL)
+        for at, column in enumerate(columns):
+            fit, own = _fitted(curve, at)
+            for each in own:
+                said.setdefault((each.code, each.message), []).append(column.name)
+            channels.append(ChannelNoise(column.name, column.sensor, column.unit.si, curve, at, fit))
+            found = unrest(samples[:, at], interval)
+            if found is not None:
+                where = f"{found.first:.1f} s to {found.last:.1f} s from the start"
+                findings.append(Finding("not_at_rest", f"{column.name} {found.words}", where))
+                if found.moving:
+                    moving.append(column.name)
+    of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in said.items()]
+    estimate = _assemble(record, channels, [*of_fits, *findings], moving, given or {})
+    return Noise(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
+
+
+def within(record: Record, begin: float | None, end: float | None) -> Record:
+    """The part of a record from ``begin`` to ``end`` [s], both from the first stamp of each clock; None: all.
+
+    Raises
+    ------
+    InputError
+        Nothing lies within.
+    """
+    if begin is None and end is None:
+        return record
+    low, high = 0.0 if begin is None else begin, np.inf if end is None else end
+    cut: dict[int, tuple[NDArray[np.bool_], Array]] = {}
+    columns = {}
+    for name, column in record.columns.items():
+        if id(column.t) not in cut:
+            start = np.nanmin(column.t, initial=np.inf)
+            inside = (column.t >= start + low) & (column.t <= start + high)
+            cut[id(column.t)] = inside, column.t[inside]
+        inside, t = cut[id(column.t)]
+        columns[name] = replace(column, t=t, values=column.values[inside])
+    if not any(inside.any() for inside, _ in cut.values()):
+        raise InputError(
+            "--begin, --end", f"found {low:g} s to {high:g} s, expected a span within the record"
+        )
+    return replace(record, columns=columns, labels=())
+
+
+def _groups(record: Record) -> list[list[Column]]:
+    """The channels that measure motion, those of one clock together."""
+    groups: dict[int, list[Column]] = {}
+    for column in record.columns.values():
+        if _CHANNELS.fullmatch(column.name) and column.unit.dimension in _DIMENSIONS:
+            groups.setdefault(id(column.t), []).append(column)
+    if not groups:
+        where = ", ".join(source.path for source in record.sources) or "record"
+        raise RecordError(
+            where,
+            f"found {', '.join(record.columns) or 'no channels'}, expected acceleration or rate, such as acc_x or "
+            "gyro_x",
+        )
+    return list(groups.values())
+
+
+def _on_a_grid(columns: list[Column]) -> tuple[float, Array]:
+    """Sample interval [s] and samples (n, channels) in SI of channels of one clock, NaN where one is missing."""
+    t, where = columns[0].t, columns[0].source.path
+    # rows without a stamp, or with one that is not later than all before, are among the record's findings
+    forward = np.isfinite(t) & (t > np.concatenate([[-np.inf], np.fmax.accumulate(t)[:-1]]))
+    samples = np.stack([column.values * column.unit.factor for column in columns], axis=1)
+    if not forward.all() and np.mean(forward) > _IN_ORDER:
+        t, samples = t[forward], samples[forward]
+    samples[~np.isfinite(samples)] = np.nan
+    size = float(np.nanmax(np.abs(samples), initial=0.0))
+    if size > 1e100:
+        raise RecordError(where, f"found values up to {size:.3g}, expected the output of a sensor")
+    counts = np.isfinite(samples).sum(axis=0)
+    if counts.min() < FEWEST:
+        name = columns[int(np.argmin(counts))].name
+        raise RecordError(where, f"found {counts.min()} samples of {name}, expected at least {FEWEST}")
+    return regular(t, samples, where)
+
+
+def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, tuple[Finding, ...]]:
+    """The fit of one channel, None where it shows nothing, and what is to be said of it."""
+    if not np.nanmax(curve.deviation[:, at], initial=0.0) > 0:
+        return None, (Finding("resolution", "the output never changes, there is no noise to be seen"),)
+    fit = noise_coefficients(curve, at)
+    return (fit if fit.names else None), fit.findings
+
+
+def _assemble(
+    record: Record,
+    channels: list[ChannelNoise],
+    findings: list[Finding],
+    moving: list[str],
+    given: Mapping[str, Any],
+) -> Estimate:
+    """Put the estimate together: N, B, K, R, Q of each channel.
+
+    A coefficient that a curve does not show has the value 0 and a u by which its upper limit is 1.645 u; it is
+    listed in ``result`` with that limit.
+    """
+    names, units, values, dof = [], [], [], []
+    blocks = []
+    for channel in channels:
+        if channel.fit is None:
+            continue
+        fit = channel.fit
+        block = np.zeros((len(SYMBOLS), len(SYMBOLS)))
+        seen = [SYMBOLS.index(name) for name in fit.names]
+        block[np.ix_(seen, seen)] = fit.covariance
+        for symbol in SYMBOLS:
+            names.append(f"{symbol}_{channel.name}")
+            units.append(noise_term(symbol, channel.unit))
+            if symbol in fit.names:
+                k = fit.names.index(symbol)
+                values.append(float(fit.values[k]))
+                dof.append(float(fit.dof[k]))
+            else:
+                k = SYMBOLS.index(symbol)
+                block[k, k] = (fit.bounds.get(symbol, np.inf) / ONE_SIDED) ** 2
+                values.append(0.0)
+                dof.append(np.inf)
+        blocks.append(block)
+    covariance = np.zeros((len(names), len(names)))
+    for k, block in enumerate(blocks):
+        own = slice(k * len(SYMBOLS), (k + 1) * len(SYMBOLS))
+        covariance[own, own] = block
+    status, message = _verdict(channels, moving)
+    longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
+    return Estimate(
+        command=COMMAND,
+        names=tuple(names),
+        units=tuple(units),
+        values=np.array(values),
+        covariance=covariance,
+        dof=np.array(dof),
+        k=np.array([coverage_factor(nu) for nu in dof]),
+        status=status,
+        message=message,
+        findings=(*record.findings, *findings),
+        statistics={
+            "samples": float(longest.samples),
+            "rate_hz": 1.0 / longest.interval,
+            "duration_s": longest.samples * longest.interval,
+        },
+        model=MODEL,
+        inputs=record.sources,
+        provenance=provenance(given),
+        result={"level": LEVEL, "channels": {channel.name: _curve(channel) for channel in channels}},
+        references=REFERENCES,
+    )
+
+
+def _curve(channel: ChannelNoise) -> dict[str, Any]:
+    """One channel of the result, in SI."""
+    curve, at, fit = channel.curve, channel.at, channel.fit
+    out: dict[str, Any] = {
+        "unit": channel.unit,
+        "tau": curve.tau,
+        "deviation": channel.deviation,
+        "lower": channel.limits[0],
+        "upper": channel.limits[1],
+        "dof": curve.dof[:, at],
+        "samples": curve.samples,
+        "interval_s": curve.interval,
+    }
+    if fit is not None:
+        out |= {
+            "fitted": np.sqrt(fit.variance(curve.tau)),
+            "fit_range_s": list(fit.fit_range),
+            "resolved": list(fit.names),
+            "upper_limits": dict(fit.bounds),
+            "chi2": fit.chi2,
+            "chi2_dof": fit.chi2_dof,
+        }
+    return out
+
+
+def _verdict(channels: list[ChannelNoise], moving: list[str]) -> tuple[Status, str]:
+    """Status and its sentence."""
+    seconds = max(each.curve.samples * each.curve.interval for each in channels)
+    if moving:
+        return Status.INCONSISTENT, (
+            f"the instrument was not at rest ({', '.join(moving)}), and noise coefficients are of rest alone: take the "
+            "part at rest with --begin and --end"
+        )
+    return Status.OK, f"noise of {counted(len(channels), 'channel')} from {seconds:.4g} s at rest"
