@@ -1,9 +1,9 @@
 """The README and every page of the documentation run as written.
 
-Python blocks run in one process per page. Console blocks run line by line in one folder: a ``$`` line is run,
-``[exit N]`` after it is the code expected (0 if none is shown), and every other line must begin a line of what is
-printed on standard output or error, or hold the same words if it is a row of a table. Studies that begin with
-their file's name as a comment lie in the folder before.
+Studies, maps and recordings (TOML and CSV blocks) that begin with their file's name as a comment are laid into a
+folder. There the Python blocks of the page run in one process, and after them the console blocks line by line: a
+``$`` line is run, ``[exit N]`` after it is the code expected (0 if none is shown), and every other line must begin a
+line of what is printed on standard output or error, or hold the same words if it is a row of a table.
 """
 
 import os
@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-FENCE = re.compile(r"^```(python|console|toml)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
 def blocks(page: Path, kind: str) -> list[str]:
@@ -25,9 +25,9 @@ def blocks(page: Path, kind: str) -> list[str]:
 
 
 def lay_out(page: Path, folder: Path) -> None:
-    """Write the studies of a page that say their file's name in the first line."""
-    for text in blocks(page, "toml"):
-        if found := re.match(r"# ([\w-]+\.toml)\n", text):
+    """Write the files of a page that say their name in the first line."""
+    for text in [*blocks(page, "toml"), *blocks(page, "csv")]:
+        if found := re.match(r"# ([\w-]+\.(?:toml|csv))\n", text):
             (folder / found[1]).write_text(text, encoding="utf-8")
 
 
@@ -35,14 +35,20 @@ def name(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=name)
+def run_python(page: Path, folder: Path) -> None:
+    """Run the Python blocks of a page, if it has any."""
+    if code := "\n\n".join(blocks(page, "python")):
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if blocks(p, "python") and not blocks(p, "console")], ids=name
+)
 def test_python_runs(page, tmp_path):
     lay_out(page, tmp_path)
-    code = "\n\n".join(blocks(page, "python"))
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
+    run_python(page, tmp_path)
 
 
 def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -70,6 +76,7 @@ def test_commands_run_and_print_what_the_page_shows(page, tmp_path):
     lines = [line for block in blocks(page, "console") for line in block.splitlines() if line.strip()]
     assert lines[0].startswith("$ ")
     lay_out(page, tmp_path)
+    run_python(page, tmp_path)
     while lines:
         command = lines.pop(0).removeprefix("$ ")
         expected = []
@@ -86,16 +93,21 @@ def test_commands_run_and_print_what_the_page_shows(page, tmp_path):
                 assert shown(line, found), f"{command}\nexpected: {line}\nfound:\n{found}"
 
 
-def test_the_studies_on_the_pages_are_studies(tmp_path):
+def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
+    from inercal.records.maps import read_map
     from inercal.study.load import load_imu_study, load_turntable_study
 
     texts = [text for page in PAGES for text in blocks(page, "toml")]
     assert texts
     for text in texts:
         (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-        on_table = tomllib.loads(text).get("rig", {}).get("kind", "").endswith("_axis_turntable")
+        keys = tomllib.loads(text)
+        if keys.keys() & {"columns", "file"}:
+            read_map(tmp_path / "study.toml")
+            continue
+        on_table = keys.get("rig", {}).get("kind", "").endswith("_axis_turntable")
         (load_turntable_study if on_table else load_imu_study)(tmp_path / "study.toml")
 
 

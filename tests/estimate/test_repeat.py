@@ -102,19 +102,26 @@ def test_another_unit_scales_values_and_uncertainties(factor, seed):
 
 
 @pytest.mark.parametrize(
-    ("change", "low", "high"), [(0.0, 0.93, 0.985), (1.0, 0.90, 0.97), (5.0, 0.92, 0.97)]
+    ("runs", "change", "low", "high"),
+    [
+        (4, 0.0, 0.93, 0.985),
+        (4, 1.0, 0.90, 0.97),
+        (4, 5.0, 0.92, 0.97),
+        (3, 2.0, 0.90, 0.97),
+        (2, 2.0, 0.835, 0.98),
+    ],
 )
-def test_intervals_of_four_runs_cover_the_truth(change, low, high):
-    """2000 sets of four runs with a common error from elsewhere; limits hold 95 % and the docstring's band with
+def test_intervals_of_a_few_runs_cover_the_truth(runs, change, low, high):
+    """2000 sets of runs with a common error from elsewhere; limits hold 95 % and the docstring's band with
     4.5 standard deviations of the count (0.005 each)."""
     rng = np.random.default_rng(20261121)
     hits = 0
     for _ in range(2000):
-        own = rng.uniform(0.5, 2.0, 4)
+        own = rng.uniform(0.5, 2.0, runs)
         common = rng.normal(0.0, 0.3)
         x = common + rng.normal(0.0, np.sqrt(own + change**2))
-        stated = own * rng.chisquare(30, 4) / 30
-        found = combine_runs([run_of([x[k]], [stated[k]], [[0.09]]) for k in range(4)])
+        stated = own * rng.chisquare(30, runs) / 30
+        found = combine_runs([run_of([x[k]], [stated[k]], [[0.09]]) for k in range(runs)])
         inside = found["K0_x"].interval(0.95)
         hits += inside[0] < 0.0 < inside[1]
     assert low < hits / 2000 < high

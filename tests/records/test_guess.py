@@ -58,6 +58,7 @@ def test_the_xsens_files_are_read_as_counts_on_their_clock(tmp_path):
         "time,ax,ay,az,gx,gy,gz",
         "t,accX,accY,accZ,gyrX,gyrY,gyrZ",
         "timestamp,imu.acc.x,imu.acc.y,imu.acc.z,imu.gyro.x,imu.gyro.y,imu.gyro.z",
+        "Zeit (s),ax (m/s2),ay (m/s2),az (m/s2),wx (rad/s),wy (rad/s),wz (rad/s)",
         "Time [s],Accel_X,Accel_Y,Accel_Z,Gyro_X,Gyro_Y,Gyro_Z",
         "t,linear_acceleration_x,linear_acceleration_y,linear_acceleration_z,"
         "angular_velocity_x,angular_velocity_y,angular_velocity_z",

@@ -100,6 +100,15 @@ def test_unknown_columns_are_passed_over_and_labels_kept(tmp_path):
     assert record.findings == ()
 
 
+@pytest.mark.parametrize("title", ["ax (m/s2)", "ax [m/s2]", "ax(m/s2)", "ax"])
+def test_a_map_may_leave_out_the_unit_that_a_header_has_in_brackets(tmp_path, title):
+    path = written(tmp_path / "a.csv", table(header=f"t,{title},gx (deg/h)"))
+    columns = "t = { from = 't', unit = 's' }\nacc_x = { from = 'ax', unit = 'm/s^2' }\n"
+    columns += "gyro_x = { from = 'gx', unit = 'deg/h' }\n"
+    record = read(path, written(tmp_path / "map.toml", f"[columns]\n{columns}"))
+    assert holds_rows(record)
+
+
 def test_compressed_files_are_read(tmp_path):
     path = tmp_path / "a.csv.gz"
     path.write_bytes(gzip.compress(table().encode()))

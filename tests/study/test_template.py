@@ -67,7 +67,9 @@ def of_method(method: str) -> str:
         if not skipped:
             kept.append(re.sub(r"^# (\w+ = |\[)", r"\1", line))
     text = "\n".join(kept).replace('method = "multiposition"', f'method = "{method}"')
-    unheeded = {"ferraris": "static_start|g_sensitivity|bias_drift", "aided": "static_start|bias_drift"}.get(method)
+    unheeded = {"ferraris": "static_start|g_sensitivity|bias_drift", "aided": "static_start|bias_drift"}.get(
+        method
+    )
     return re.sub(f"(?m)^({unheeded}) = .*$", "", text) if unheeded else text
 
 

@@ -26,7 +26,9 @@ def temperature(
     /,
     *,
     map_file: MapFile = None,
-    at: Annotated[str, Parameter(help="Temperature T0 about which the polynomial is written.")] = "25 degC",
+    at: Annotated[
+        str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
+    ] = "25 degC",
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Fit what a sensor's output or its calibration does with temperature."""

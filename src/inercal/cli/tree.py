@@ -35,9 +35,10 @@ COMMANDS = {
     ),
     ("calibrate", "imu"): (
         "inercal.cli.calibrate:calibrate_imu",
-        "Calibrate an IMU that was held still in many poses by hand.\n\nGives bias, scale factor and misalignment "
-        "of the accelerometers, and of the gyro if there is one, with uncertainties. --out saves them (.json or "
-        ".toml), --report writes a page to hand over. Exit code 1: done, but the verdict is not ok.",
+        "Calibrate an IMU held by hand, set on its sides and turned, or turned by a table.\n\nGives bias, scale factor "
+        "and misalignment of the accelerometers, and of the gyro if there is one, with uncertainties; of repeat runs "
+        "the combined values. --out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: "
+        "done, but the verdict is not ok.",
         "inercal calibrate imu log.csv --study imu.toml --report cal.html",
     ),
     ("calibrate", "turntable"): (

@@ -7,7 +7,7 @@ that is estimated for each coefficient by the rule of Mandel and Paule.
 
 The combined value stands for the instrument over such runs, with k - 1 degrees of freedom where a change between k
 runs is found. Intervals of 95 % from simulated runs then cover the truth in 92 to 97 % for three and more runs,
-whatever the size of the change, and in 87 to 96 % for two.
+whatever the size of the change, and in 87 to 98 % for two.
 """
 
 from __future__ import annotations
