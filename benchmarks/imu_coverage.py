@@ -1,8 +1,10 @@
-"""Are the stated uncertainties of a hand-held calibration true? A campaign of simulated calibrations.
+"""Are the stated uncertainties of an IMU's calibration true? Campaigns of simulated calibrations.
 
     python benchmarks/imu_coverage.py --runs 2000 --folder build/coverage
+    python benchmarks/imu_coverage.py --runs 2000 --method ferraris
 
-An interrupted campaign goes on where it stopped. Its result is kept in docs/design/coverage.md.
+An interrupted campaign with a folder goes on where it stopped. The results are kept in docs/design/coverage.md (by
+hand) and docs/design/imu-methods-coverage.md (the other methods).
 """
 
 import argparse
@@ -14,23 +16,53 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import Processes, run
-from inercal.imu.campaign import one_calibration, one_calibration_with_g_sensitivity
+from inercal.imu import campaign as by_hand
+from inercal.imu.aided import campaign as aided
+from inercal.imu.aided.coefficients import names_of
+from inercal.imu.ferraris import campaign as ferraris
+from inercal.imu.ferraris.method import NAMES
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 
 SEED = 20261121
+BY_HAND = ACCELEROMETER_TRIAD + GYRO_TRIAD
+CAMPAIGNS = {
+    "multiposition": (by_hand.one_calibration, BY_HAND),
+    "multiposition, g-sensitivity": (
+        by_hand.one_calibration_with_g_sensitivity,
+        BY_HAND + GYRO_G_SENSITIVITY,
+    ),
+    "ferraris": (ferraris.one_calibration, NAMES),
+    "ferraris, by scatter": (ferraris.one_calibration_by_scatter, NAMES),
+    "aided": (aided.one_calibration, names_of(("acc", "gyro"), False)),
+}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", type=int, default=2000)
     parser.add_argument("--folder", type=Path, help="keep finished chunks here")
-    parser.add_argument(
-        "--g-sensitivity", action="store_true", help="draw and estimate g-sensitive drift too"
+    parser.add_argument("--method", choices=("multiposition", "ferraris", "aided"), default="multiposition")
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument(
+        "--g-sensitivity",
+        action="store_const",
+        dest="kind",
+        const=", g-sensitivity",
+        help="multiposition: draw and estimate g-sensitive drift too",
+    )
+    kind.add_argument(
+        "--by-scatter",
+        action="store_const",
+        dest="kind",
+        const=", by scatter",
+        help="ferraris: leave the alignment to the scatter of the positions",
     )
     options = parser.parse_args()
+    chosen = options.method + (options.kind or "")
+    if chosen not in CAMPAIGNS:
+        parser.error(f"found {chosen}, expected one of: {'; '.join(CAMPAIGNS)}")
 
-    task = one_calibration_with_g_sensitivity if options.g_sensitivity else one_calibration
-    names = ACCELEROMETER_TRIAD + GYRO_TRIAD + (GYRO_G_SENSITIVITY if options.g_sensitivity else ())
+    task, names = CAMPAIGNS[chosen]
     sample = run(
         task,
         runs=options.runs,

@@ -9,7 +9,6 @@ from inercal.examples import FOLDER
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.simulate import Session, draw_full_truth, quiet, simulate_session
 from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import Noise
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.record import Record
@@ -62,9 +61,3 @@ def renamed(record: Record, **names: str) -> Record:
         for name, column in record.columns.items()
     }
     return replace(record, columns=columns)
-
-
-def noisy_truth(rng: np.random.Generator):
-    """An instrument whose biases also wander."""
-    truth = draw_full_truth(rng)
-    return replace(truth, accelerometer_noise=Noise(8e-4, 1e-4), gyro_noise=Noise(5.6e-4, 5e-5))

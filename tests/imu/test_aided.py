@@ -191,6 +191,20 @@ def test_errors_of_the_table_widen_the_uncertainties_and_are_in_the_budget(noisy
     assert shaky["M_xy"].u >= 1e-3 / np.sqrt(2.0)
 
 
+def test_a_mounting_known_to_a_tenth_of_a_degree_makes_no_ill_conditioned_test(noisy):
+    """It turns the frame of all sensors: the misalignments are no better known, but no motion would help."""
+    record, _ = noisy
+    u = np.radians(0.1)
+    estimate = calibrated(record, turntable("two_axis_turntable", None, {"dtheta_x": normal(u)}))
+    assert estimate.status is Status.OK
+    assert estimate.statistics["condition"] == pytest.approx(
+        calibrated(record).statistics["condition"], rel=0.01
+    )
+    for name in ("M_yz", "M_zy", "T_yz", "T_zy"):
+        assert estimate[name].u == pytest.approx(u, rel=0.1)
+    assert estimate["M_xy"].u < 0.1 * u
+
+
 # bad input
 
 
@@ -314,6 +328,9 @@ def test_the_study_says_how_the_instrument_sits():
     rig = {"kind": "two_axis_turntable", "base": {"azimuth": "90.0(1) deg"}}
     told = aided_settings(check(AidedTable, {"rig": rig}, "study", StudyError), "study")
     assert told.azimuth_u == pytest.approx(np.radians(0.1))
+    other = {"kind": "three_axis_turntable", "errors": {"deps_x": {"normal": "3 arcsec"}}}
+    with pytest.raises(StudyError, match=r"imu\.aided\.rig\.errors\.deps_x: .* did you mean deps_x1"):
+        aided_settings(check(AidedTable, {"rig": other}, "study", StudyError), "study")
     with pytest.raises(StudyError, match="right-handed"):
         check(AidedTable, {"mounting": ["+x", "+y", "-z"]}, "study", StudyError)
 

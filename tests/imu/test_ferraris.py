@@ -1,6 +1,7 @@
 """Ferraris calibration of simulated sessions: the truth comes back, and the stated uncertainties hold."""
 
 import math
+import os
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
@@ -9,17 +10,19 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from ferraris_sessions import SETTINGS, noisy_truth, session, with_values
+from ferraris_sessions import SETTINGS, session, with_values
 
 from inercal.convert.correct import imu_model
 from inercal.estimate.coverage import coverage
+from inercal.estimate.runs import Processes, run
 from inercal.estimate.status import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
+from inercal.imu.ferraris.campaign import one_calibration
 from inercal.imu.ferraris.method import NAMES, Inputs, coefficients, derivatives
 from inercal.imu.ferraris.settings import FerrarisSettings
-from inercal.imu.ferraris.simulate import Session, simulate_session, true_values
+from inercal.imu.ferraris.simulate import true_values
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.units import parse_unit
@@ -227,24 +230,6 @@ def test_outputs_coarser_than_their_noise_are_no_better_known_than_their_step():
 
 
 SEED, RUNS = 20261121, 500
-ALIGNMENT, TURN_U, GRAVITY_U, CLOCK_U, LATITUDE = math.radians(0.5), math.radians(0.2), 1e-3, 1e-4, 0.8
-
-
-def _one(rng):
-    """One instrument, site, clock and session drawn and calibrated."""
-    truth = noisy_truth(rng)
-    drawn = Session(
-        alignment=ALIGNMENT,
-        turn_u=TURN_U,
-        gravity=rng.normal(9.81, GRAVITY_U),
-        latitude=LATITUDE,
-        clock=1.0 + rng.normal(0.0, CLOCK_U),
-    )
-    record, truth = simulate_session(truth, drawn, rng)
-    site = Site(9.81, (GravityInput("gravity", GRAVITY_U, "m/s^2", 1.0),), LATITUDE)
-    options = FerrarisSettings(turn_u=TURN_U, alignment=ALIGNMENT)
-    estimate = solved(record, ImuSettings(site, time_base_u=CLOCK_U), options)
-    return estimate.values - true_values(truth), estimate.u, estimate.dof, estimate.status is Status.OK
 
 
 @pytest.mark.slow
@@ -254,9 +239,8 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
     91 and 98.4 % are exact binomial limits of one coefficient at a risk of about 0.05 % over some twenty; alignment of
     second order and the Allan fit at the length of a hold err on the safe side, so that all together may lie at 97 %.
     """
-    rows = [_one(rng) for rng in np.random.default_rng(SEED).spawn(RUNS)]
-    error, u, dof, sound = (np.array(column) for column in zip(*rows, strict=True))
-    assert np.all(sound)
-    found = coverage(error, u, dof)
+    sample = run(one_calibration, runs=RUNS, seed=SEED, executor=Processes(min(2, os.cpu_count() or 1)))
+    assert np.all(sample["sound"] == 1.0)
+    found = coverage(sample["error"], sample["u"], sample["dof"])
     assert np.all((found.fraction >= 0.91) & (found.fraction <= 0.984)), found.table(NAMES)
     assert 0.94 <= found.pooled <= 0.97, found.table(NAMES)

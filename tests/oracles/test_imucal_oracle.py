@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
-from ferraris_sessions import SETTINGS, options_of, record_of
+from ferraris_sessions import SETTINGS, UNSURE, options_of, record_of
 
 from inercal.examples import FOLDER
 from inercal.imu.ferraris.calibration import calibrate_ferraris
@@ -160,3 +160,12 @@ def test_corrected_outputs_are_equal(name):
     )
     assert np.allclose(f, theirs[0], rtol=0.0, atol=1e-10 * np.max(np.abs(theirs[0])))
     assert np.allclose(np.degrees(omega), theirs[1], rtol=0.0, atol=1e-10 * np.max(np.abs(theirs[1])))
+
+
+@pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
+def test_its_biases_agree_with_least_squares_of_all_positions(name):
+    """imucal's are the means of two positions (accelerometers) and of all samples (gyro)."""
+    estimate = calibrate_ferraris(record_of(name), UNSURE, options_of(name)).estimate
+    rows = estimate.result["least_squares"]
+    assert len(rows) == 6
+    assert all(abs(row["difference_over_u"]) < 0.2 for row in rows)

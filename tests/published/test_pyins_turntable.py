@@ -5,8 +5,8 @@ pyins 8377ede, sim.Turntable and examples/imu_calibration.ipynb with seed 0: its
 every error within three standard uncertainties.
 
 The noise of the recording lets the gyro's elements be known to 0.015 to 0.024 % (one standard uncertainty), so the
-largest of nine errors is 0.03 % or more in every second recording, also with the best of estimators. In this one it
-is 0.024 % where the heading of the table is stated, and 0.032 % where it is not.
+largest of nine errors is above 0.03 % in six of ten recordings, also with the best of estimators. In this one it is
+0.024 % where the heading of the table is stated, and 0.032 % where it is not.
 """
 
 import numpy as np
@@ -120,6 +120,29 @@ def test_every_error_is_within_three_standard_uncertainties(case, request):
             extra = 0.0 if name == "K0" else GYRO_WALK * np.sqrt(265.3 / 3.0)
             u = np.hypot(estimate[f"{name}_{i}"].u, extra)
             assert abs(estimate[f"{name}_{i}"].value - bias[a]) <= 3.0 * u, name
+
+
+@pytest.mark.parametrize("case", ["stated", "unknown"])
+def test_the_bound_is_below_the_usual_size_of_the_largest_error(case, request):
+    """The largest of nine errors by the stated covariance: 0.033 % in the median, below 0.03 % in four of ten."""
+    estimate = request.getfixturevalue(case)
+    names, S = list(estimate.names), {i: estimate[f"S_{i}"].value for i in "xyz"}
+    J = np.zeros((9, len(names)))  # of the elements S_i T_ij
+    for row, (i, j) in enumerate((i, j) for i in "xyz" for j in "xyz"):
+        J[row, names.index(f"S_{i}")] = 1.0 if i == j else estimate[f"T_{i}{j}"].value
+        if i != j:
+            J[row, names.index(f"T_{i}{j}")] = S[i]
+    V = J @ estimate.covariance @ J.T
+    u = np.sqrt(np.diag(V))
+    assert 1.4e-4 < u.min() < u.max() < 2.5e-4
+    largest = np.abs(np.random.default_rng(1).multivariate_normal(np.zeros(9), V, 20_000)).max(axis=1)
+    assert np.median(largest) == pytest.approx(3.3e-4, abs=0.1e-4)
+    assert np.mean(largest < 3.0e-4) == pytest.approx(0.39, abs=0.03)
+    # a column by one turn less the mean of 30 s of rest before it, as pyins takes it
+    T = 19.0
+    of_peer = 2.9089e-4 * np.sqrt(T + T**2 / 30.0) / (2.0 * np.pi)
+    assert of_peer == pytest.approx(2.6e-4, abs=0.1e-4)
+    assert u.max() < of_peer
 
 
 def test_the_uncertainties_are_those_the_noise_allows(stated):

@@ -46,5 +46,5 @@ def aided_settings(table: AidedTable, where: object) -> AidedSettings:
         An error that this kind of table does not have, or one without any distribution.
     """
     azimuth = table.rig.base.azimuth
-    chain = chain_of(table.rig, where, mounting_of(table.mounting))
+    chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")
     return AidedSettings(chain, None if azimuth is None else azimuth.u)

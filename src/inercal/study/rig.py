@@ -198,8 +198,12 @@ class RigTable(Strict):
     )
 
 
-def chain_of(table: RigTable, where: object, mounting: NDArray[np.float64] | None = None) -> Chain:
+def chain_of(
+    table: RigTable, where: object, mounting: NDArray[np.float64] | None = None, key: str = "rig"
+) -> Chain:
     """The chain of a table with the errors that are given for it, and an instrument ``mounting`` (3, 3) on it.
+
+    ``key`` is that of the table in the study, for errors.
 
     Raises
     ------
@@ -211,7 +215,7 @@ def chain_of(table: RigTable, where: object, mounting: NDArray[np.float64] | Non
     usual = given.pop("default", None)
     default = None if usual is None else usual.distribution()
     if usual is not None and default is None:
-        raise StudyError(where, f"rig.errors.default: found no distribution, expected {_EXPECTED}")
+        raise StudyError(where, f"{key}.errors.default: found no distribution, expected {_EXPECTED}")
     scopes: dict[str, Scope] = {}
     if usual is not None and usual.scope is not None:
         scopes = dict.fromkeys(known, Scope(usual.scope))
@@ -220,13 +224,13 @@ def chain_of(table: RigTable, where: object, mounting: NDArray[np.float64] | Non
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
             raise StudyError(
-                where, f"rig.errors.{name}: unknown error of a {table.kind}, did you mean {near}?"
+                where, f"{key}.errors.{name}: unknown error of a {table.kind}, did you mean {near}?"
             )
         if error == "none":
             continue
         distribution = error.distribution() or (None if known[name].is_offset else default)
         if distribution is None:
-            raise StudyError(where, f"rig.errors.{name}: found no distribution, expected {_EXPECTED}")
+            raise StudyError(where, f"{key}.errors.{name}: found no distribution, expected {_EXPECTED}")
         errors[name] = distribution
         if error.scope is not None:
             scopes[name] = Scope(error.scope)

@@ -59,7 +59,7 @@ class Sensor:
 class Fit:
     """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, three of each triad.
 
-    ``references`` by triad; ``known`` by triad what the data alone tell of its gains.
+    ``references`` by triad; ``known`` by triad what the test, on a perfect table, tells of its gains.
     """
 
     unknowns: Unknowns
@@ -167,9 +167,14 @@ def _stacked(sensors: Sequence[Sensor], known: Unknowns, from_mean: Array) -> tu
 def _known(
     sensors: Sequence[Sensor], known: Unknowns, triad: str, names: Mapping[str, tuple[str, ...]]
 ) -> Identifiability:
-    """What the data tell of the gains of a triad, whatever the other unknowns are within their priors."""
+    """What the test tells of the gains of a triad, whatever the other unknowns are within their priors.
+
+    Errors of the table do not count: a large one, such as that of the mounting, which turns the frame of all sensors,
+    makes the uncertainties large, but no motion would help.
+    """
     main = np.concatenate([known.places[f"gain {each}"] for each in _gains(triad, known)])
-    others = np.setdiff1d(np.arange(len(known.sd)), main)
+    of_table = [known.places[name] for name in known.stated if name != "earth rate"]
+    others = np.setdiff1d(np.arange(len(known.sd)), np.concatenate([main, *of_table]))
     rows = [np.zeros((len(others), len(known.sd)))]
     rows[0][range(len(others)), others] = 1.0
     for sensor in sensors:
