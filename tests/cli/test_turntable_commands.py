@@ -9,7 +9,6 @@ import pytest
 import xarray
 
 from inercal.cli import run
-from inercal.estimate.status import Status
 from inercal.rigs.plans import named
 
 STUDY = """
@@ -237,8 +236,7 @@ def test_an_unidentified_term_ends_unobservable_with_its_null_vector(folder, cap
     assert "DX_XY" in data["status"]["message"]
     assert run(["calibrate", "turntable", "r.csv", "--study", "t.toml"]) == 1
     shown = capsys.readouterr().out
-    assert "add positions, or leave terms out" in shown  # said once, in the message
-    assert Status.UNOBSERVABLE.advice not in shown
+    assert "add positions, or leave terms out" in shown
 
 
 def test_design_writes_positions_that_a_table_can_be_told(folder, capsys):

@@ -8,8 +8,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli import EXIT_BAD_VERDICT, process_age
+from inercal.cli import process_age
 from inercal.cli.options import Files, MapFile, ReportOutput, read_record, working
+from inercal.cli.outcome import hand_over
 
 
 def allan(
@@ -22,10 +23,8 @@ def allan(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Tell the noise of an instrument at rest."""
-    from inercal.estimate.exchange import save, to_json
-    from inercal.estimate.status import Status
     from inercal.noise.outcome import noise_of, within
-    from inercal.report.allan import curves_csv, table
+    from inercal.report.allan import curves_csv, page, table
     from inercal.units import parse_quantity
 
     output.check((".json", ".toml", ".csv"), (*files, map_file))
@@ -42,20 +41,6 @@ def allan(
     timing = {"read": read_s, "solve": noise.estimate.timing["solve"], "total": process_age()}
     estimate = replace(noise.estimate, timing=timing)
     noise = replace(noise, estimate=estimate)
-    output.say_findings(estimate.findings)
-    if output.out is not None:
-        if output.out.suffix.lower() == ".csv":
-            from inercal._files import write_text
-
-            write_text(output.out, curves_csv(noise))
-        else:
-            save(estimate, output.out)
-        output.say(f"noise: {output.out}")
-    if output.report is not None:
-        from inercal._files import write_text
-        from inercal.report.allan import page
-
-        write_text(output.report, page(noise))
-        output.say(f"report: {output.report}")
-    output.emit(to_json(estimate), f"{table(noise)}\n\n{estimate.status.value}: {estimate.message}")
-    return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
+    return hand_over(
+        estimate, [table(noise)], lambda: page(noise), output, "noise", lambda: curves_csv(noise)
+    )

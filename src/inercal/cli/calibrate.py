@@ -21,7 +21,7 @@ from inercal.cli.options import (
     read_repeats,
     working,
 )
-from inercal.cli.outcome import hand_over
+from inercal.cli.outcome import hand_over, printed
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -83,7 +83,7 @@ def calibrate_imu(
         drawn = _imu_pictures(solved[0][0]) if len(runs) == 1 else repeats(estimate)
         return render(estimate, drawn, "Calibration of an inertial measurement unit")
 
-    return hand_over(estimate, estimate, page, output, estimate.status.advice)
+    return hand_over(estimate, [printed(estimate)], page, output)
 
 
 def _imu_pictures(found: Calibrated) -> list[Picture]:
@@ -141,7 +141,7 @@ def calibrate_turntable(
         drawn = pictures(found) if isinstance(found, Calibration) else rate_pictures(found)
         return render(shown, drawn, "Calibration on a turntable")
 
-    return hand_over(estimate, shown, page, output, table=tolerances(estimate))
+    return hand_over(estimate, [printed(shown), tolerances(estimate)], page, output)
 
 
 def _solve(

@@ -9,8 +9,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli import EXIT_BAD_VERDICT, process_age
+from inercal.cli import process_age
 from inercal.cli.options import ReportOutput
+from inercal.cli.outcome import hand_over
 
 _CALIBRATION = "Calibration that `inercal calibrate --out` wrote."
 
@@ -25,8 +26,7 @@ def compare(
     """Compare two calibrations of one instrument."""
     from inercal.estimate.compare import Saved
     from inercal.estimate.compare import compare as compared
-    from inercal.estimate.exchange import load, save, to_json
-    from inercal.estimate.status import Status
+    from inercal.estimate.exchange import load
     from inercal.records.read import source_of
     from inercal.report.comparison import page, table
 
@@ -38,15 +38,4 @@ def compare(
     estimate = compared(*files)
     timing = {"read": read - clock, "solve": time.perf_counter() - read, "total": process_age()}
     estimate = replace(estimate, inputs=inputs, timing=timing)
-    output.say_findings(estimate.findings)
-    if output.out is not None:
-        save(estimate, output.out)
-        output.say(f"comparison: {output.out}")
-    if output.report is not None:
-        from inercal._files import write_text
-
-        write_text(output.report, page(estimate))
-        output.say(f"report: {output.report}")
-    verdict = f"{estimate.status.value}: {estimate.message}"
-    output.emit(to_json(estimate), f"{table(estimate)}\n\n{verdict}")
-    return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
+    return hand_over(estimate, [table(estimate)], lambda: page(estimate), output, "comparison")

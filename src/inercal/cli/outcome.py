@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from inercal.cli import EXIT_BAD_VERDICT
@@ -14,33 +14,36 @@ if TYPE_CHECKING:
 
 def hand_over(
     estimate: Estimate,
-    shown: Estimate,
+    tables: Iterable[str],
     page: Callable[[], str],
     output: ReportOutput,
-    advice: str = "",
-    table: str = "",
     what: str = "calibration",
+    curves: Callable[[], str] | None = None,
 ) -> int:
     """Write what was asked for, say the verdict, and give the exit code.
 
-    People see ``shown`` and the ``table`` below it, and with a bad verdict the ``advice``, where the message does not
-    hold it itself; ``what`` the file is, in a word.
+    People see the ``tables`` that are not empty; ``what`` the file is, in a word, and ``curves`` is its text where a
+    .csv was asked for.
     """
+    from inercal._files import write_text
     from inercal.estimate.exchange import save, to_json
     from inercal.estimate.status import Status
 
     output.say_findings(estimate.findings)
     if output.out is not None:
-        save(estimate, output.out)
+        if curves is not None and output.out.suffix.lower() == ".csv":
+            write_text(output.out, curves())
+        else:
+            save(estimate, output.out)
         output.say(f"{what}: {output.out}")
     if output.report is not None:
-        from inercal._files import write_text
-
         write_text(output.report, page())
         output.say(f"report: {output.report}")
-    text = "".join(f"{part}\n\n" for part in (shown.table() if shown.names else "", table) if part)
-    verdict = f"{estimate.status.value}: {estimate.message}"
-    if estimate.status is not Status.OK and advice:
-        verdict += f"\n{advice}"
-    output.emit(to_json(estimate), text + verdict)
+    text = "".join(f"{table}\n\n" for table in tables if table)
+    output.emit(to_json(estimate), f"{text}{estimate.status.value}: {estimate.message}")
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
+
+
+def printed(estimate: Estimate) -> str:
+    """The table of the coefficients; nothing where there are none."""
+    return estimate.table() if estimate.names else ""

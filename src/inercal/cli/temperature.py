@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from inercal.cli import process_age
 from inercal.cli.options import MapFile, ReportOutput, read_record
-from inercal.cli.outcome import hand_over
+from inercal.cli.outcome import hand_over, printed
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def temperature(
 
         return render(estimate, pictures(model), "Bias and scale factor against temperature")
 
-    return hand_over(estimate, estimate, page, output, estimate.status.advice, what="temperature model")
+    return hand_over(estimate, [printed(estimate)], page, output, "temperature model")
 
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:

@@ -1,4 +1,7 @@
-"""The verdict on an estimate: a code that programs test, a meaning and advice that people read."""
+"""The verdict on an estimate: a code that programs test, and a meaning that people read.
+
+What to do about a bad one is in the message of the estimate, which knows the case.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +23,6 @@ class Status(enum.Enum):
         """One sentence: what this verdict says."""
         return _MEANING[self]
 
-    @property
-    def advice(self) -> str:
-        """One sentence: what to do about it."""
-        return _ADVICE[self]
-
 
 _MEANING = {
     Status.OK: "the estimate is sound",
@@ -33,13 +31,4 @@ _MEANING = {
     Status.INCONSISTENT: "the data contradict the model or the stated noise",
     Status.UNOBSERVABLE: "the data say nothing about some combination of the parameters",
     Status.TOO_FEW_INTERVALS: "too few static intervals were found to fit the model",
-}
-
-_ADVICE = {
-    Status.OK: "use the values with their uncertainties",
-    Status.ILL_CONDITIONED: "add the poses or motions named in the message, or use only the other parameters",
-    Status.NOT_CONVERGED: "check units, signs and the order of the channels with `inercal inspect`",
-    Status.INCONSISTENT: "check units, signs, channels and noise settings; look at the residuals",
-    Status.UNOBSERVABLE: "change the plan so that the named combination is excited, or leave the term out",
-    Status.TOO_FEW_INTERVALS: "hold the instrument still for longer, in more poses, and record again",
 }
