@@ -230,11 +230,12 @@ def test_an_instrument_that_moves_is_not_at_rest(seconds, peak):
 
 
 def test_a_knock_is_said_and_left_to_the_user():
-    x = white(30000, 16)
+    x = white(1200000, 16)
     x[10000:10020] += 400.0 * np.sin(np.arange(20.0))
     found = noise_of(record(column("acc_x", "g", x))).estimate
     assert found.status is Status.OK
     assert codes(found).count("not_at_rest") == 1
+    assert found.message == "noise of 1 channel from 12000 s at rest, acc_x disturbed"
 
 
 @pytest.mark.parametrize(
@@ -274,5 +275,7 @@ def test_a_span_of_the_record():
     np.testing.assert_array_equal(part["acc_x"].values, np.arange(100.0, 301.0))
     np.testing.assert_array_equal(part["gyro_x"].values, np.arange(100.0, 200.0))
     assert within(whole, None, None) is whole
-    with pytest.raises(InputError, match="expected a span within the record"):
+    with pytest.raises(InputError, match="found 20 s to 30 s, expected a span within the record"):
         within(whole, 20.0, 30.0)
+    with pytest.raises(InputError, match=r"found 20 s and later, expected .* which lasts 9.99 s"):
+        within(whole, 20.0, None)

@@ -103,8 +103,8 @@ def noise_coefficients(
     fitted after all, is counted as one standard uncertainty. The degrees of freedom of a ramp are those of the noise
     in which it is seen (Welch and Satterthwaite); those of other terms are half of the chi-square degrees of freedom
     that a term's own scatter leaves it, for with a standard deviation s of nu degrees of freedom and
-    u = s/sqrt(2 nu) the interval s ± t(nu/2) u holds the truth at its level within about 2 % whatever nu is. Where
-    a misfit remains, the covariance is multiplied by chi2 per degree of freedom.
+    u = s/sqrt(2 nu) the interval s ± t(nu/2) u holds the truth at 95 % within 1 % from nu = 4 on, and more often
+    below. Where a misfit remains, the covariance is multiplied by chi2 per degree of freedom.
     """
     unknown = [term for term in terms if term not in SYMBOLS]
     if unknown or not terms:

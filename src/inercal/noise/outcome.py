@@ -18,7 +18,7 @@ from inercal.instruments.noise import SYMBOLS
 from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
-from inercal.noise.rest import unrest
+from inercal.noise.rest import Unrest, unrest
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Column, Record
@@ -98,7 +98,7 @@ def noise_of(record: Record, given: Mapping[str, Any] | None = None) -> Noise:
     channels: list[ChannelNoise] = []
     said: dict[tuple[str, str], list[str]] = {}
     findings: list[Finding] = []
-    moving: list[str] = []
+    disturbed: dict[str, Unrest] = {}
     for columns in groups:
         interval, samples = _on_a_grid(columns)
         curve = allan_deviation(samples, interval, level=LEVEL)
@@ -111,10 +111,9 @@ def noise_of(record: Record, given: Mapping[str, Any] | None = None) -> Noise:
             if found is not None:
                 where = f"{found.first:.1f} s to {found.last:.1f} s from the start"
                 findings.append(Finding("not_at_rest", f"{column.name} {found.words}", where))
-                if found.moving:
-                    moving.append(column.name)
+                disturbed[column.name] = found
     of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in said.items()]
-    estimate = _assemble(record, channels, [*of_fits, *findings], moving, given or {})
+    estimate = _assemble(record, channels, [*of_fits, *findings], disturbed, given or {})
     return Noise(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
 
 
@@ -139,8 +138,12 @@ def within(record: Record, begin: float | None, end: float | None) -> Record:
         inside, t = cut[id(column.t)]
         columns[name] = replace(column, t=t, values=column.values[inside])
     if not any(inside.any() for inside, _ in cut.values()):
+        stamps = (column.t[np.isfinite(column.t)] for column in record.columns.values())
+        lasts = max((float(np.ptp(t)) for t in stamps if t.size), default=0.0)
+        later = "and later" if np.isinf(high) else f"to {high:g} s"
         raise InputError(
-            "--begin, --end", f"found {low:g} s to {high:g} s, expected a span within the record"
+            "--begin, --end",
+            f"found {low:g} s {later}, expected a span within the record, which lasts {lasts:.4g} s",
         )
     return replace(record, columns=columns, labels=())
 
@@ -192,7 +195,7 @@ def _assemble(
     record: Record,
     channels: list[ChannelNoise],
     findings: list[Finding],
-    moving: list[str],
+    disturbed: Mapping[str, Unrest],
     given: Mapping[str, Any],
 ) -> Estimate:
     """Put the estimate together: N, B, K, R, Q of each channel.
@@ -226,7 +229,7 @@ def _assemble(
     for k, block in enumerate(blocks):
         own = slice(k * len(SYMBOLS), (k + 1) * len(SYMBOLS))
         covariance[own, own] = block
-    status, message = _verdict(channels, moving)
+    status, message = _verdict(channels, disturbed)
     longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
     return Estimate(
         command=COMMAND,
@@ -277,12 +280,15 @@ def _curve(channel: ChannelNoise) -> dict[str, Any]:
     return out
 
 
-def _verdict(channels: list[ChannelNoise], moving: list[str]) -> tuple[Status, str]:
+def _verdict(channels: list[ChannelNoise], disturbed: Mapping[str, Unrest]) -> tuple[Status, str]:
     """Status and its sentence."""
     seconds = max(each.curve.samples * each.curve.interval for each in channels)
+    moving = [name for name, each in disturbed.items() if each.moving]
     if moving:
         return Status.INCONSISTENT, (
             f"the instrument was not at rest ({', '.join(moving)}), and noise coefficients are of rest alone: take the "
             "part at rest with --begin and --end"
         )
-    return Status.OK, f"noise of {counted(len(channels), 'channel')} from {seconds:.4g} s at rest"
+    though = f", {', '.join(disturbed)} disturbed" if disturbed else ""
+    lasted = f"{seconds:.0f}" if seconds >= 1000 else f"{seconds:.4g}"
+    return Status.OK, f"noise of {counted(len(channels), 'channel')} from {lasted} s at rest{though}"

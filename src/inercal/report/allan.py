@@ -36,6 +36,9 @@ _SLOPES = {
 _ABREAST = 3
 """Channels side by side in a picture."""
 
+_LEGEND = ("measured", "fit", *SYMBOLS)
+"""Entries of the legend, in its order, by what they begin with."""
+
 
 def shown_units(unit: str) -> tuple[tuple[str, float], tuple[tuple[str, float], ...]]:
     """Units for people of samples in ``unit`` (SI) and of N, B, K, R, Q, each with its size in SI."""
@@ -56,7 +59,8 @@ def cells(channel: ChannelNoise, noise: Noise) -> list[str]:
             value, u = rounded(p.value / size, p.u / size)
             found.append(f"{value} ± {u}")
         else:
-            found.append(f"< {channel.fit.bounds[symbol] / size:.2g}")
+            limit = channel.fit.bounds[symbol] / size
+            found.append(f"< {rounded(limit, limit)[1]}")
     return found
 
 
@@ -130,7 +134,9 @@ def _picture(sensor: str, channels: Sequence[ChannelNoise], noise: Noise) -> Pic
             for axes in panels[0]
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
         }
-        page.legend(shown.values(), shown.keys(), loc="outside upper center", ncols=4)
+        labels = sorted(shown, key=lambda label: _LEGEND.index(label.partition(",")[0]))
+        handles = [shown[label] for label in labels]
+        page.legend(handles, labels, loc="outside upper center", ncols=len(_LEGEND))
         drawn = svg(page)
     words = {"acc": "Accelerometers", "gyro": "Gyro", "a": "Accelerometers"}
     return Picture(
@@ -159,17 +165,22 @@ def _curve(axes: Axes, channel: ChannelNoise, noise: Noise) -> None:
     if channel.fit is not None:
         fitted = tau[_fitted(channel)]
         axes.plot(fitted, np.sqrt(channel.fit.variance(fitted)) / size, color=INK, lw=1.0, label="fit")
-        for k, symbol in enumerate(reversed(channel.fit.names)):
-            value = noise.estimate[f"{symbol}_{channel.name}"].value
-            _slope(axes, symbol, value / size, tau)
+        falls = deviation[-1] <= deviation[0]  # then the upper right is free, else the upper left
+        for k, symbol in enumerate(channel.fit.names):
+            p = noise.estimate[f"{symbol}_{channel.name}"]
+            _slope(axes, symbol, p.value / size, tau)
             text, of_coefficient = coefficients[SYMBOLS.index(symbol)]
+            value, _ = rounded(p.value / of_coefficient, p.u / of_coefficient)
             axes.text(
-                0.04,
-                0.04 + 0.07 * k,
-                f"{symbol} {value / of_coefficient:.3g} {plain_unit(text)}",
+                0.97 if falls else 0.03,
+                0.97 - 0.075 * k,
+                f"{symbol} {value} {plain_unit(text)}",
                 transform=axes.transAxes,
+                ha="right" if falls else "left",
+                va="top",
                 fontsize=6.5,
                 color=_SLOPES[symbol][2],
+                bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.8},
             )
     powers_of_ten(axes.xaxis)
     powers_of_ten(axes.yaxis)
@@ -227,7 +238,7 @@ def _common_limits(above: Axes, below: Axes, channels: Sequence[ChannelNoise]) -
     curves = np.concatenate([channel.deviation for channel in channels]) / size
     known = curves[np.isfinite(curves) & (curves > 0)]
     if known.size:
-        above.set_ylim(0.5 * known.min(), 2.0 * known.max())
+        above.set_ylim(0.5 * known.min(), 3.0 * known.max())
     off = [_off(channel)[0][_fitted(channel)] for channel in channels if channel.fit is not None]
     largest = 1.3 * float(np.nanmax(np.abs(np.concatenate(off)), initial=10.0)) if off else 10.0
     below.set_ylim(max(-largest, -100.0), largest)
