@@ -56,9 +56,7 @@ def passes(calibration) -> dict:
     kernels.integrate(start, omega, intervals, out)  # compiles or loads
     return {
         "one pass of the turns": lambda: carried(turns, up, gyro.model, gyro.drift),
-        "the same with derivatives": lambda: carried_with_derivatives(
-            turns, up, gyro.model, gyro.drift
-        ),
+        "the same with derivatives": lambda: carried_with_derivatives(turns, up, gyro.model, gyro.drift),
         "as many intervals, compiled": lambda: kernels.integrate(start, omega, intervals, out),
     }
 

@@ -56,11 +56,6 @@ def test_accelerometers_alone_are_one_file(tmp_path):
     assert not any(name.startswith("S_") for name in estimate.names)
 
 
-def test_g_sensitivity_is_refused_not_dropped():
-    with pytest.raises(InputError, match="g-sensitive"):
-        imu_tk.terms(instrument(1, sensitive=True))
-
-
 # As imu_tk writes it: columns of Eigen, no words after the numbers.
 ITS_OWN = """           1  -0.003359299  -0.008906395
            0            1   -0.02133412

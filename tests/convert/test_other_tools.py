@@ -85,6 +85,16 @@ def test_a_coefficient_for_which_there_is_no_place_is_named():
     assert Finding("not_held", "imu_tk has no place for D_R_x: left out") in found
 
 
+def test_g_sensitivity_is_left_out_of_imu_tk_with_its_size():
+    """What the largest G does at 9.80665 m/s^2, in the gyro's unit: more than that no rate is off."""
+    model = instrument(16, sensitive=True)
+    converted = to_tool(estimate_of(model, np.random.default_rng(16)), "imu_tk").estimate
+    (text,) = (f.message for f in converted.findings if f.code == "not_held")
+    assert "G_xx, G_xy" in text
+    largest = np.max(np.abs(model.g_sensitivity)) * 9.80665
+    assert f"(G is up to {largest:.2g} {model.units['gyro']} at 1 g)" in text
+
+
 def test_outputs_in_g_are_converted_for_tools_that_know_only_si_units_and_counts_stay():
     model = replace(instrument(15), units={"acc": "g", "gyro": "count"})
     texts = to_tool(estimate_of(model, np.random.default_rng(15)), "kalibr").texts

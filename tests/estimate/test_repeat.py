@@ -31,7 +31,7 @@ def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:
 def test_the_rule_of_mandel_and_paule_against_its_definition():
     """With the variance found, the weighted sum of squares equals its degrees of freedom."""
     x, variances = np.array([1.0, 1.3, 0.7, 1.9]), np.array([0.01, 0.02, 0.01, 0.05])
-    found = mandel_paule(x, variances)
+    found = mandel_paule(x, variances, np.full(4, np.inf))
     weights = 1.0 / (variances + found.between)
     mean = weights @ x / weights.sum()
     assert weights @ (x - mean) ** 2 == pytest.approx(3.0, rel=1e-8)
@@ -41,7 +41,7 @@ def test_the_rule_of_mandel_and_paule_against_its_definition():
 def test_equal_variances_have_a_closed_form():
     """s^2 - sigma^2: the variance of the values less that of each."""
     x = np.array([1.0, 2.0, 4.0, 4.5, 7.0])
-    found = mandel_paule(x, np.full(5, 0.25))
+    found = mandel_paule(x, np.full(5, 0.25), np.full(5, np.inf))
     assert found.between == pytest.approx(np.var(x, ddof=1) - 0.25, rel=1e-8)
     np.testing.assert_allclose(found.weights, 0.2, rtol=1e-8)
 
@@ -149,6 +149,18 @@ def test_a_bad_run_is_left_out_and_gives_the_verdict():
     assert alone.message.startswith("run 2 (b.csv): found 3")
 
 
+def test_a_change_between_runs_is_claimed_by_chance_no_more_often_than_said():
+    """4000 sets of six runs without any change, variances of eight degrees of freedom each: a probability below 2 %
+    in 2 % of them, give or take 4.5 standard deviations (1 %)."""
+    rng = np.random.default_rng(20261121)
+    said = 0
+    for _ in range(4000):
+        true = rng.uniform(0.5, 2.0, 6)
+        found = mandel_paule(rng.normal(0.0, np.sqrt(true)), true * rng.chisquare(8, 6) / 8, np.full(6, 8.0))
+        said += found.probability < 0.02
+    assert 0.01 < said / 4000 < 0.03
+
+
 def test_runs_of_another_kind_are_refused():
     with pytest.raises(InputError, match=r"run 2: found 2 coefficients, .* expected 1 coefficients"):
         combine_runs([run_of([1.0], [1.0]), run_of([1.0, 2.0], [1.0, 1.0])])
@@ -167,8 +179,10 @@ def test_findings_and_results_that_runs_share_are_said_once():
 
 
 def test_the_budget_adds_up():
-    item = BudgetItem("gravity", "B", 0.3, "m/s^2", {"K0_x": 0.09 / 1.09})
-    runs = [run_of([x], [1.0], [[0.09]], budget=(item,)) for x in (0.0, 3.0, 5.0)]
+    """Of a variance of 1.09 in each run, 0.09 is gravity's and 0.3 that of an alignment that is set up anew."""
+    gravity = BudgetItem("gravity", "B", 0.3, "m/s^2", {"K0_x": 0.09 / 1.09})
+    alignment = BudgetItem("alignment", "B", 0.01, "rad", {"K0_x": 0.3 / 1.09}, redrawn=True)
+    runs = [run_of([x], [1.0], [[0.09]], budget=(gravity, alignment)) for x in (0.0, 3.0, 5.0)]
     found = combine_runs(runs)
     assert sum(part.share.get("K0_x", 0.0) for part in found.budget) == pytest.approx(1.0)
     assert [part.source for part in found.budget] == [

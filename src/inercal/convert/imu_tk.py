@@ -40,12 +40,7 @@ Array = NDArray[np.float64]
 
 
 def terms(model: ImuModel) -> Terms:
-    """``T_a, K_a, b_a`` and, where there is a gyro, ``T_g, K_g, b_g``; raises `InputError` for g-sensitivity."""
-    if model.g_sensitivity.any():
-        raise InputError(
-            "imu_tk",
-            "found a g-sensitive gyro (G), for which it has no place, expected a calibration without G",
-        )
+    """``T_a, K_a, b_a`` and, where there is a gyro, ``T_g, K_g, b_g``; it has no place for g-sensitivity."""
     found: Terms = {}
     for letter, triad in (("a", model.accelerometer), ("g", model.gyro)):
         if triad is not None:

@@ -20,6 +20,7 @@ from inercal.instruments.terms import GYRO_G_SENSITIVITY, TERMS
 from inercal.instruments.triad import TriadModel
 from inercal.records.findings import Finding
 from inercal.records.read import source_of
+from inercal.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -80,7 +81,11 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
     dof = np.where(matters, estimate.dof, math.inf).min(axis=1, initial=math.inf)
     findings = list(convention.notes(terms))
     if unused:
-        findings.append(Finding("not_held", f"{name} has no place for {', '.join(unused)}: left out"))
+        text = f"{name} has no place for {', '.join(unused)}: left out"
+        if any(term.startswith("G_") for term in unused):
+            largest = float(np.max(np.abs(model.g_sensitivity))) * STANDARD_GRAVITY
+            text += f" (G is up to {largest:.2g} {model.units['gyro']} at 1 g)"
+        findings.append(Finding("not_held", text))
     converted = replace(
         estimate,
         command="convert",

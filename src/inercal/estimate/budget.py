@@ -50,13 +50,17 @@ class TypeB:
 
 @dataclass(frozen=True)
 class BudgetItem:
-    """One line of a budget: a source, its u, and the share of each parameter's variance that it causes."""
+    """One line of a budget: a source, its u, and the share of each parameter's variance that it causes.
+
+    ``redrawn`` as in `TypeB`.
+    """
 
     source: str
     type: str
     u: float
     unit: str
     share: Mapping[str, float]
+    redrawn: bool = False
 
 
 def combine(
@@ -101,4 +105,6 @@ def _item(names: Sequence[str], source: TypeA | TypeB, variance: Array) -> Budge
         for name, part, whole in zip(names, own, variance, strict=True)
         if part > 0 and whole > 0
     }
-    return BudgetItem(source.source, "A" if isinstance(source, TypeA) else "B", source.u, source.unit, share)
+    if isinstance(source, TypeA):
+        return BudgetItem(source.source, "A", source.u, source.unit, share)
+    return BudgetItem(source.source, "B", source.u, source.unit, share, source.redrawn)

@@ -43,7 +43,10 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
         "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in estimate.findings],
         "statistics": estimate.statistics,
         "budget": [
-            {"source": b.source, "type": b.type, "u": b.u, "unit": b.unit, "share": b.share}
+            {
+                **{"source": b.source, "type": b.type, "u": b.u, "unit": b.unit, "share": b.share},
+                **({"redrawn": True} if b.redrawn else {}),
+            }
             for b in estimate.budget
         ],
         "model": estimate.model,
@@ -99,7 +102,7 @@ def from_json(data: Mapping[str, Any]) -> Estimate:
         findings=tuple(Finding(f["code"], f["message"], f["where"]) for f in data.get("findings", ())),
         statistics={key: _number(value) for key, value in data.get("statistics", {}).items()},
         budget=tuple(
-            BudgetItem(b["source"], b["type"], _number(b["u"]), b["unit"], b["share"])
+            BudgetItem(b["source"], b["type"], _number(b["u"]), b["unit"], b["share"], bool(b.get("redrawn")))
             for b in data.get("budget", ())
         ),
         model=data.get("model", ""),

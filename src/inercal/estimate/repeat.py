@@ -49,14 +49,14 @@ class Combined:
     probability: float
 
 
-def mandel_paule(x: Array, variances: Array) -> Combined:
-    """Weigh values (k,) with known variances (k,) that may also differ by a variance of unknown size.
+def mandel_paule(x: Array, variances: Array, dof: Array) -> Combined:
+    """Weigh values (k,) with variances (k,) of ``dof`` (k,) that may also differ by a variance of unknown size.
 
     The between-run variance is the one with which the weighted sum of squares equals k - 1; 0 where it is less even
-    without. ``probability`` is that of such a sum of squares by chance alone (chi-square).
+    without. ``probability`` is that of such a sum of squares by chance alone, by Welch's test (Biometrika 38 (1951)
+    330), as the variances are estimates themselves.
     """
     from scipy.optimize import brentq
-    from scipy.special import chdtrc
 
     k = len(x)
     size = max(float(np.ptp(x)), float(np.sqrt(np.max(variances)))) or 1.0
@@ -71,7 +71,20 @@ def mandel_paule(x: Array, variances: Array) -> Combined:
     first = surplus(floor)
     between = float(brentq(surplus, floor, float(k), xtol=1e-15, rtol=1e-12)) if first > 0.0 else 0.0
     weights = 1.0 / (known + max(between, floor))
-    return Combined(weights / weights.sum(), between * size**2, float(chdtrc(k - 1.0, first + k - 1.0)))
+    probability = _welch(1.0 / (known + floor), first + k - 1.0, dof)
+    return Combined(weights / weights.sum(), between * size**2, probability)
+
+
+def _welch(weights: Array, squares: float, dof: Array) -> float:
+    """Probability of a weighted sum of squares of k values about their mean, with weights of ``dof`` (k,)."""
+    from scipy.special import chdtrc, fdtrc
+
+    k = len(weights)
+    unsure = float(np.sum((1.0 - weights / weights.sum()) ** 2 / dof))
+    if unsure == 0.0:
+        return float(chdtrc(k - 1.0, squares))
+    ratio = squares / (k - 1.0) / (1.0 + 2.0 * (k - 2.0) / (k**2 - 1.0) * unsure)
+    return float(fdtrc(k - 1.0, (k**2 - 1.0) / (3.0 * unsure), ratio))
 
 
 def combine_runs(runs: Sequence[Estimate]) -> Estimate:
@@ -118,15 +131,14 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     )
     own = np.array([run.covariance for run in sound]) - elsewhere
     known = np.mean(elsewhere, axis=0)
-    parts = [
-        mandel_paule(values, np.maximum(variances, 0.0))
-        for values, variances in zip(x.T, np.diagonal(own, axis1=1, axis2=2).T, strict=True)
-    ]
+    spread = np.maximum(np.diagonal(own, axis1=1, axis2=2), 0.0)
+    alone = _own_dof(sound, spread)
+    parts = [mandel_paule(*each) for each in zip(x.T, spread.T, alone.T, strict=True)]
     weights = np.array([part.weights for part in parts]).T
     within = np.einsum("kp,kq,kpq->pq", weights, weights, own)
     between = np.array([part.between for part in parts]) * np.sum(weights**2, axis=0)
     covariance = known + within + np.diag(between)
-    dof = _dof(sound, weights, own, np.diag(within) + between, np.diag(covariance))
+    dof = _dof(alone, weights, spread, np.diag(within) + between, np.diag(covariance))
     names = first.names
     findings = [*_findings(runs), *_changes(first, parts)]
     status, message = Status.OK, f"{len(names)} coefficients from {counted(len(sound), 'run')}"
@@ -164,17 +176,24 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     )
 
 
-def _dof(runs: Sequence[Estimate], weights: Array, own: Array, type_a: Array, total: Array) -> Array:
-    """Degrees of freedom (p,): k - 1 where a change from run to run was found, else those of the runs together."""
-    spread = np.diagonal(own, axis1=1, axis2=2)
-    # dof of a run are those of its whole variance; its type A part alone has fewer (Welch-Satterthwaite)
+def _own_dof(runs: Sequence[Estimate], spread: Array) -> Array:
+    """Degrees of freedom (k, p) of the variances ``spread`` (k, p) of the runs alone.
+
+    Those of a run are of its whole variance; the part of it has fewer (Welch-Satterthwaite).
+    """
     whole = np.array([np.diag(run.covariance) for run in runs])
     with np.errstate(divide="ignore", invalid="ignore"):
-        alone = np.array([run.dof for run in runs]) * (spread / whole) ** 2
-        pooled = type_a**2 / np.sum((weights**2 * spread) ** 2 / alone, axis=0)
+        dof = np.array([run.dof for run in runs]) * (spread / whole) ** 2
+    return np.where(np.isfinite(dof) & (dof > 0), dof, np.inf)
+
+
+def _dof(dof: Array, weights: Array, spread: Array, type_a: Array, total: Array) -> Array:
+    """Degrees of freedom (p,): k - 1 where a change from run to run was found, else those of the runs together."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pooled = type_a**2 / np.sum((weights**2 * spread) ** 2 / dof, axis=0)
         found = type_a > 1.000001 * np.sum(weights**2 * spread, axis=0)
-        dof = np.where(found, len(runs) - 1.0, pooled) * (total / type_a) ** 2
-    return np.where(np.isfinite(dof), np.maximum(dof, 1.0), np.inf)
+        combined = np.where(found, len(dof) - 1.0, pooled) * (total / type_a) ** 2
+    return np.where(np.isfinite(combined), np.maximum(combined, 1.0), np.inf)
 
 
 def _changes(first: Estimate, parts: Sequence[Combined]) -> list[Finding]:
@@ -189,7 +208,7 @@ def _changes(first: Estimate, parts: Sequence[Combined]) -> list[Finding]:
 
 
 def _budget(runs: Sequence[Estimate], within: Array, between: Array, total: Array) -> tuple[BudgetItem, ...]:
-    """Scatter within and between the runs, and the sources from elsewhere as in the first run."""
+    """Scatter within and between the runs, and the sources that are one error in all."""
     names = runs[0].names
 
     def shares(variance: Array) -> dict[str, float]:
@@ -199,11 +218,21 @@ def _budget(runs: Sequence[Estimate], within: Array, between: Array, total: Arra
             if part > 0 and whole > 0
         }
 
-    own = np.diag(runs[0].covariance)
+    def variance(source: str) -> Array:
+        """What a source does, in the mean of the runs."""
+        each = [
+            (run.u**2, item.share)
+            for run in runs
+            for item in run.budget
+            if item.source == source and item.type == "B"
+        ]
+        parts = [np.array([share.get(name, 0.0) for name in names]) * u2 for u2, share in each]
+        return np.asarray(np.sum(parts, axis=0) / len(runs))
+
     elsewhere = (
-        replace(item, share=shares(np.array([item.share.get(name, 0.0) for name in names]) * own))
+        replace(item, share=shares(variance(item.source)))
         for item in runs[0].budget
-        if item.type == "B"
+        if item.type == "B" and not item.redrawn
     )
     # each coefficient has its own size of scatter, so that there is no one u to state
     return (

@@ -28,8 +28,9 @@ COMMAND = "calibrate imu"
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "
     "frame axis j); accelerometers: K1, M upper-triangular, K0, with |f| = g in every static pose; gyro: S, T full, "
-    "D_F, and + G f where g-sensitivity, + D_R (t - t0) where the drift of the bias is estimated. Frame: z along the "
-    "input axis of accelerometer z, y in the plane of the input axes of accelerometers y and z."
+    "D_F, and + G f where g-sensitivity, + D_R (t - t0) where the drift of the bias in this recording is estimated, t0 "
+    "= bias_time_s. Frame: z along the input axis of accelerometer z, y in the plane of the input axes of "
+    "accelerometers y and z."
 )
 
 FRAME = "b, of the instrument: z along the input axis of accelerometer z, y in the plane of those of y and z"
