@@ -214,7 +214,7 @@ def test_what_cannot_be_integrated_is_left_out_and_said():
     record, truth = recording(seed=12, poses=24)
     t, acc, gyro = arrays(record)
     middle = np.searchsorted(t, 31.5)  # in the first turn
-    gyro[middle] = np.nan
+    gyro[middle : middle + 4] = np.nan
     limit = gyro[middle + 300 : middle + 310, 0].max() + 1e6
     gyro[middle + 300 : middle + 310, 0] = limit  # flat at an extreme in the second turn
     estimate = calibrate(record_of(t, acc, gyro), SETTINGS).estimate
@@ -298,6 +298,23 @@ def test_specific_force_in_g_labelled_as_metres_per_second_squared():
     assert "acc are 0.1" in estimate.message
 
 
+@pytest.mark.parametrize("share", [0.001, 0.01])
+def test_missing_values_anywhere_are_missing_samples_and_no_movement(share):
+    """Single cells lost at random, in the rest at the start too: as many poses and turns, hardly other values."""
+    record, truth = recording(seed=33, poses=24)
+    t, acc, gyro = arrays(record)
+    whole = calibrate(record_of(t, acc, gyro), SETTINGS).estimate
+    rng = np.random.default_rng(33)
+    for values in (acc, gyro):
+        values[rng.random(values.shape) < share] = np.nan
+    acc[100, 0] = np.nan
+    holed = calibrate(record_of(t, acc, gyro), SETTINGS).estimate
+    assert holed.status is Status.OK
+    assert holed.statistics["intervals"] == whole.statistics["intervals"]
+    assert holed.statistics["turns"] >= whole.statistics["turns"] - 2
+    assert np.all(np.abs(compare(holed, truth)) < 5.0 * holed.u)
+
+
 def test_a_missing_accelerometer_sample_in_a_turn_does_no_harm_to_g_sensitivity():
     record, truth = recording(seed=19, poses=24, g_sensitivity=2e-4)
     t, acc, gyro = arrays(record)
@@ -351,7 +368,8 @@ def test_a_dead_axis_is_named(sensor):
 def test_a_gyro_that_could_not_be_calibrated_is_no_sound_calibration():
     record, _ = recording(seed=23)
     t, acc, gyro = arrays(record)
-    gyro[1600::40] = np.nan  # a hole in every turn
+    for lost in range(5):  # a hole in every turn
+        gyro[1600 + lost :: 40] = np.nan
     estimate = calibrate(record_of(t, acc, gyro), SETTINGS).estimate
     assert estimate.status is not Status.OK
     assert any(finding.code == "gyro_missing" for finding in estimate.findings)

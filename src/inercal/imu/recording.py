@@ -54,7 +54,7 @@ def prepare(record: Record, static_start: float | None) -> Recording:
     """
     accelerometer = record.triad("acc")
     gyro = record.triad("gyro") if any(f"gyro_{axis}" in record for axis in "xyz") else None
-    accelerometer, gyro = _stamped(accelerometer, gyro)
+    accelerometer, gyro = _whole(accelerometer, gyro)
     t, where = accelerometer.t, accelerometer.source.path
     for triad in (accelerometer, gyro):
         if triad is not None:
@@ -99,18 +99,25 @@ def _plausible(triad: Triad) -> None:
         )
 
 
-def _stamped(accelerometer: Triad, gyro: Triad | None) -> tuple[Triad, Triad | None]:
-    """The triads without samples that have no time stamp (the gap then shows); one clock stays one."""
-    shared = gyro is not None and gyro.t is accelerometer.t
-    known = np.isfinite(accelerometer.t)
-    if not known.all():
-        accelerometer = replace(accelerometer, t=accelerometer.t[known], values=accelerometer.values[known])
+def _whole(accelerometer: Triad, gyro: Triad | None) -> tuple[Triad, Triad | None]:
+    """The triads without rows that lack a stamp or a value (the gap then shows); one clock stays one."""
     if gyro is None:
-        return accelerometer, None
-    own = np.isfinite(gyro.t)
-    if not own.all():
-        gyro = replace(gyro, t=accelerometer.t if shared else gyro.t[own], values=gyro.values[own])
-    return accelerometer, gyro
+        return _kept(accelerometer, _complete(accelerometer)), None
+    if gyro.t is not accelerometer.t:
+        return _kept(accelerometer, _complete(accelerometer)), _kept(gyro, _complete(gyro))
+    both = _complete(accelerometer) & _complete(gyro)
+    accelerometer = _kept(accelerometer, both)
+    return accelerometer, replace(_kept(gyro, both), t=accelerometer.t)
+
+
+def _complete(triad: Triad) -> NDArray[np.bool_]:
+    """Rows (n,) with a stamp and three values."""
+    return np.asarray(np.isfinite(triad.t) & np.isfinite(triad.values).all(axis=1))
+
+
+def _kept(triad: Triad, rows: NDArray[np.bool_]) -> Triad:
+    """Those rows of a triad; the triad itself if these are all."""
+    return triad if rows.all() else replace(triad, t=triad.t[rows], values=triad.values[rows])
 
 
 def on_other_clock(values: Array, t: Array, other: Array) -> Array:
