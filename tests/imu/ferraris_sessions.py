@@ -1,5 +1,6 @@
 """Ferraris sessions for tests: the shipped recordings with their studies, and simulated ones."""
 
+import math
 import tomllib
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.record import Record
 from inercal.study.imu_ferraris import FerrarisTable, ferraris_settings
+from inercal.units import parse_unit
 
 SETTINGS = ImuSettings(Site(9.81))
 UNSURE = ImuSettings(Site(9.81, (GravityInput("gravity", 2e-3, "m/s^2", 1.0),)))
@@ -43,6 +45,19 @@ def session(seed: int, noisy: bool = False, g_sensitivity: float = 2e-4, **given
     if not noisy:
         truth = quiet(truth)
     return simulate_session(truth, replace(Session(), **given), rng)
+
+
+def in_degrees(record: Record, scale: float = 1.0) -> tuple[Record, float]:
+    """The same recording of a gyro in deg/s whose scale factors are ``scale`` times those of the counts over 4775 per
+    rad/s, and what takes the scale factors of the counts to it."""
+    factor = scale * math.degrees(1.0) / 4775.0
+    columns = {
+        name: replace(column, values=column.values * factor, unit=parse_unit("deg/s"))
+        if name.startswith("gyro")
+        else column
+        for name, column in record.columns.items()
+    }
+    return replace(record, columns=columns), factor
 
 
 def with_values(record: Record, **changes) -> Record:

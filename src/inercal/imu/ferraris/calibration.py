@@ -92,11 +92,15 @@ def calibrate_ferraris(
         return FerrarisCalibration(_timed(estimate, clock), acc, gyro, sections)
     found = matrices(readings.inputs, readings.weights)
     carried = misses(acc, gyro, sections, found)
+    turns = sections.turns
     against = list(contradictions((acc, gyro), found, carried, options))
+    if turns is not None:
+        against += turns.against
     progress("carrying the uncertainties")
     scatter = judge(readings, found, settings.site, options)
     findings = [
         *against,
+        *(() if turns is None else turns.findings),
         *readings.findings,
         *([] if against else sense_finding(found, carried)),
         *scatter_findings(scatter, options),

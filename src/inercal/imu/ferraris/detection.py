@@ -1,20 +1,20 @@
-"""Sections found in the data: holds with an axis upright, and turns about an axis between them.
+"""Sections found in the data: holds with an axis upright, and motions about an axis between them.
 
 A hold is where the windowed variance of both sensors stays near that of the calmest part of the record. Which axis
 is upright shows without any calibration: of many holds, each axis lies level in most, so that the median of its means
-is its bias. A turn is a stretch of motion whose integrated gyro output is dominated by one axis.
+is its bias. Which of the motions are the turns is chosen in `inercal.imu.ferraris.choice`.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.imu.ferraris.names import POSITIONS, TURNS, UP
+from inercal.imu.ferraris.motions import UPRIGHT, Level, Motion, motions, part
+from inercal.imu.ferraris.names import POSITIONS, UP
 from inercal.imu.recording import on_other_clock
 from inercal.records.dwells import Dwell, breaks, static_intervals, window_samples, windowed_variance
 from inercal.records.record import Triad
@@ -27,55 +27,26 @@ STILL = 8.0
 CALM = 0.2
 """Quantile of the windowed variance that stands for rest: holds are more than a fifth of such a recording."""
 
-UPRIGHT = 0.9
-"""Cosine of the largest angle (26 deg) from upright."""
-
-DOMINANT = 0.9
-"""Least part of the integrated rotation that is about the axis of a turn."""
-
-SMALLEST = 0.7
-"""Least size of the largest motion about an axis, over that of the others, that can be its turn."""
-
-NEAR = 0.25
-"""Largest deviation of a turn from the stated angle, or of its size from the largest of its axis, as a part of it."""
-
 
 @dataclass(frozen=True)
-class _Motion:
-    """A stretch of motion: samples ``start`` to ``stop``, its integrated rotation (3,) [output s]."""
+class Detected:
+    """The holds, those of them that are ``positions`` by name (start, stop), and the ``motions`` that leave the
+    vertical where it was; in samples of the accelerometers."""
 
-    start: int
-    stop: int
-    rotation: Array
-
-    def with_next(self, other: _Motion) -> _Motion:
-        """This and a later one, with the pause between them."""
-        return _Motion(self.start, other.stop, self.rotation + other.rotation)
+    holds: tuple[Dwell, ...]
+    positions: dict[str, tuple[int, int]]
+    motions: tuple[Motion, ...]
 
 
-def detect(acc: Triad, gyro: Triad, turn: float) -> dict[str, tuple[int, int]]:
-    """Find what sections there are.
-
-    Parameters
-    ----------
-    acc, gyro : Triad
-        The recording; the time axes may differ.
-    turn : float
-        Stated angle of the turns [rad], with its sign.
-
-    Returns
-    -------
-    dict of name to (start, stop)
-        Samples of the accelerometers. A section that was not found is not there.
-    """
+def detect(acc: Triad, gyro: Triad) -> Detected:
+    """Find the holds, the positions among them and the motions that may be turns; the time axes may differ."""
     holds = _holds(acc, gyro)
     if not holds:
-        return {}
-    found = _positions(acc, holds)
-    bias = np.mean([np.nanmean(_part(gyro, acc, hold.start, hold.stop)[1], axis=0) for hold in holds], axis=0)
-    for axis, motion in _turns(gyro, _motions(acc, gyro, holds, bias), turn).items():
-        found[TURNS[axis]] = (motion.start, motion.stop)
-    return found
+        return Detected((), {}, ())
+    level = Level.of(acc, holds)
+    bias = np.mean([np.nanmean(part(gyro, acc, hold.start, hold.stop)[1], axis=0) for hold in holds], axis=0)
+    found = motions(acc, gyro, holds, level, bias, _cuts(acc))
+    return Detected(holds, _positions(acc, holds, level), tuple(found))
 
 
 def _holds(acc: Triad, gyro: Triad) -> tuple[Dwell, ...]:
@@ -96,12 +67,12 @@ def _calm(variance: Array) -> NDArray[np.bool_]:
     return variance <= STILL * float(np.quantile(known, CALM)) if known.size else np.isfinite(variance)
 
 
-def _positions(acc: Triad, holds: tuple[Dwell, ...]) -> dict[str, tuple[int, int]]:
+def _positions(acc: Triad, holds: tuple[Dwell, ...], level: Level) -> dict[str, tuple[int, int]]:
     """The hold of each position: of several, those of the two positions of an axis that are nearest in time.
 
     Biases that wander then drop out of their difference.
     """
-    cosines = _levelled(acc, holds) @ UP.T
+    cosines = np.array([level.up(hold.of(acc.values)) for hold in holds]) @ UP.T
     found: dict[str, tuple[int, int]] = {}
     for k in range(0, 6, 2):
         up, down = (
@@ -144,70 +115,3 @@ def _long_enough(holds: list[Dwell]) -> list[Dwell]:
 def _apart(here: Dwell, there: Dwell) -> int:
     """Samples between two holds."""
     return max(here.start, there.start) - min(here.stop, there.stop)
-
-
-def _part(gyro: Triad, acc: Triad, start: int, stop: int) -> tuple[Array, Array]:
-    """Times and outputs of the gyro between two samples of the accelerometers."""
-    if gyro.t is acc.t:
-        return gyro.t[start:stop], gyro.values[start:stop]
-    inside = (gyro.t >= acc.t[start]) & (gyro.t <= acc.t[stop - 1])
-    return gyro.t[inside], gyro.values[inside]
-
-
-def _motions(acc: Triad, gyro: Triad, holds: tuple[Dwell, ...], bias: Array) -> Iterator[_Motion]:
-    """Stretches between holds and breaks of the time axis that leave the vertical where it was, and chains of them.
-
-    A turn by hand may pause where the hand takes a new grip.
-    """
-    level = _levelled(acc, holds)
-    before = {hold.stop: f for hold, f in zip(holds, level, strict=True)}
-    after = {hold.start: f for hold, f in zip(holds, level, strict=True)}
-    resting = np.zeros(len(acc.t), dtype=bool)
-    for hold in holds:
-        resting[hold.start : hold.stop] = True
-    begins_after = {hold.start: hold.stop for hold in holds}
-    chain: list[_Motion] = []
-    for stretch in static_intervals(~resting, _cuts(acc), 3):
-        t, output = _part(gyro, acc, stretch.start, stretch.stop)
-        f = [each for each in (before.get(stretch.start), after.get(stretch.stop)) if each is not None]
-        if len(t) < 3 or not np.isfinite(output).all() or (len(f) == 2 and f[0] @ f[1] < UPRIGHT):
-            chain = []
-            continue
-        own = _Motion(
-            stretch.start, stretch.stop, np.asarray(np.trapezoid(output - bias, t, axis=0), dtype=np.float64)
-        )
-        joined = bool(chain) and begins_after.get(chain[-1].stop) == own.start
-        chain = [*(earlier.with_next(own) for earlier in chain if joined), own]
-        yield from chain
-
-
-def _levelled(acc: Triad, holds: tuple[Dwell, ...]) -> Array:
-    """Direction (n, 3) of the specific force in the holds, as near as it shows without a calibration."""
-    means = np.array([hold.of(acc.values).mean(axis=0) for hold in holds])
-    f = means - np.median(means, axis=0)
-    size = np.linalg.norm(f, axis=1)
-    return np.asarray(f / np.where(size > 0.5 * size.max(), size, np.inf)[:, None])
-
-
-def _turns(gyro: Triad, motions: Iterable[_Motion], turn: float) -> dict[int, _Motion]:
-    """The turn about each axis: of physical outputs near the stated angle, of counts the largest there are."""
-    about: dict[int, list[_Motion]] = {0: [], 1: [], 2: []}
-    for motion in motions:
-        size = float(np.linalg.norm(motion.rotation))
-        axis = int(np.argmax(np.abs(motion.rotation)))
-        if size > 0.0 and abs(motion.rotation[axis]) > DOMINANT * size:
-            about[axis].append(motion)
-    largest = [max((abs(m.rotation[k]) for m in found), default=0.0) for k, found in about.items()]
-    wanted = [abs(turn) / gyro.unit.factor] * 3 if gyro.unit.dimension == "rate" else largest
-    chosen = {}
-    for axis, found in about.items():
-        # one in the stated sense first, then the nearest, as near as a hand can tell, and the shortest of those
-        ranked = sorted(
-            (m.rotation[axis] * turn < 0.0, round(20.0 * off), m.stop - m.start, k)
-            for k, m in enumerate(found)
-            if (off := abs(abs(m.rotation[axis]) / wanted[axis] - 1.0)) < NEAR
-        )
-        # a turn of counts that is far smaller than the others is another motion
-        if ranked and largest[axis] > SMALLEST * max(largest):
-            chosen[axis] = found[ranked[0][-1]]
-    return chosen

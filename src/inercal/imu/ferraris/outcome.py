@@ -17,7 +17,7 @@ from inercal.imu.ferraris.names import NAMES as SECTIONS
 from inercal.imu.ferraris.names import POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
-from inercal.imu.ferraris.uncertainty import Propagation, noise_covariance, type_a, type_b
+from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_covariance, type_a, type_b
 from inercal.imu.ferraris.verdict import too_few, verdict
 from inercal.imu.outcome import COMMAND
 from inercal.imu.settings import ImuSettings
@@ -60,6 +60,8 @@ def assemble(
     values = np.asarray(coefficients(readings.inputs, readings.weights), dtype=float)
     from_data = type_a(errors, acc_unit, gyro_unit)
     known = type_b(errors, settings.site, settings.time_base_u, options, acc_unit, gyro_unit)
+    if sections.turns is not None:
+        known += doubtful_turns(errors, sections.turns.doubt)
     covariance, dof, budget = combine(NAMES, [*from_data, *known])
     residual = np.sum([source.covariance for source in from_data], axis=0)
     status, message = verdict(readings, scatter, against, options)

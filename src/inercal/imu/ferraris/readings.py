@@ -14,16 +14,13 @@ from inercal.imu.ferraris.method import Inputs
 from inercal.imu.ferraris.names import POSITIONS, TURNS
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.ferraris.ways import LOST, clipped_rows
 from inercal.imu.recording import coarse_steps
 from inercal.noise.allan import AllanFit, fit_pooled
-from inercal.records.checks.values import saturated
 from inercal.records.findings import Finding
 from inercal.records.record import Triad
 
 Array = NDArray[np.float64]
-
-LOST = 3.5
-"""Longest step of time in a turn, in sample intervals: two lost samples hardly matter to its integral."""
 
 RESTLESS = 30.0
 """Variance in a position over the median of all from which the instrument certainly moves."""
@@ -101,14 +98,6 @@ def read_sections(
         np.array(swing),
         tuple(findings),
     )
-
-
-def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
-    """Rows (n,) in which an axis saturates."""
-    clipped = np.zeros(len(gyro.t), dtype=bool)
-    for values in gyro.values.T:
-        clipped[saturated(values)] = True
-    return clipped
 
 
 def _noise(triad: Triad, parts: list[Array]) -> AllanFit:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError, StudyError
+from inercal.imu.ferraris.choice import Choice, choose
 from inercal.imu.ferraris.detection import detect
-from inercal.imu.ferraris.names import NAMES
+from inercal.imu.ferraris.names import NAMES, TURNS
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.records.places import places
 from inercal.records.record import Record, Triad
@@ -24,11 +25,12 @@ _SIGNED = re.compile(r"([+-])([xyz])")
 @dataclass(frozen=True, eq=False)
 class Sections:
     """The rows of each section, by name, for the accelerometers and for the gyro; ``found_by`` says how: labels,
-    study or detection."""
+    study or detection, and ``turns`` in the last case what there is to say of the choice."""
 
     acc: Mapping[str, Integers]
     gyro: Mapping[str, Integers]
     found_by: str
+    turns: Choice | None = None
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -46,13 +48,17 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
     RecordError
         Labels that do not belong to the rows, or a turn labelled in several places.
     """
+    turns = None
     if options.sections:
         rows, found_by = {name: _rows(name, ends, acc) for name, ends in options.sections.items()}, "study"
     elif any(_canonical(label) for label in set(record.labels)):
         rows, found_by = _labelled(record.labels, acc), "labels"
     else:
-        spans = detect(acc, gyro, options.turn)
-        rows, found_by = {name: np.arange(start, stop) for name, (start, stop) in spans.items()}, "detection"
+        found_by = "detection"
+        seen = detect(acc, gyro)
+        turns = choose(acc, gyro, seen, options)
+        spans = seen.positions | {TURNS[axis]: (m.start, m.stop) for axis, m in turns.motions.items()}
+        rows = {name: np.arange(start, stop) for name, (start, stop) in spans.items()}
     known = {name: _finite(found, acc) for name, found in rows.items()}
     for name, found in known.items():
         if len(found) < 2:
@@ -60,7 +66,7 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
                 acc.source.path, f"section {name} has {len(found)} rows of numbers, expected a recording"
             )
     other = {name: _finite(_on(gyro, acc, found), gyro) for name, found in known.items()}
-    return Sections(known, other, found_by)
+    return Sections(known, other, found_by, turns)
 
 
 def _canonical(label: str) -> str:

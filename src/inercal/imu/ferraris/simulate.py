@@ -26,7 +26,8 @@ class Session:
     ``holds`` lengths of the six positions, ``turning`` that of a turn, ``rest`` of the pauses before and after it and
     ``way`` of the motion between sections [s]; ``rate`` of samples [Hz]; ``turn`` the stated angle [rad], ``turn_u``
     and ``alignment`` the standard deviations [rad] of the true one and of the directions; ``gravity`` [m/s^2] and
-    ``latitude`` [rad] of the site; ``clock`` seconds that the record's clock counts in a true second.
+    ``latitude`` [rad] of the site; ``clock`` seconds that the record's clock counts in a true second. ``headings`` are
+    changes of heading [rad] before and after each turn, with a ``pause`` [s] between; none where they are 0.
     """
 
     holds: tuple[float, ...] = (5.0,) * 6
@@ -40,6 +41,8 @@ class Session:
     gravity: float = 9.81
     latitude: float | None = None
     clock: float = 1.0
+    headings: tuple[float, float] = (0.0, 0.0)
+    pause: float = 1.0
 
 
 def draw_full_truth(rng: np.random.Generator, g_sensitivity: float = 2e-4) -> ImuTruth:
@@ -97,9 +100,19 @@ def simulate_session(truth: ImuTruth, session: Session, rng: np.random.Generator
         attitude = _upright(axis, 0.0, rng)
         go(attitude)
         stay("", attitude, session.rest)
+        before, after = session.headings
+        if before:
+            add("", *_motion(attitude, before * axis, 0.5 * session.way, session.rate))
+            attitude = multiply(attitude, exp(before * axis))
+            stay("", attitude, session.pause)
         step = axis * (session.turn + rng.normal(0.0, session.turn_u))
         add(name, *_motion(attitude, step, session.turning, session.rate))
-        stay("", multiply(attitude, exp(step)), session.rest)
+        attitude = multiply(attitude, exp(step))
+        if after:
+            stay("", attitude, session.pause)
+            add("", *_motion(attitude, after * axis, 0.5 * session.way, session.rate))
+            attitude = multiply(attitude, exp(after * axis))
+        stay("", attitude, session.rest)
     return _outputs(truth, session, np.concatenate(q), np.concatenate(rates), labels, rng)
 
 

@@ -14,18 +14,12 @@ from numpy.typing import NDArray
 from inercal.geometry.rotations import angle_between
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import POSITIONS
-from inercal.imu.ferraris.readings import LOST, clipped_rows
 from inercal.imu.ferraris.sections import Sections
+from inercal.imu.ferraris.ways import clipped_rows, followed
 from inercal.imu.turns import carried, cut_turns
 from inercal.records.record import Triad
 
 Array = NDArray[np.float64]
-
-LONGEST = 60.0
-"""Longest way between two positions that is followed [s]."""
-
-SHORTEST = 0.25
-"""Shortest way that can be one [s]: in a recording cut down to its sections there is none left between them."""
 
 FEWEST = 2
 """Ways between positions without which nothing is said."""
@@ -41,14 +35,10 @@ def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tupl
     order = sorted(POSITIONS, key=lambda name: int(sections.acc[name][0]))
     f = np.array([found.accelerometer.correct(acc.values[sections.acc[name]].mean(axis=0)) for name in order])
     verticals = f / np.linalg.norm(f, axis=1, keepdims=True)
-    spans, clipped, longest = [], clipped_rows(gyro), LOST / gyro.rate
+    spans, clipped = [], clipped_rows(gyro)
     for k, (here, there) in enumerate(itertools.pairwise(order)):
         start, stop = int(sections.gyro[here][-1]), int(sections.gyro[there][0])
-        steps = np.diff(gyro.t[start : stop + 1])
-        whole = bool(np.all((steps > 0.0) & (steps <= longest))) and start < stop
-        part = slice(start, stop + 1)
-        known = bool(np.isfinite(gyro.values[part]).all()) and not clipped[part].any()
-        if whole and known and SHORTEST < steps.sum() < LONGEST:
+        if followed(gyro, clipped, start, stop):
             spans.append((k, start, stop))
     if len(spans) < FEWEST:
         return None

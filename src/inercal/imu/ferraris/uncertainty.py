@@ -130,6 +130,15 @@ def type_b(
     return [*sources, *_coarse(p, acc_unit, gyro_unit), *_unequal_holds(p)]
 
 
+def doubtful_turns(p: Propagation, doubt: Array) -> list[TypeB]:
+    """What it does that a turn may have been by up to ``doubt`` (3,) [rad] more or less (GUM F.2.3.3)."""
+    u = doubt / math.sqrt(3.0)
+    size = float(np.max(u))
+    return (
+        [TypeB("choice of the turns", size, "rad", p.by["angles"] * (u / size), redrawn=True)] if size else []
+    )
+
+
 def _horizontal_earth_rate(p: Propagation) -> Array:
     """(33, 18): by either horizontal component in each position and turn, the heading of each unknown."""
     columns = []
