@@ -81,6 +81,13 @@ def test_format_and_parse_round_trip(unit_of, value):
         ("mdps", "mdeg/s"),
         ("Grad/s", "deg/s"),
         ("", "1"),
+        ("m·s⁻²", "m/s^2"),
+        ("m s^-2", "m/s^2"),
+        ("rad·s⁻¹", "rad/s"),
+        ("rad s^-1", "rad/s"),
+        ("º/s", "deg/s"),  # U+00BA, which European keyboards have
+        ("° s⁻¹", "deg/s"),
+        ("m/s³", "m/s^3"),
     ],
 )
 def test_spellings(typed, meant):

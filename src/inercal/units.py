@@ -118,6 +118,11 @@ _PINT_DIMENSIONS = {
     "kilogram * meter ** 2 / ampere / second ** 3": "voltage", "dimensionless": "number",
 }  # fmt: skip
 
+_SUPERSCRIPT = re.compile("⁻?[¹²³⁴-⁹]")
+_DIGITS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
+#: micro and Greek mu, the ordinal of European keyboards for the degree, and points for products
+_SIGNS = str.maketrans("µμº·⋅", "uu°**")
+
 #: names with one-digit powers, joined by * and /: pint would compute 9^9^9^9 for as long as it takes
 _FOR_PINT = re.compile(r"(?:1/)?[^\W\d]+(?:\^-?\d)?(?:[*/][^\W\d]+(?:\^-?\d)?)*")
 
@@ -153,7 +158,7 @@ def parse_unit(text: str, where: object = "unit", dimension: str | None = None) 
     Parameters
     ----------
     text : str
-        For example ``m/s^2``, ``m/s²``, ``deg/h``, ``ug``, ``count``.
+        For example ``m/s^2``, ``m/s²``, ``m·s⁻²``, ``deg/h``, ``ug``, ``count``.
     where : object
         Named in the error: a file and column, or a key.
     dimension : str, optional
@@ -164,9 +169,12 @@ def parse_unit(text: str, where: object = "unit", dimension: str | None = None) 
     QuantityError
         The text is no unit known here or to pint.
     """
-    plain = text.strip().replace("²", "^2").replace("³", "^3").replace("**", "^").replace("µ", "u")
-    plain = re.sub(r"\s*([*/^()])\s*", r"\1", plain.replace("μ", "u").replace("s2", "s^2"))
+    plain = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), text.strip())
+    plain = plain.translate(_SIGNS).replace("**", "^").replace("s2", "s^2")
+    plain = re.sub(r"\s*([*/^()])\s*", r"\1", plain)
     plain = re.sub(r"\s+", "*", plain)
+    plain = re.sub(r"\*([^\W\d]+)\^-(\d)\b", r"/\1^\2", plain)
+    plain = re.sub(r"\^1\b", "", plain)
     plain = _ALIASES.get(plain, plain)
     for measured, (_, factors) in _TABLE.items():
         if plain in factors:

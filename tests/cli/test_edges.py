@@ -109,6 +109,29 @@ def test_apply_says_the_findings_and_keeps_the_rate_where_a_specific_force_is_mi
     assert capsys.readouterr().err == ""
 
 
+def test_apply_says_what_of_the_calibration_it_does_not_use(folder, capsys):
+    """On standard error, in the JSON object, and in a stream: a drift of the bias, and a bad verdict."""
+    whole = json.loads(Path("cal.json").read_text())
+    whole["parameters"] += [{"name": f"D_R_{i}", "value": 1e-3, "u": 0.1, "unit": "1"} for i in "xyz"]
+    names = [each["name"] for each in whole["parameters"]]
+    whole |= {
+        "covariance": {"names": names, "matrix": [[0.0] * 9] * 9},
+        "status": {"code": "inconsistent", "message": "no"},
+    }
+    whole["result"]["bias_time_s"] = 12.5
+    Path("drift.json").write_text(json.dumps(whole))
+    assert run(["apply", "drift.json", "log.csv", "--out", "x.csv", "--json"]) == 0
+    captured = capsys.readouterr()
+    findings = json.loads(captured.out)["findings"]
+    assert [finding["code"] for finding in findings[:2]] == ["bad_verdict", "not_held"]
+    assert "D_F is the bias at 12.5 s" in findings[1]["message"]
+    assert run(["apply", "drift.json", "log.csv", "--stream"]) == 0
+    for err in (captured.err, capsys.readouterr().err):
+        assert err.startswith(
+            "bad_verdict: the calibration ended inconsistent: no (drift.json)\nnot_held: the drift D_R"
+        )
+
+
 @pytest.mark.parametrize(
     ("arguments", "command", "inputs"),
     [
@@ -188,6 +211,27 @@ def test_standard_output_may_be_closed(folder):
     done = shell("$INERCAL inspect log.csv >&-")
     assert done.returncode == 2
     assert done.stderr == "inercal: error: standard output: found it closed, expected it open\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
+@pytest.mark.parametrize(
+    "command",
+    [
+        "apply cal.json log.csv --out x.csv",
+        "inspect log.csv --report r.html",
+        "convert cal.json --to kalibr --out k.yaml",
+        "allan log.csv --out n.json",
+    ],
+)
+def test_json_that_cannot_be_written_is_one_line(command, folder):
+    """Findings and names of files are said once the object is out; else the error stands alone."""
+    done = shell(f"$INERCAL {command} --json")
+    assert done.returncode == 0
+    assert done.stderr
+    done = shell(f"$INERCAL {command} --json > /dev/full")
+    assert done.returncode == 2
+    assert done.stderr.startswith("inercal: error: standard output: ")
+    assert done.stderr.count("\n") == 1, done.stderr
 
 
 @POSIX

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inercal.convert.correct import ImuModel, imu_model
+from inercal.convert.correct import ImuModel, imu_model, not_applied
 from inercal.errors import InputError
 from inercal.instruments.triad import TriadModel
 
@@ -74,6 +74,19 @@ def test_a_calibration_of_one_axis_is_none_of_an_imu():
     del bad.parameters["K1_y"]
     with pytest.raises(InputError, match="expected the coefficients of an IMU"):
         imu_model(bad)
+
+
+def test_a_drift_of_the_bias_is_not_applied_and_said():
+    """It goes with the time of one recording alone; the bias that is applied is that at its t0."""
+    drifting = estimate(D_F_x=0.5, D_R_x=1e-3)
+    drifting.result["bias_time_s"] = 250.25
+    (finding,) = not_applied(drifting, "cal.json")
+    assert (finding.code, finding.where) == ("not_held", "cal.json")
+    assert "D_F is the bias at 250.25 s of that" in finding.message
+    assert not_applied(estimate(D_F_x=0.5)) == ()
+    plain, moved = imu_model(estimate(D_F_x=0.5)), imu_model(drifting)
+    f, omega = np.ones((2, 4, 3))
+    np.testing.assert_array_equal(moved.correct(f, omega), plain.correct(f, omega))
 
 
 @pytest.mark.parametrize("command", ["compare", "temperature"])

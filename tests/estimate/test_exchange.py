@@ -302,6 +302,11 @@ def damaged(path, **changes):
 
 def test_what_was_wrong_is_said(tmp_path):
     path = tmp_path / "wrong.json"
+    for text in ("null", "[]", "5", '"text"'):
+        path.write_text(text)
+        assert f"holds {text!r}, " in refused(path)
+    for other in (None, 5, [None]):
+        assert "does not have the form of one" in damaged(path, parameters=other)
     data = to_json(example())
     first, second = data["parameters"]
     assert "the key 'name' is missing" in damaged(path, parameters=[{}])

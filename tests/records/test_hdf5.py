@@ -208,6 +208,22 @@ class Attributes:
         self.attrs[key] = value
 
 
+def test_a_channel_without_any_number_is_kept_beside_its_clock(tmp_path):
+    """As an empty column of a text file is beside its stamps."""
+    path = tmp_path / "run.nc"
+    with h5netcdf.File(path, "w") as file:
+        file.dimensions = {"time": N}
+        time = file.create_variable("time", ("time",), data=T)
+        time.attrs["units"] = "s"
+        acc = file.create_variable("acc_x", ("time",), data=np.full(N, np.nan))
+        acc.attrs["units"] = "g"
+    text = '[columns.acc_x]\nfrom = "acc_x"\nunit = "g"\n'
+    for record in (read(path), read(path, mapped(tmp_path / "m.toml", text))):
+        assert np.isnan(record["acc_x"].values).all()
+        np.testing.assert_array_equal(record["acc_x"].t, T)
+        assert [f.message for f in record.findings] == [f"acc_x: {N} missing values"]
+
+
 def test_netcdf_4(tmp_path):
     path = tmp_path / "run.nc"
     with h5netcdf.File(path, "w") as file:

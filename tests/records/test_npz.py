@@ -46,6 +46,35 @@ def test_dates_are_seconds(tmp_path):
         read(path, mapped(tmp_path / "m.toml", text.replace('"s"', '"ms"').format("when")))
 
 
+def test_dates_need_no_unit(tmp_path):
+    """They carry it: a channel of dates is in seconds since 1970, one of durations in seconds."""
+    path = tmp_path / "run.npz"
+    steps = (1e6 * T).astype("timedelta64[us]")
+    for stamps, zero in ((np.datetime64("1970-01-02") + steps, 86400.0), (steps, 0.0)):
+        np.savez(path, **{"time": stamps, "acc_z [g]": ACC[:, 2]})
+        np.testing.assert_allclose(read(path)["acc_z"].t, zero + T, rtol=0, atol=1e-10)
+        assert 'unit = "s"' in guess_map(path)
+
+
+def test_whole_numbers_with_too_many_digits_are_said(tmp_path):
+    """A count is kept if it has 53 bits between its first and last 1, whatever its size and sign."""
+    path = tmp_path / "run.npz"
+    counts = [2**53 + 2, 2**53 + 1, -(2**53) - 1, -(2**63), 2**62 + 2**9, 2**62 + 2**10, 7, 2**63 - 1]
+    sizes = np.array([2**64 - 1, 2**63, 2**63 + 2**11, 0, 1, 2, 3, 4], np.uint64)
+    stamps = 1_700_000_000_123_456_789 + 10**7 * np.arange(8)
+    np.savez(path, **{"t [ns]": stamps, "acc_x [count]": counts, "acc_y [count]": sizes})
+    found = [(f.message, f.where) for f in read(path).findings if f.code == "resolution"]
+    assert found == [
+        ("acc_x: 4 whole numbers beyond 2^53, rounded to 53 bits", "rows 2-3, 5, 8"),
+        ("acc_y: 1 whole number beyond 2^53, rounded to 53 bits", "row 1"),
+    ]
+    for name, exact in (("acc_x", counts), ("acc_y", sizes.tolist())):  # Python compares integers exactly
+        kept = [int(value) == number for value, number in zip(read(path)[name].values, exact, strict=True)]
+        assert kept == (
+            [True, False, False, True, False, True, True, False] if name == "acc_x" else [False] + [True] * 7
+        )
+
+
 def test_only_wanted_arrays_are_read_and_no_objects(tmp_path):
     """An array of objects, which could run any code on loading, is as if it were not there."""
     path = tmp_path / "run.npz"

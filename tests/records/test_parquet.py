@@ -70,6 +70,28 @@ def test_columns_go_by_number_or_name_and_may_be_of_many_types(tmp_path):
     ]
 
 
+def test_a_table_over_dates_names_itself(tmp_path):
+    """As pandas writes a DatetimeIndex: the dates carry their unit, and count from 1970."""
+    stamps = pa.array(10**9 * 1_700_000_000 + 20_000_000 * np.arange(40), pa.timestamp("ns"))
+    record = read(written(tmp_path / "a.parquet", {"acc_x [g]": ACC[:, 0], "time": stamps}))
+    np.testing.assert_allclose(record["acc_x"].t, 1.7e9 + T, atol=3e-7, rtol=0)
+    assert record.findings == ()
+
+
+def test_a_column_without_any_number_is_kept(tmp_path):
+    """As an empty column of a text file is; only where no column holds a number nothing is left to read."""
+    nothing = pa.nulls(40)  # as pandas writes a column of None
+    columns = {"t [s]": T, "acc_x [g]": np.full(40, np.nan), "acc_y [g]": nothing}
+    record = read(written(tmp_path / "a.parquet", columns))
+    assert np.isnan([record["acc_x"].values, record["acc_y"].values]).all()
+    assert [f.message for f in record.findings if f.code == "nan"] == [
+        "acc_x: 40 missing values",
+        "acc_y: 40 missing values",
+    ]
+    with pytest.raises(RecordError, match="no row of numbers in the mapped columns"):
+        read(written(tmp_path / "b.parquet", {"t [s]": nothing, "acc_x [g]": nothing}))
+
+
 def test_a_guess_reads_the_table(tmp_path):
     path = written(
         tmp_path / "a.parquet", {"ts_us": 1e6 * T, "ax": ACC[:, 0], "ay": ACC[:, 1], "az": ACC[:, 2]}

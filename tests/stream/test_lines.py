@@ -92,6 +92,18 @@ ROWS = "0.0,1.5,2.25\n0.1,-1e-3,3\n0.2,0.3,-0.1\n"
         ((HEADER + ROWS).replace(",", "\t"), None),
         ((HEADER + ROWS).replace(",", ";").replace(".", ","), None),
         (HEADER.replace(",", ";") + "0;1;2\n1;2;3\n2;0,5;1,5\n3;1,5;0,25\n", None),
+        (
+            HEADER.replace(",", ";")
+            + "".join(f"{i};{i};7\n" for i in range(500))
+            + "".join(f"{i};{i},5;7\n" for i in range(500, 600)),
+            None,
+        ),
+        (
+            "t [s];label;acc_x [g]\n"
+            + "".join(f"{i};pos. {i};7\n" for i in range(500))
+            + "".join(f"{i};pos. {i};{i},5\n" for i in range(500, 600)),
+            None,
+        ),
         (HEADER.replace(",", ",note,") + ROWS.replace(",", ",x,"), None),
         (HEADER + ROWS.replace("1.5", '"1.5"'), None),
         ("t [s],label,acc_x [g]\n0.0,rest,1\n0.1, turn ,1.5\n0.2,rest,2\n", None),
@@ -115,6 +127,19 @@ def test_digits_are_those_of_the_file(data, map_text, tmp_path):
     assert said == []
     assert len(found) >= 3
     assert not any(finding.code in ("bad_row", "nan", "truncated") for finding in record.findings)
+
+
+def test_whole_numbers_with_too_many_digits_are_said(tmp_path):
+    """2^53 + 1 has no float64 of its own; 2^53 and 2^60 have. A fraction is rounded anyway, and so are stamps."""
+    stamp = 1_700_000_000_123_456_789
+    numbers = [2**53 - 1, 2**53, 2**53 + 1, -(2**53) - 1, 2**60, 10**18 + 1, "9007199254740993.0", "1e400"]
+    rows = [f"{stamp + 10**7 * i},{number},{i}\n" for i, number in enumerate(numbers)]
+    record, found, said = same_as_a_file(tmp_path, "t [ns],acc_x [count],acc_y [count]\n" + "".join(rows))
+    whole = [(finding.message, finding.where) for finding in record.findings if finding.code == "resolution"]
+    assert whole == [("acc_x: 3 whole numbers beyond 2^53, rounded to 53 bits", "lines 4-5, 7")]
+    live = [finding.where for finding in said if finding.code == "resolution"]
+    assert live == ["line 4", "line 5", "line 7"]
+    assert found[2].values[0] == 2.0**53
 
 
 def test_what_is_no_number_is_nan_and_said_with_its_line(tmp_path):

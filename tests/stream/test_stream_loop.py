@@ -92,7 +92,7 @@ def test_after_the_end_there_is_nothing_more_to_say(tmp_path):
     rows = recording(30)
     assert len(play(Smoother(), rows, saving)) == 30
     assert play(Smoother(), rows, saving, said) == []
-    assert said == [f"resumed after row 30 of {tmp_path / 'state'}"]
+    assert said == [f"resumed after row 30 of {tmp_path / 'state'}", "30 rows passed over"]
     # the recording has grown since
     more = recording(50)
     assert play(Smoother(), more, saving) == play(Smoother(), more)[30:]
@@ -102,26 +102,66 @@ def test_a_live_stream_goes_on(tmp_path):
     """What is sent again is passed over, by its time; then the digits are as if nothing had happened."""
     rows = recording(100)
     whole = play(Smoother(), rows)
-    for begin in (40, 25, 1):
+    for begin in (40, 39, 25, 1):
         saving, said = Saving(tmp_path / f"{begin}", 7), []
         assert play(Smoother(), rows[:40], saving) == whole[:40]
         assert play(Smoother(), rows[begin:], saving, said) == whole[40:]
-        assert said[1].startswith("rows up to t = 0.39 s are passed over")
+        passed = "1 row" if begin == 39 else f"{40 - begin} rows"
+        assert said[1:] == ["rows up to t = 0.39 s are passed over", f"{passed} passed over"]
+        said.clear()
+        assert play(Smoother(), rows[begin:90], saving, said) == []
+        assert said[-1] == f"the stream ended after {90 - begin} rows, all passed over"
 
 
 def test_a_live_stream_without_stamps_goes_on(tmp_path):
     """There every row of another stream is a new one, and rows are counted on."""
-    header = "position,y_x [deg/h]\n"
     rows = [f"{i},{x}\n" for i, x in enumerate(np.random.default_rng(2).standard_normal(20))]
+    assert counted_on(tmp_path, rows[:8], rows[8:])[0] == rows_of(8, 20)
+
+
+COARSE = [f"1,{x}\n" for x in np.random.default_rng(3).integers(0, 2, 150)]
+OTHER = [*COARSE[:5], f"1,{7}\n", *COARSE[6:]]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "new", "words"),
+    [
+        # rows all alike do not tell one stream from another: nothing is lost
+        (["1,5\n"] * 100, ["1,5\n"] * 60, 60, "the stream goes on, no row is passed over"),
+        (["1,5\n"] * 100, ["1,5\n"] + ["1,6\n"] * 150, 151, "the stream goes on, no row is passed over"),
+        # of coarse counts, the first row does not tell, all of the first 64 do
+        (COARSE[:100], COARSE, 50, "100 rows passed over"),
+        (COARSE[:10], COARSE, 140, "10 rows passed over"),
+        (COARSE[:1], COARSE, 149, "1 row passed over"),
+        (COARSE[:100], OTHER, 150, "the stream goes on, no row is passed over"),
+        (COARSE[:100], COARSE[:40], 0, "the stream ended after 40 of these rows, all passed over"),
+        (COARSE[:100], COARSE[:80], 0, "the stream ended after 80 of these rows, all passed over"),
+    ],
+)
+def test_coarse_rows_without_stamps(first, second, new, words, tmp_path):
+    """A stream is only taken for the saved one where its rows can tell; what is passed over is always said."""
+    rows, said = counted_on(tmp_path, first, second)
+    assert rows == rows_of(len(first), len(first) + new)
+    assert said[1:] == [words]
+
+
+def rows_of(begin, end):
+    """Numbers of rows, as texts."""
+    return [str(row) for row in range(begin, end)]
+
+
+def counted_on(tmp_path, first, second):
+    """Numbers of the rows answered in a second stream without stamps, and what is said; the digits are checked."""
 
     class Second(Smoother):
         def step(self, state, sample):
             return super().step(state, sample._replace(values=sample.values[1:]))
 
-    whole = play(Second(), rows, header=header)
-    saving = Saving(tmp_path / "state", 3)
-    assert play(Second(), rows[:8], saving, header=header) == whole[:8]
-    assert play(Second(), rows[8:], saving, header=header) == whole[8:]
+    header, saving, said = "position,y_x [deg/h]\n", Saving(tmp_path / "state", 3), []
+    before = play(Second(), first, saving, header=header)
+    after = play(Second(), second, saving, said, header=header)
+    assert before + after == play(Second(), [*first, *second[len(second) - len(after) :]], header=header)
+    return [line.split(",")[1] for line in after], said
 
 
 def test_another_stream_that_begins_alike_is_refused(tmp_path):
@@ -133,11 +173,12 @@ def test_another_stream_that_begins_alike_is_refused(tmp_path):
         play(Smoother(), other, saving)
 
 
-def test_a_replay_that_ends_too_soon_says_nothing(tmp_path):
-    saving = Saving(tmp_path / "state", 5)
+def test_a_replay_that_ends_too_soon_gives_no_line(tmp_path):
+    saving, said = Saving(tmp_path / "state", 5), []
     play(Smoother(), recording(20), saving)
     before = saving.path.read_bytes()
-    assert play(Smoother(), recording(20)[:10], saving) == []
+    assert play(Smoother(), recording(20)[:10], saving, said) == []
+    assert said[1:] == ["the stream ended after 10 of these rows, all passed over"]
     assert saving.path.read_bytes() == before
 
 
@@ -196,21 +237,23 @@ def test_a_reader_that_leaves_loses_no_row(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
-def test_an_interrupt_finishes_the_row_in_work_and_saves(tmp_path):
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_finishes_the_row_in_work_and_saves(signum, tmp_path):
+    """As on Ctrl-C, so where a service is stopped."""
     saving, rows = Saving(tmp_path / "state", 1000), recording(20)
     out = []
 
     def write(text):
         out.append(text)
         if len(out) == 8:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signum)
             out.append(out.pop())  # still here: the interrupt waits
 
     lines = Lines(io.BytesIO((HEADER + "".join(rows)).encode()), "stdin", None, print)
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(signum)
     with pytest.raises(KeyboardInterrupt):
         run(Smoother(), lines, write, saving)
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(signum) is before
     assert out[1:] + play(Smoother(), rows, saving) == play(Smoother(), rows)
     assert len(out) == 8
 
@@ -230,6 +273,26 @@ def test_an_interrupt_does_not_wait_for_a_line(tmp_path):
     os.close(write_end)
     assert time.perf_counter() - clock < 5.0
     assert play(Smoother(), recording(9), saving) == play(Smoother(), recording(9))[5:]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="locks as on POSIX")
+def test_a_checkpoint_is_for_one_run_at_a_time(tmp_path):
+    """A second run at the same time is refused and harms nothing; the lock goes with the run, and none hinders."""
+    saving, rows, refused = Saving(tmp_path / "state", 4), recording(20), []
+
+    class Nested(Smoother):
+        def step(self, state, sample):
+            if sample.row == 10:
+                with pytest.raises(InputError, match=r"state: is in use by another run") as caught:
+                    play(Smoother(), rows, saving)
+                refused.append(caught)
+            return super().step(state, sample)
+
+    assert play(Nested(), rows, saving) == play(Smoother(), rows)
+    assert len(refused) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["state"]
+    (tmp_path / "state.lock").touch()  # as a killed run leaves it
+    assert play(Smoother(), rows, saving) == []
 
 
 def test_runs_in_another_thread_too():

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from inercal.cli.options import FileOutput, MapFile, envelope, read_record, reading
 from inercal.cli.streaming import StreamOptions, run_stream
 from inercal.errors import InputError, UsageError
+from inercal.records.findings import Finding
 
 if TYPE_CHECKING:
     from inercal.convert.correct import ImuModel
@@ -39,7 +40,8 @@ def apply(
             raise InputError("--stream", f"found {len(paths)} files, expected one or standard input")
         file = paths[0] if paths else None
         streaming.check(output, (calibration, file, map_file))
-        model = _model(calibration, output)
+        model, findings = _model(calibration)
+        output.say_findings(findings)
         run_stream(lambda lines: Apply(lines, model, invert), file, map_file, output, streaming)
         return
 
@@ -54,24 +56,25 @@ def apply(
     if streaming != StreamOptions():
         raise InputError("--checkpoint", "found without --stream, expected them together")
     output.check(SUFFIXES, (calibration, *paths, map_file))
-    model = _model(calibration, output)
+    model, findings = _model(calibration)
     record = apply_to(read_record(paths, map_file, output), model, invert)
-    output.say_findings(record.findings)
     with reading(output) as progress:
         write_record(record, output.out, progress)
+    findings += record.findings
+    output.say_findings(findings)
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
-    output.emit(envelope("apply", words, result, inputs, record.findings), words)
+    output.emit(envelope("apply", words, result, inputs, findings), words)
 
 
-def _model(calibration: Path, output: FileOutput) -> ImuModel:
-    """The instrument of a calibration; a bad verdict of it is said."""
-    from inercal.convert.correct import imu_model
+def _model(calibration: Path) -> tuple[ImuModel, tuple[Finding, ...]]:
+    """The instrument of a calibration, and what to say of that: a bad verdict, terms that are not applied."""
+    from inercal.convert.correct import imu_model, not_applied
     from inercal.estimate.exchange import load
     from inercal.estimate.status import Status
 
     estimate = load(calibration)
-    if estimate.status is not Status.OK:
-        output.say(f"{estimate.status.value}: {estimate.message}")
-    return imu_model(estimate, calibration)
+    verdict = f"the calibration ended {estimate.status.value}: {estimate.message}"
+    bad = () if estimate.status is Status.OK else (Finding("bad_verdict", verdict, str(calibration)),)
+    return imu_model(estimate, calibration), (*bad, *not_applied(estimate, calibration))

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -49,9 +49,17 @@ class Output:
         False
     )
     quiet: Annotated[bool, Parameter(help="No messages and no progress on standard error.")] = False
+    _unsaid: list[str] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def say(self, text: str) -> None:
-        """A message for people, on standard error."""
+        """A message for people, on standard error; beside JSON once that is out, for an error must stand alone."""
+        if self.json:
+            self._unsaid.append(text)
+        else:
+            self.say_now(text)
+
+    def say_now(self, text: str) -> None:
+        """What is worth knowing only while it goes on."""
         if not self.quiet:
             print(text, file=sys.stderr)
 
@@ -64,7 +72,9 @@ class Output:
     def emit(self, data: Mapping[str, Any], text: str) -> None:
         """The result on standard output: the JSON object, or the text for people."""
         if self.json:
-            print(json.dumps(data, indent=1, allow_nan=False))
+            print(json.dumps(data, indent=1, allow_nan=False), flush=True)
+            for message in self._unsaid:
+                self.say_now(message)
         elif text:
             print(text)
 

@@ -29,16 +29,17 @@ def hand_over(
     from inercal.estimate.exchange import save, to_json
     from inercal.estimate.status import Status
 
-    output.say_findings(estimate.findings)
     if output.out is not None:
         if curves is not None and output.out.suffix.lower() == ".csv":
             write_text(output.out, curves())
         else:
             save(estimate, output.out)
-        output.say(f"{what}: {output.out}")
     if output.report is not None:
         write_text(output.report, page())
-        output.say(f"report: {output.report}")
+    output.say_findings(estimate.findings)
+    for written, path in ((what, output.out), ("report", output.report)):
+        if path is not None:
+            output.say(f"{written}: {path}")
     text = "".join(f"{table}\n\n" for table in tables if table)
     output.emit(to_json(estimate), f"{text}{estimate.status.value}: {estimate.message}")
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT

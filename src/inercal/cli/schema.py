@@ -16,6 +16,7 @@ def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen
     found = json_schema()
     if output.out is not None:
         write_text(output.out, json.dumps(found, indent=1) + "\n")
-        output.say(f"schema: {output.out}")
     if output.json or output.out is None:
-        print(json.dumps(found, indent=1))
+        print(json.dumps(found, indent=1), flush=True)
+    if output.out is not None:
+        output.say_now(f"schema: {output.out}")

@@ -27,7 +27,7 @@ def sensitivity(
     read_s = time.perf_counter() - clock
     maps_wanted = bool(output.targets)
     with of_study(study), reading(output, "sampling") as progress:
-        analysed = analyse(settings, maps_wanted, output.say, progress)
+        analysed = analyse(settings, maps_wanted, output.say_now, progress)
     if analysed.note:
         output.say(analysed.note)
     if output.out is not None:

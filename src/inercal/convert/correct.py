@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.instruments.triad import TriadModel, apart, triad_from_terms
+from inercal.records.findings import Finding
 from inercal.records.record import Column, Record
 from inercal.units import Unit, parse_unit
 
@@ -72,6 +73,22 @@ def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
     g = [[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"]
     symbols = {str(sensor): str(unit) for sensor, unit in units.items()}
     return ImuModel(accelerometer, gyro, np.array(g), symbols)
+
+
+def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
+    """``not_held``: the terms of a calibration that `imu_model` leaves out, for they do not go with any recording."""
+    if not any(name.startswith("D_R_") for name in estimate.names):
+        return ()
+    t0 = estimate.result.get("bias_time_s")
+    time = f"{t0:.6g} s" if isinstance(t0, int | float) else "the time bias_time_s"
+    return (
+        Finding(
+            "not_held",
+            "the drift D_R of the gyro bias belongs to the recording of the calibration and is not applied: "
+            f"D_F is the bias at {time} of that",
+            str(where),
+        ),
+    )
 
 
 @np.errstate(all="ignore")

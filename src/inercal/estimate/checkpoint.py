@@ -10,7 +10,9 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -92,6 +94,41 @@ def load(path: str | Path, kind: str, fingerprint: str, like: S) -> S:
     }:
         raise InputError(path, "is a checkpoint of another version of inercal, expected one of this version")
     return cast(S, _rebuilt(like, "state", leaves))
+
+
+@contextmanager
+def alone(path: str | Path) -> Iterator[None]:
+    """Keep a checkpoint from other runs as long as the block lasts.
+
+    A file ``PATH.lock`` is locked meanwhile, where the system and the file system have such locks (not on Windows).
+    They end with the process, however it ends; the file is then left, and harms nobody.
+
+    Raises
+    ------
+    InputError
+        Another run has it, or the file cannot be written.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    lock = Path(f"{os.path.realpath(path)}.lock")
+    try:
+        file = lock.open("w")
+    except OSError as error:
+        raise InputError(path, f"cannot be written ({error.strerror or error})") from error
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(path, "is in use by another run, expected a checkpoint for each") from error
+        except OSError:
+            pass  # no locks on this file system
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
 
 
 def fingerprint(settings: object) -> str:

@@ -18,6 +18,7 @@ from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.record import Source
+from inercal.units import shown
 
 Array = NDArray[np.float64]
 
@@ -154,12 +155,18 @@ def load(path: str | Path) -> Estimate:
         if Path(path).suffix.lower() == ".toml":
             import tomllib
 
-            return from_json(plain_objects(tomllib.loads(text)))
-        return from_json(json.loads(text))
+            data = plain_objects(tomllib.loads(text))
+        else:
+            data = json.loads(text)
+        if not isinstance(data, Mapping):
+            raise InputError(path, f"holds {shown(text.strip())}, {expected}")
+        return from_json(data)
     except KeyError as error:
         hint = "; `inercal convert --from` reads those of other tools"
         raise InputError(path, f"the key {error} is missing, {expected}{hint}") from error
-    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except (TypeError, AttributeError) as error:
+        raise InputError(path, f"does not have the form of one, {expected}") from error
+    except (ValueError, OverflowError, RecursionError) as error:
         raise InputError(path, f"{str(error)[:120]}, {expected}") from error
 
 

@@ -19,7 +19,7 @@ from inercal.errors import InputError, MapError, RecordError
 from inercal.records.channels import Channel
 from inercal.records.findings import Finding
 from inercal.records.read.join import FileTable, check_present, conversion, row_rate
-from inercal.records.read.layout import Layout, comment_marks, find_layout, sniff_decimal
+from inercal.records.read.layout import Layout, comment_marks, find_layout, is_rounded
 from inercal.records.read.table import Part, Table
 from inercal.records.read.text import contents, locate
 from inercal.records.record import Column, Record, Source
@@ -108,10 +108,7 @@ class Lines:
         self._number = 0
         self._flaws: Counter[tuple[str, str]] = Counter()
         self._form, self._held = self._begin(record_map)
-        part = _part(record_map)
-        layout = self._form.layout
-        self._sniff = part.options.decimal is None and layout.delimiter != ","
-        self._layout = layout
+        self._layout = self._form.layout
 
     @property
     def record(self) -> Record:
@@ -152,15 +149,17 @@ class Lines:
     def sample(self, line: Line, row: int) -> Sample:
         """The sample in a line, as row ``row`` of the record."""
         text, form = line.text, self._form
-        if self._sniff and ("," in text or "." in text):
-            # the first row may hold whole numbers alone, which do not tell
-            self._layout = replace(self._layout, decimal=sniff_decimal([text], self._layout.delimiter))
-            self._sniff = False
+        self._layout = self._layout.settled([text])  # the first row may hold whole numbers alone
         fields = self._layout.fields(text)
         bad = fields is None
         t, values = math.nan, [math.nan] * len(form.fields)
         if fields is not None:
             found = [self._layout.number(fields[field.column]) for field in form.fields]
+            for field, value in zip(form.fields, found, strict=True):
+                if value is not None and is_rounded(fields[field.column], value):
+                    self._flaw(
+                        "resolution", f"{field.name}: whole number beyond 2^53, rounded to 53 bits", line
+                    )
             stamp = 0.0 if form.time is None else self._layout.number(fields[form.time.column])
             bad = stamp is None or None in found
             t = self._value(form.time, stamp, bad, line) if form.time is not None else t

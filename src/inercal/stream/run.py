@@ -5,6 +5,9 @@ with is that stream again: the rows seen are passed over, without output, and mu
 stream is one that goes on: there, rows with a time stamp no later than the last one seen are passed over. From
 then on every line is, digit for digit, what a run without interruption gives for that row.
 
+One row without a time stamp does not tell, for coarse counts repeat. There the first 64 rows must be those of the
+saved stream, and wait for each other; where these were all alike, nothing can tell, and the stream goes on.
+
 A state is saved only after the lines of all rows in it have been taken by the reader, so none is lost: those
 since the last save are given once more after the run has been killed. A last row whose line has not ended is
 answered, but not kept in the state, for it may not have been whole.
@@ -17,14 +20,19 @@ import signal
 import threading
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from inercal.errors import RecordError
-from inercal.estimate.checkpoint import fingerprint, load, save
+from inercal.estimate.checkpoint import alone, fingerprint, load, save
+from inercal.records.places import counted
 from inercal.records.write.text import number
 from inercal.stream.lines import Line, Lines, Sample
 
@@ -32,6 +40,8 @@ S = TypeVar("S")
 
 Output = Sequence[float | str]
 """Values of an output line; NaN is written as nothing, texts as they are."""
+
+_HEAD = 64
 
 
 class Recursive(Protocol[S]):
@@ -72,19 +82,18 @@ class Saving:
 
 
 class _Position(NamedTuple):
-    """What a state has seen: rows, the CRC-32 of the first and of all of them, and the last time stamp [s]."""
+    """What a state has seen: rows, the CRC-32 of each of the first and of all of them, and the last time stamp [s]."""
 
     rows: int = 0
-    first: int = 0
+    head: NDArray[np.int64] = np.empty(0, np.int64)
     all: int = 0
     t: float = -math.inf
 
     def after(self, line: Line, t: float) -> _Position:
         """The position after one more row."""
+        head = np.append(self.head, zlib.crc32(line.data)) if self.rows < _HEAD else self.head
         crc = zlib.crc32(line.data, self.all)
-        return _Position(
-            self.rows + 1, self.first if self.rows else crc, crc, t if math.isfinite(t) else self.t
-        )
+        return _Position(self.rows + 1, head, crc, t if math.isfinite(t) else self.t)
 
 
 class _Whole(NamedTuple):
@@ -112,7 +121,7 @@ def run(
     saving : Saving, optional
         The state is loaded from there if the file exists, and saved there.
     say : callable
-        Told where a saved state is gone on from.
+        Told where a saved state is gone on from, and how many rows are passed over.
 
     Returns
     -------
@@ -122,11 +131,23 @@ def run(
     Raises
     ------
     InputError
-        A checkpoint that is not of this estimator, or that cannot be written; a stream that begins as the
-        saved one and then differs.
+        A checkpoint that is not of this estimator, in use by another run, or that cannot be written; a stream that
+        begins as the saved one and then differs.
     KeyboardInterrupt
-        On an interrupt, once the row in work is done and the state is saved.
+        On an interrupt or SIGTERM, once the row in work is done and the state is saved.
     """
+    with nullcontext() if saving is None else alone(saving.path):
+        return _run(estimator, lines, write, saving, say)
+
+
+def _run(
+    estimator: Recursive[S],
+    lines: Lines,
+    write: Callable[[str], None],
+    saving: Saving | None,
+    say: Callable[[str], None],
+) -> int:
+    """As `run`, with the checkpoint to itself."""
     mark = fingerprint({"estimator": estimator.settings, "stream": lines.settings})
     whole = _Whole(_Position(), estimator.initial())
     if saving is not None and saving.path.exists():
@@ -165,29 +186,60 @@ def _new_samples(
     lines: Lines, position: _Position, interrupts: _Interrupts, say: Callable[[str], None]
 ) -> Iterator[tuple[Line, Sample]]:
     """The rows that are not in a position yet; raises `RecordError` where they are not those that follow it."""
-    line, row = interrupts.next(lines), position.rows
-    passed = math.nan
-    if row and line is not None:
-        if zlib.crc32(line.data) == position.first:
-            seen = _Position()
-            while line is not None and seen.rows < row:
-                seen, line = seen.after(line, math.nan), interrupts.next(lines)
-            if seen.rows == row and seen.all != position.all:
-                raise RecordError(
-                    lines.where,
-                    f"found other rows than the {row} of the checkpoint, expected the same stream from its "
-                    "beginning, or one that goes on",
-                )
+    rows, row = iter(lambda: interrupts.next(lines), None), position.rows
+    passed, earlier = math.nan, 0
+    if row:
+        same, held = _begins_alike(rows, position, lines.stamped)
+        rows = chain(held, rows)
+        if same:
+            _pass_over(islice(rows, row), position, lines.where, say)
         elif lines.stamped and math.isfinite(position.t):
             passed = position.t
             say(f"rows up to t = {passed} s are passed over")
-    while line is not None:
+        else:
+            say("the stream goes on, no row is passed over")
+    for line in rows:
         sample = lines.sample(line, row)
-        if not sample.t <= passed:
-            passed = math.nan
-            row += 1
-            yield line, sample
-        line = interrupts.next(lines)
+        if sample.t <= passed:
+            earlier += 1
+            continue
+        if not math.isnan(passed):
+            say(f"{counted(earlier, 'row')} passed over")
+        passed = math.nan
+        row += 1
+        yield line, sample
+    if not math.isnan(passed):
+        say(f"the stream ended after {counted(earlier, 'row')}, all passed over")
+
+
+def _begins_alike(rows: Iterator[Line], position: _Position, stamped: bool) -> tuple[bool, list[Line]]:
+    """True for a stream that begins, as far as it goes, with the rows that a position began with; the rows taken."""
+    head = position.head[: 1 if stamped else _HEAD].tolist()
+    if len(head) > 1 and len(set(head)) == 1:
+        return False, []
+    held: list[Line] = []
+    for crc, line in zip(head, rows, strict=False):  # in this order no row is taken beyond the head
+        held.append(line)
+        if zlib.crc32(line.data) != crc:
+            return False, held
+    return True, held
+
+
+def _pass_over(rows: Iterator[Line], position: _Position, where: str, say: Callable[[str], None]) -> None:
+    """Pass over the rows of a position; raises `RecordError` where they are others."""
+    seen = _Position()
+    for line in rows:
+        seen = seen.after(line, math.nan)
+    if seen.rows < position.rows:
+        say(f"the stream ended after {seen.rows} of these rows, all passed over")
+    elif seen.all != position.all:
+        raise RecordError(
+            where,
+            f"found other rows than the {seen.rows} of the checkpoint, expected the same stream from its "
+            "beginning, or one that goes on",
+        )
+    else:
+        say(f"{counted(seen.rows, 'row')} passed over")
 
 
 class _Interrupts:
@@ -201,7 +253,7 @@ class _Interrupts:
         self._asked = False
 
     def handle(self, signum: int, frame: FrameType | None) -> None:
-        """Handle SIGINT."""
+        """Handle SIGINT and SIGTERM."""
         if self.waiting or self._asked:
             raise KeyboardInterrupt
         self._asked = True
@@ -223,8 +275,10 @@ def _interrupts() -> Iterator[_Interrupts]:
     if threading.current_thread() is not threading.main_thread():
         yield interrupts
         return
-    before = signal.signal(signal.SIGINT, interrupts.handle)
+    asking = (signal.SIGINT, signal.SIGTERM)
+    before = {signum: signal.signal(signum, interrupts.handle) for signum in asking}
     try:
         yield interrupts
     finally:
-        signal.signal(signal.SIGINT, before)
+        for signum, handler in before.items():
+            signal.signal(signum, handler)

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from inercal.records.channels import of_a_table
 from inercal.records.checks.angles import angles
@@ -57,3 +58,9 @@ def missing(values: Mapping[str, Array]) -> tuple[Finding, ...]:
         for name, rows in empty.items()
         if rows.size
     )
+
+
+def too_long(name: str, word: str, numbers: ArrayLike) -> Finding:
+    """``resolution``: whole numbers of a column that float64 cannot hold, in the lines or rows of these ``numbers``."""
+    count = counted(np.size(numbers), "whole number")
+    return Finding("resolution", f"{name}: {count} beyond 2^53, rounded to 53 bits", places(word, numbers))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import InercalError, RecordError
 from inercal.records.channels import Channel
-from inercal.records.checks import missing
+from inercal.records.checks import missing, too_long
 from inercal.records.findings import Finding
 from inercal.records.read.canonical import bare, canonical
 from inercal.records.read.table import FileOptions, Sample, Table
@@ -30,9 +30,9 @@ _LISTED = 20
 class NamedArray:
     """An array (rows, columns) of an open file; ``load`` reads one of its columns (rows,).
 
-    A column holds numbers, dates or durations (NumPy's, taken as seconds), or, if ``text``, strings.
-    ``unit`` is the one the file states; ``clock`` names the array of the file that holds the time stamps of
-    the rows, where the file says so.
+    A column holds numbers, dates or durations (NumPy's, taken as seconds, of dates since 1970), or, if ``text``,
+    strings. ``unit`` is the one the file states, of dates and durations s; ``clock`` names the array of the file
+    that holds the time stamps of the rows, where the file says so.
     """
 
     rows: int
@@ -46,7 +46,9 @@ class NamedArray:
 def held(values: NDArray[Any], unit: str | None = None, clock: str | None = None) -> NamedArray:
     """An array (n,) or (n, k) that is in memory."""
     columns = 1 if values.ndim == 1 else values.shape[1]
-    return NamedArray(len(values), columns, partial(_of, values), values.dtype.kind in "SU", unit, clock)
+    kind = values.dtype.kind
+    unit = "s" if kind in "Mm" else unit
+    return NamedArray(len(values), columns, partial(_of, values), kind in "SU", unit, clock)
 
 
 def _of(values: NDArray[Any], column: int) -> NDArray[Any]:
@@ -168,7 +170,8 @@ def tables(
     if not groups:
         return [Table((), {}, contents.words, 0, (), contents.findings)]
     parts = [_table(contents, group, clock, path) for clock, group in groups.items()]
-    if all(np.isnan(column).all() for part in parts for column in part.values.values()):
+    numbers = (column for part in parts for column in (*part.values.values(), part.clock))
+    if all(column is None or np.isnan(column).all() for column in numbers):
         raise RecordError(path, "no row of numbers in the mapped columns, expected numbers")
     return parts
 
@@ -219,6 +222,7 @@ def _table(
     values: dict[str, Array] = {}
     labels: tuple[str, ...] = ()
     rows: dict[str, int] = {}
+    long: list[Finding] = []
     for channel, (name, column) in places.items():
         array = contents.arrays[name]
         loaded = array.load(column)
@@ -231,6 +235,8 @@ def _table(
         if loaded.dtype.kind in "Mm" and channel.unit.symbol != "s":
             raise RecordError(path, f'{name} holds dates, which are read in seconds, expected unit = "s"')
         values[channel.name] = _numbers(loaded)
+        if channel.name != "t" and (beyond := _rounded(loaded)).size:
+            long.append(too_long(channel.name, "row", beyond + 1))
     if len(set(rows.values())) > 1:
         counts = ", ".join(f"{count} rows of {name}" for name, count in rows.items())
         raise RecordError(
@@ -242,7 +248,7 @@ def _table(
         stamps = _numbers(array.load(0)) * parse_unit(array.unit or "s", f"{path}: {clock}").factor
     return Table(
         tuple(places), values, contents.words, max(rows.values()), labels,
-        (*contents.findings, *missing(values)), stamps,
+        (*contents.findings, *missing(values), *long), stamps,
     )  # fmt: skip
 
 
@@ -285,7 +291,7 @@ def _single(contents: Contents, options: FileOptions, path: Path) -> str | None:
 
 
 def _numbers(column: NDArray[Any]) -> Array:
-    """As float64, dates as seconds since 1970; NaN where infinite. Integers beyond 2^53 lose their last digits."""
+    """As float64, dates as seconds since 1970; NaN where infinite."""
     if column.dtype.kind in "Mm":
         known = ~np.isnat(column)
         kind = "datetime64[ns]" if column.dtype.kind == "M" else "timedelta64[ns]"
@@ -293,6 +299,17 @@ def _numbers(column: NDArray[Any]) -> Array:
         return np.where(known, whole + 1e-9 * rest, np.nan)
     numbers = np.ascontiguousarray(column, dtype=np.float64)
     return np.where(np.isfinite(numbers), numbers, np.nan)
+
+
+def _rounded(column: NDArray[Any]) -> NDArray[np.int64]:
+    """Places of the integers that float64 cannot hold: they have more than 53 bits between the first and last 1."""
+    if column.dtype.kind not in "iu" or column.dtype.itemsize < 8:
+        return np.empty(0, np.int64)
+    size = np.abs(column).astype(np.uint64)
+    far = np.flatnonzero(size > np.uint64(2**53))
+    lowest = size[far] & (~size[far] + np.uint64(1))
+    rounded: NDArray[np.int64] = far[size[far] // lowest > np.uint64(2**53)]
+    return rounded
 
 
 def _texts(column: NDArray[Any]) -> tuple[str, ...]:

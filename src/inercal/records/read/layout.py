@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from inercal.records.read.table import FileOptions
 _SAMPLE = 100
 _DELIMITERS = ("\t", ";", ",", None)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*")
+_WHOLE = re.compile(r"\s*[+-]?\d+\s*")
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
 
 
@@ -23,8 +25,9 @@ _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
 class Layout:
     """How the lines of a file are to be read.
 
-    ``delimiter`` None is any run of blanks; ``width`` is the number of fields of a row; ``header`` is empty
-    where there is none and stands in line ``header_line``; ``first`` is the index of the first line after it.
+    ``delimiter`` None is any run of blanks; ``decimal`` is empty as long as no number has told; ``width`` is the
+    number of fields of a row; ``header`` is empty where there is none and stands in line ``header_line``; ``first``
+    is the index of the first line after it.
     """
 
     delimiter: str | None
@@ -51,6 +54,17 @@ class Layout:
         """The number a field holds, NaN where it is empty; None if it is no number."""
         return parse_number(text.replace(",", ".") if self.decimal == "," else text)
 
+    def settled(self, lines: Iterable[str]) -> Layout:
+        """The layout with the decimal mark of the first of more lines that tells it, where none has told so far."""
+        if self.decimal:
+            return self
+        for line in lines:
+            if ("," in line or "." in line) and self.is_row(line):
+                decimal = sniff_decimal([line], self.delimiter)
+                if decimal:
+                    return replace(self, decimal=decimal)
+        return self
+
 
 def parse_number(text: str) -> float | None:
     """The number of a text, NaN where it is empty or says so; None if it is no number."""
@@ -59,6 +73,11 @@ def parse_number(text: str) -> float | None:
         return None if "_" in text else float(text)
     except ValueError:
         return float("nan") if text.lower() in _MISSING else None
+
+
+def is_rounded(text: str, value: float) -> bool:
+    """True for a whole number, read as ``value``, that float64 cannot hold."""
+    return 2.0**53 <= abs(value) < math.inf and _WHOLE.fullmatch(text) is not None and int(text) != value
 
 
 def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layout:
@@ -148,13 +167,10 @@ def _sniff_delimiter(sample: Sequence[str], first: str) -> str | None:
 
 
 def sniff_decimal(sample: Sequence[str], delimiter: str | None) -> str:
-    """A comma if numbers such as 1,5 are there and none such as 1.5."""
+    """A point if numbers such as 1.5 are there, else a comma if such as 1,5; nothing if whole numbers alone."""
     if delimiter == ",":
         return "."
     fields = [field for line in sample for field in _split(line, delimiter)]
-    commas = any(_DECIMAL_COMMA.fullmatch(field) for field in fields)
-    return (
-        ","
-        if commas and not any("." in field and parse_number(field) is not None for field in fields)
-        else "."
-    )
+    if any("." in field and parse_number(field) is not None for field in fields):
+        return "."
+    return "," if any(_DECIMAL_COMMA.fullmatch(field) for field in fields) else ""

@@ -46,10 +46,16 @@ def _arrays(archive: ZipFile, name: str) -> Iterator[tuple[str, NamedArray]]:
         for field, (kind, *_) in fields.items():
             if kind.kind in _KINDS:
                 load = partial(_column, whole, field)
-                yield f"{key}/{field}", NamedArray(shape[0], 1, load, kind.kind in _TEXT)
+                yield f"{key}/{field}", NamedArray(shape[0], 1, load, kind.kind in _TEXT, _unit(kind))
     if dtype.kind in _KINDS and (dtype.kind not in _TEXT or len(shape) == 1):
         columns = 1 if len(shape) == 1 else shape[1]
-        yield key, NamedArray(shape[0], columns, partial(_column, whole, None), dtype.kind in _TEXT)
+        load = partial(_column, whole, None)
+        yield key, NamedArray(shape[0], columns, load, dtype.kind in _TEXT, _unit(dtype))
+
+
+def _unit(dtype: Any) -> str | None:
+    """The unit of dates and durations, which are read in seconds."""
+    return "s" if dtype.kind in "Mm" else None
 
 
 def _column(whole: Callable[[], NDArray[Any]], field: str | None, column: int) -> NDArray[Any]:

@@ -48,11 +48,12 @@ def _leaves(field: Any, above: str = "") -> Iterator[tuple[str, bool, str | None
     dates = types.is_timestamp(kind) or types.is_duration(kind)
     numbers = (
         types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_decimal(kind)
-    )
+        or types.is_null(kind)
+    )  # fmt: skip
     if text or dates or numbers:
         metadata = field.metadata or {}
         unit = metadata.get(b"units") or metadata.get(b"unit")
-        yield name, text, unit.decode("utf-8", "replace") if unit else None
+        yield name, text, "s" if dates else unit.decode("utf-8", "replace") if unit else None
 
 
 def _column(file: Any, name: str, _: int) -> NDArray[Any]:
@@ -65,7 +66,8 @@ def _column(file: Any, name: str, _: int) -> NDArray[Any]:
     column = table.column(0)
     if pyarrow.types.is_dictionary(column.type):
         column = column.cast(column.type.value_type)
-    if pyarrow.types.is_boolean(column.type) or pyarrow.types.is_decimal(column.type):
+    types = pyarrow.types
+    if types.is_boolean(column.type) or types.is_decimal(column.type) or types.is_null(column.type):
         column = column.cast(pyarrow.float64())
     values: NDArray[Any] = column.to_numpy()
     return values

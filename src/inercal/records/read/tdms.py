@@ -43,7 +43,7 @@ def _opened(path: Path) -> Iterator[Contents]:
                 clock = clocks.setdefault(waveform, _free(f"{channel.group_name}/waveform time", clocks))
                 arrays.setdefault(clock, NamedArray(len(channel), 1, partial(_times, waveform), unit="s"))
             name = f"{channel.group_name}/{channel.name}"
-            unit = channel.properties.get("unit_string") or None
+            unit = "s" if channel.dtype.kind == "M" else channel.properties.get("unit_string") or None
             arrays[name] = NamedArray(len(channel), 1, partial(_column, channel), text, unit, clock)
         cut = file.file_status.incomplete_final_segment
         findings = (Finding("truncated", "the file ends within a segment"),) if cut else ()

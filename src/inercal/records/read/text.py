@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from inercal.errors import RecordError
 from inercal.records.channels import Channel
+from inercal.records.checks import too_long
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.read.canonical import EXAMPLE, bare, canonical
-from inercal.records.read.layout import Layout, find_layout
+from inercal.records.read.layout import Layout, find_layout, is_rounded
 from inercal.records.read.lines import Block, blocks
 from inercal.records.read.table import FileOptions, Sample, Table
 from inercal.records.record import Array
@@ -58,14 +59,18 @@ def read(
         pieces: list[list[Array]] = [[] for _ in numbers]
         labels: list[str] = []
         flaws: list[_Flaws] = []
+        rounded: dict[str, list[int]] = {name: [] for name in numbers}
         block = head
         for block in chain([head.after(layout.first)], stream):
+            layout = layout.settled(block.lines)
             rows = _at_once(block, layout, tuple(numbers.values()))
             if rows is None:
                 rows, flaw = _line_by_line(block, layout, tuple(numbers.values()))
                 flaws.append(flaw)
-            for column, piece in zip(pieces, rows.T, strict=True):
+            for name, column, piece in zip(numbers, pieces, rows.T, strict=True):
                 column.append(piece.copy())
+                if name != "t":
+                    rounded[name] += _rounded(block, layout, numbers[name], piece)
             if label is not None:
                 labels += _labels(block, layout, label)
             progress(file.tell())
@@ -77,6 +82,7 @@ def read(
         )
     count = len(next(iter(values.values())))
     findings = _findings(flaws, tuple(numbers), block, layout.width)
+    findings += tuple(too_long(name, "line", lines) for name, lines in rounded.items() if lines)
     return [Table(tuple(found), values, contents(layout), count, tuple(labels), findings)]
 
 
@@ -93,6 +99,7 @@ def peek(path: Path) -> list[Sample]:
         head = next(blocks(file, path))
     skip = _leading(head.lines, path)
     layout = find_layout(head.lines, FileOptions(skip=skip), path)
+    layout = layout.settled(head.lines[layout.first :])
     rows, _ = _line_by_line(head.after(layout.first), layout, tuple(range(layout.width)))
     names = (*layout.header, *repeat("", layout.width))[: layout.width] if layout.header else ()
     return [Sample(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))]
@@ -195,6 +202,19 @@ def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
     place, badly = np.array(lines, np.int64), np.array(bad, np.int64)
     empty = np.isnan(rows) & ~np.isin(place, badly)[:, np.newaxis]
     return rows, _Flaws(badly, tuple(place[column] for column in empty.T))
+
+
+def _rounded(block: Block, layout: Layout, index: int, values: Array) -> list[int]:
+    """Numbers of the lines where the whole number in a column, read as ``values`` (rows of the block,), was rounded."""
+    far = np.flatnonzero(np.abs(values) >= 2.0**53)
+    if not far.size:
+        return []
+    rows = [(number, line) for number, line in enumerate(block.lines, block.first) if layout.is_row(line)]
+    texts = ((*rows[i], values[i]) for i in far.tolist())
+    return [
+        number for number, line, value in texts
+        if is_rounded((layout.fields(line) or [""] * layout.width)[index], float(value))
+    ]  # fmt: skip
 
 
 def _labels(block: Block, layout: Layout, index: int) -> list[str]:
