@@ -36,6 +36,13 @@ class AidedTable(Strict):
             )
         return self
 
+    @model_validator(mode="after")
+    def _no_limits(self) -> AidedTable:
+        """Refuse what would change nothing."""
+        if self.rig.limits.model_fields_set:
+            raise refusal("found rig.limits, expected none: the angles are those of the record")
+        return self
+
 
 def aided_settings(table: AidedTable, where: object) -> AidedSettings:
     """Put the table in SI.

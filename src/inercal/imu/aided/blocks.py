@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ class Blocks:
     """Means ``y`` (n, 3) [output] of a triad over blocks.
 
     ``samples`` (n, s) [s] are the times of the samples, ``nodes`` (n, s + 1) [s] the ends of their intervals,
-    ``resting`` (n,) whether the table rests throughout, ``lost`` how many blocks were left out.
+    ``resting`` (n,) whether the table rests throughout, ``clipped`` how many blocks each axis that saturates has lost.
     """
 
     triad: Triad
@@ -42,7 +43,7 @@ class Blocks:
     samples: Array
     nodes: Array
     resting: NDArray[np.bool_]
-    lost: int
+    clipped: Mapping[str, int]
 
     @property
     def middle(self) -> Array:
@@ -53,6 +54,16 @@ class Blocks:
     def length(self) -> Array:
         """Lengths (n,) [s]."""
         return np.asarray(self.nodes[:, -1] - self.nodes[:, 0])
+
+    def only(self, kept: NDArray[np.bool_]) -> Blocks:
+        """Those of a mask (n,)."""
+        return replace(
+            self,
+            y=self.y[kept],
+            samples=self.samples[kept],
+            nodes=self.nodes[kept],
+            resting=self.resting[kept],
+        )
 
 
 def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
@@ -73,8 +84,10 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     steps = np.clip(np.nan_to_num(np.diff(t), nan=np.inf), 0.0, 1.5 * interval)
     low, high = t - 0.5 * np.r_[interval, steps], t + 0.5 * np.r_[steps, interval]
     good = np.isfinite(triad.values).all(axis=1) & np.isfinite(t)
-    for values in triad.values.T:
-        good[saturated(values)] = False
+    at_end = {}
+    for axis, values in zip("xyz", triad.values.T, strict=True):
+        # slow motion and noise reach the same levels without a sharp end
+        at_end[axis] = np.isin(values, np.unique(values[saturated(values)]))
     whole = np.r_[True, (np.diff(t) > 0.5 * interval) & (np.diff(t) < 1.5 * interval)]
 
     def rows(x: NDArray[Any]) -> NDArray[Any]:
@@ -82,9 +95,10 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
 
     nodes = np.concatenate([rows(low)[:, :1], rows(high)], axis=1)
     kept = rows(good).all(axis=1) & rows(whole)[:, 1:].all(axis=1)
+    in_blocks = {axis: rows(at).any(axis=1) for axis, at in at_end.items()}
     inside = (nodes[:, 0] >= motion.t[0] - motion.step) & (nodes[:, -1] <= motion.t[-1] + motion.step)
-    lost = int(np.sum(~kept & inside))
-    kept &= inside
+    clipped = {axis: int(np.sum(at & inside)) for axis, at in in_blocks.items() if np.any(at & inside)}
+    kept &= inside & ~np.any(list(in_blocks.values()), axis=0)
     if np.count_nonzero(kept) < FEWEST:
         raise RecordError(
             triad.source.path,
@@ -95,7 +109,7 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     weights = np.diff(nodes, axis=1)
     weights /= weights.sum(axis=1, keepdims=True)
     y = np.einsum("ns,nsi->ni", weights, rows(triad.values)[kept])
-    return Blocks(triad, y, rows(t)[kept], nodes, _within(nodes, rests), lost)
+    return Blocks(triad, y, rows(t)[kept], nodes, _within(nodes, rests), clipped)
 
 
 def _within(nodes: Array, rests: Array) -> NDArray[np.bool_]:

@@ -14,14 +14,16 @@ from inercal.estimate.status import Status
 from inercal.imu.aided.blocks import Blocks, cut
 from inercal.imu.aided.coefficients import gain_names
 from inercal.imu.aided.fit import Fit, fit
+from inercal.imu.aided.misfit import knocks
 from inercal.imu.aided.model import side_of, unknowns
 from inercal.imu.aided.outcome import assemble, timed, without_fit
 from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, tells, travel
-from inercal.imu.aided.table import Motion, motion_of, shifted
+from inercal.imu.aided.table import Motion, motion_of, shifted, times
 from inercal.imu.aided.walk import whiten
 from inercal.imu.settings import ImuSettings
 from inercal.records.findings import Finding
+from inercal.records.places import counted
 from inercal.records.record import Record
 
 Array = NDArray[np.float64]
@@ -107,13 +109,24 @@ def calibrate_aided(
     elif wrong:
         bad = Status.INCONSISTENT, _contradiction(wrong, blocks, motion)
     if bad is not None:
-        estimate = without_fit(record, settings, *bad)
+        estimate = without_fit(record, settings, *bad, said=(*said, *motion.findings))
         return AidedCalibration(timed(estimate, time.perf_counter() - clock), motion, rests)
     progress("fitting all sensors")
     known = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
-    sides = [side_of(each, motion, rests, known) for each in blocks]
-    names = {side.sensor: gain_names(side.sensor, settings.g_sensitivity) for side in sides}
-    done = fit(sides, motion, known, settings.site.gravity, names)
+    names = {each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity) for each in blocks}
+
+    def fitted() -> Fit:
+        sides = [side_of(each, motion, rests, known) for each in blocks]
+        return fit(sides, motion, known, settings.site.gravity, names)
+
+    done = fitted()
+    knocked = knocks(done)
+    if any(wrong.any() for wrong in knocked.values()):
+        said += [
+            _knocked(each, knocked[each.triad.sensor]) for each in blocks if knocked[each.triad.sensor].any()
+        ]
+        blocks = [each.only(~knocked[each.triad.sensor]) for each in blocks]
+        done = fitted()
     estimate = assemble(record, motion, rests, done, late, settings, said)
     return AidedCalibration(timed(estimate, time.perf_counter() - clock), motion, rests, done)
 
@@ -126,6 +139,16 @@ def _contradiction(wrong: list[str], blocks: list[Blocks], motion: Motion) -> st
         what = "all would fit if " + ", or if ".join(found)
     unexplained = f"{' and '.join(wrong)} of its variation unexplained"
     return f"the outputs do not follow the table's angles ({unexplained}): {what}"
+
+
+def _knocked(blocks: Blocks, wrong: NDArray[np.bool_]) -> Finding:
+    """Blocks that were left out."""
+    at = times(blocks.middle[wrong])
+    return Finding(
+        "outlier",
+        f"{counted(int(wrong.sum()), 'block')} of {float(np.median(blocks.length)):.2g} s of {blocks.triad.sensor} far "
+        f"from the fit, knocks or wrong readings, at t {at} s: left out",
+    )
 
 
 def _warm_up() -> None:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.imu.aided.blocks import Reference, reference
+from inercal.imu.aided.levels import Levels, chosen, levels
 from inercal.imu.aided.model import Equation, Side, Unknowns, equations
 from inercal.imu.aided.table import Motion
-from inercal.imu.aided.walk import Levels, Whitened, levels, whiten
+from inercal.imu.aided.walk import Whitened, whiten
 
 Array = NDArray[np.float64]
 
@@ -103,7 +104,13 @@ def fit(
                 for side in sides
                 for each in equations(side, references[side.sensor], known, x, gravity)
             ]
-            noise = noise or [_noise(side, each, known, x, rough) for side, each in found]
+            noise = noise or [
+                level
+                for first in range(0, len(found), 3)
+                for level in chosen(
+                    [noise_of(side, each, known, x, rough) for side, each in found[first : first + 3]]
+                )
+            ]
             sensors = [
                 Sensor(side, each, level, _whiten(side, each, level))
                 for (side, each), level in zip(found, noise, strict=True)
@@ -125,7 +132,9 @@ def fit(
     return Fit(known, x, root @ root.T, sensors, references, told, converged)
 
 
-def _noise(side: Side, equation: Equation, known: Unknowns, x: Array, rough: bool) -> Levels:
+def noise_of(
+    side: Side, equation: Equation, known: Unknowns, x: Array, rough: bool = False
+) -> tuple[Levels, Levels]:
     """Noise of a sensor; ``rough`` from its steps at rest alone, while the fit is far off."""
     blocks = side.blocks
     sd = known.sd[equation.index]
@@ -135,7 +144,8 @@ def _noise(side: Side, equation: Equation, known: Unknowns, x: Array, rough: boo
         both = blocks.resting[1:] & blocks.resting[:-1]
         steps = np.diff(y)[both] if np.count_nonzero(both) >= 10 else np.diff(y)
         n = float(np.sqrt(max(0.5 * np.median(steps**2) / 0.455, floor**2) * np.median(blocks.length)))
-        return Levels(n, n, FIRST_WALK * n, np.inf, np.inf, 0.0)
+        level = Levels(n, n, FIRST_WALK * n, FIRST_WALK * n, np.inf, np.inf, 0.0)
+        return level, level
     U, s, Vt = np.linalg.svd(equation.columns * sd, full_matrices=False)
     some = s > SMALL * np.std(np.diff(y))
     prior = Vt[some] @ ((known.mean - x)[equation.index] / sd)
@@ -146,7 +156,8 @@ def _whiten(side: Side, equation: Equation, level: Levels) -> Whitened:
     """Whitened columns of a sensor, the residual last."""
     blocks = side.blocks
     columns = np.column_stack([equation.columns, equation.residual])
-    return whiten(columns, blocks.middle, level.white(blocks.length, blocks.resting), level.walk)
+    t, length, resting = blocks.middle, blocks.length, blocks.resting
+    return whiten(columns, t, level.white(length, resting), level.wander(t, length, resting))
 
 
 def _stacked(sensors: Sequence[Sensor], known: Unknowns, from_mean: Array) -> tuple[Array, Array]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.budget import combine, common
+from inercal.estimate.budget import TypeB, combine, common
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.aided.coefficients import (
@@ -20,9 +20,11 @@ from inercal.imu.aided.coefficients import (
     type_a,
     type_b,
 )
+from inercal.imu.aided.faults import faults
 from inercal.imu.aided.fit import Fit
+from inercal.imu.aided.misfit import misfits
 from inercal.imu.aided.table import Motion
-from inercal.imu.aided.verdict import findings, verdict
+from inercal.imu.aided.verdict import findings, scatter, verdict
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
@@ -45,6 +47,8 @@ REFERENCES = (
     "S. J. Koopman, Disturbance smoother for state space models, Biometrika 80 (1993) 117",
     "H. D. Patterson, R. Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58 "
     "(1971) 545",
+    "T. S. Breusch, A. R. Pagan, The Lagrange multiplier test and its applications to model specification in "
+    "econometrics, Review of Economic Studies 47 (1980) 239",
     "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
 )
 
@@ -64,9 +68,18 @@ def assemble(
     values, rows, own = coefficients(fit, names)
     sources_a = type_a(fit, rows, own, names)
     sources_b = type_b(fit, rows, names, values, settings.site, settings.time_base_u)
+    faulty = misfits(fit, names, rows, list(faults(fit, motion, settings.site.gravity)))
+    tilt = scatter(fit, settings.site.gravity)
+    if tilt > 0.0 and not faulty:
+        crossed = np.array([name.startswith(("M_", "T_")) for name in names])
+        sources_b.append(
+            TypeB("shifts with each turn", tilt, "rad", np.eye(len(names))[:, crossed], redrawn=True)
+        )
+    plain, *_ = combine(names, [*sources_a, *sources_b])
+    u = dict(zip(names, np.sqrt(np.diag(plain)).tolist(), strict=True))
+    status, message = verdict(fit, dict(zip(names, values.tolist(), strict=True)), u, len(rests), faulty)
+    sources_b += [TypeB(f"misfit ({each.code})", 1.0, "1", each.shift, redrawn=True) for each in faulty]
     covariance, dof, budget = combine(names, [*sources_a, *sources_b])
-    u = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    status, message = verdict(fit, dict(zip(names, values.tolist(), strict=True)), u, len(rests))
     symbols = {triad: of_triad(fit, triad)[0].side.blocks.triad.unit.symbol for triad in triads}
     units = [
         TERMS[name].unit_for(symbols["acc" if name.startswith(("K", "M")) else "gyro"]) for name in names
@@ -81,7 +94,7 @@ def assemble(
         k=np.array([coverage_factor(float(value)) for value in dof]),
         status=status,
         message=message,
-        findings=(*record.findings, *said, *findings(fit, lag)),
+        findings=(*record.findings, *said, *motion.findings, *findings(fit, lag, faulty)),
         statistics=_statistics(fit, rests),
         budget=budget,
         model=MODEL,
@@ -102,13 +115,15 @@ def assemble(
     )
 
 
-def without_fit(record: Record, settings: ImuSettings, status: Status, message: str) -> Estimate:
+def without_fit(
+    record: Record, settings: ImuSettings, status: Status, message: str, said: Sequence[Finding] = ()
+) -> Estimate:
     """The estimate of a test that cannot be fitted: no parameters, but why."""
     return without_parameters(
         COMMAND,
         status,
         message,
-        findings=record.findings,
+        findings=(*record.findings, *said),
         model=MODEL,
         traceability=settings.traceability,
         inputs=record.sources,
@@ -146,6 +161,7 @@ def _noise(fit: Fit, triad: str) -> dict[str, list[float]]:
         "white_at_rest": [level.resting for level in levels],
         "white_turning": [level.moving for level in levels],
         "walk": [level.walk for level in levels],
+        "walk_turning": [level.walk_moving for level in levels],
     }
 
 

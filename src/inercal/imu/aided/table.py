@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError
+from inercal.records.findings import Finding
+from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.rigs.chain import Chain, Error, Scope
 
@@ -27,15 +29,25 @@ SHORTEST = 1.0
 FASTEST = np.radians(3000.0)
 """Speed [rad/s] that no table has: the angle jumps."""
 
+LEAST_GLITCH = np.radians(0.3)
+"""Distance [rad] of an angle from its neighbours below which it is kept."""
+
+GLITCH = 15.0
+"""The same over the median distance of the forty around."""
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Angles (m, joints) [rad] of the chain's joints at times ``t`` (m,) [s], without jumps at full turns."""
+    """Angles (m, joints) [rad] of the chain's joints at times ``t`` (m,) [s], without jumps at full turns.
+
+    ``findings`` say which readings were left out.
+    """
 
     chain: Chain
     t: Array
     angles: Array
     path: str
+    findings: tuple[Finding, ...] = ()
 
     def at(self, t: Array) -> Array:
         """Angles (*t.shape, joints) [rad]; held beyond the ends.
@@ -104,6 +116,16 @@ def motion_of(record: Record, chain: Chain) -> Motion:
     if len(t) < 10:
         raise RecordError(path, f"found {len(t)} rows with angles, expected the table's angles over the test")
     angles = np.unwrap(values, axis=0)
+    wrong = [_glitches(column) for column in angles.T]
+    said = tuple(
+        Finding(
+            "outlier",
+            f"{counted(len(rows), 'reading')} of {joint} far from both neighbours, at t {times(t[rows])} s: left out",
+        )
+        for joint, rows in zip(chain.joints, wrong, strict=True)
+        if len(rows)
+    )
+    t, angles = (np.delete(x, np.concatenate(wrong), axis=0) for x in (t, angles))
     speed = np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None]
     row, joint = np.unravel_index(int(np.argmax(speed)), speed.shape)
     if speed[row, joint] > FASTEST:
@@ -113,7 +135,24 @@ def motion_of(record: Record, chain: Chain) -> Motion:
             f"{chain.joints[joint]} jumps by {jump:.4g} deg at t {t[row]:.2f} s, expected the angles that the table "
             "passes through, as its encoders give them",
         )
-    return Motion(chain, t, angles, path)
+    return Motion(chain, t, angles, path, said)
+
+
+def _glitches(angle: Array) -> NDArray[np.int64]:
+    """Rows of single angles (m,) off the curve through two neighbours on either side, which agree with each other."""
+    middle = angle[2:-2]
+    off = np.abs(middle - (4.0 * (angle[1:-3] + angle[3:-1]) - angle[:-4] - angle[4:]) / 6.0)
+    step = np.abs(angle[3:-1] - angle[1:-3])
+    rows = np.flatnonzero((off > LEAST_GLITCH) & (step < 0.5 * off)) + 2
+    near = [slice(max(row - 22, 0), row + 19) for row in rows]
+    far = [off[row - 2] > GLITCH * np.median(off[at]) for row, at in zip(rows, near, strict=True)]
+    peak = [off[row - 2] >= np.max(off[max(row - 4, 0) : row + 1]) for row in rows]
+    return np.asarray(rows[np.logical_and(far, peak)], dtype=np.int64)
+
+
+def times(t: Array) -> str:
+    """Up to four times [s] in words."""
+    return ", ".join(f"{each:.2f}" for each in t[:4]) + (" and later" if len(t) > 4 else "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from inercal.estimate.result import rounded
 from inercal.estimate.status import Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
-from inercal.imu.aided.fit import Fit
+from inercal.imu.aided.fit import Fit, Sensor
+from inercal.imu.aided.misfit import Misfit, variation
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 
@@ -24,6 +25,18 @@ HARDLY = 0.1
 """Standard uncertainty of a scale factor over its value, or of a misalignment [rad], beyond which the data say next to
 nothing of it."""
 
+GROSS_SHIFT = 5.0
+"""Shift of a coefficient, in its standard uncertainties, by a fault, beyond which nothing can be used."""
+
+GROSS_PART = 1e-3
+"""Part of the outputs' variation that such a fault makes at least: below that, the uncertainties allow for it."""
+
+GROSS_WANDER = 0.01
+"""Shift of an output by one turn, over the variation of its triad, beyond which nothing can be used."""
+
+GROSS_NOISE = 0.1
+"""Residuals in turns over the variation of the triad, beyond which nothing can be used."""
+
 DRIFT = 10.8
 """Twice the gain of the log likelihood beyond which a bias wanders for certain (chi-square of 1, p = 0.001)."""
 
@@ -35,20 +48,44 @@ _CURE = {
 }
 
 
-def verdict(fit: Fit, values: Mapping[str, float], u: Mapping[str, float], rests: int) -> tuple[Status, str]:
-    """Status and message; ``values`` and standard uncertainties ``u`` of the coefficients by name."""
+def verdict(
+    fit: Fit, values: Mapping[str, float], u: Mapping[str, float], rests: int, faults: Sequence[Misfit]
+) -> tuple[Status, str]:
+    """Status and message.
+
+    ``values`` and standard uncertainties ``u`` of the coefficients by name, these without ``faults``, which are what
+    was found in the residuals.
+    """
     triads = tuple(fit.known)
+    limit = np.array(list(u.values()))
+    for fault in faults:
+        if fault.part > GROSS_PART and np.any(np.abs(fault.shift) > GROSS_SHIFT * limit):
+            return Status.INCONSISTENT, fault.message
     for triad in triads:
         wrong = _unit_words(fit, triad)
         if wrong:
             return Status.INCONSISTENT, wrong
+    for sensor, name in zip(fit.sensors, _sensor_names(fit), strict=True):
+        left, size = _in_turns(sensor), variation(sensor.side.blocks.y)
+        noise = sensor.noise.resting / np.sqrt(np.median(sensor.side.blocks.length))
+        shifts = sensor.noise.excess > 0.0 and _shift(sensor) > GROSS_WANDER * size
+        if faults and (shifts or left > max(GROSS_NOISE * size, GROSS_SHIFT * noise)):
+            return Status.INCONSISTENT, faults[0].message
+        if shifts or left > max(GROSS_NOISE * size, GROSS_SHIFT * noise):
+            part = 100.0 * (_shift(sensor) if shifts else left) / size
+            return (
+                Status.INCONSISTENT,
+                f"the output of {name} departs from the table's angles by {part:.2g} % of its variation when the "
+                "table turns, and not at rest: look at the residuals (angles that are not those of the table, an "
+                "instrument that is not fixed to it, outputs that saturate or are not linear)",
+            )
     for triad in triads:
         known = fit.known[triad]
         weak = [name for name in known.names if _relative(name, values, u) > HARDLY]
         if weak:
             return (
                 Status.UNOBSERVABLE,
-                f"the test says next to nothing of {_listed(weak)} ({_least(fit, triad)}): {_CURE[triad]}",
+                f"the test says next to nothing of {_listed(weak)} ({_least(fit, triad)}): {_cure(fit, triad)}",
             )
     for triad in triads:
         known = fit.known[triad]
@@ -57,7 +94,7 @@ def verdict(fit: Fit, values: Mapping[str, float], u: Mapping[str, float], rests
             return (
                 Status.ILL_CONDITIONED,
                 f"the test hardly fixes {term} ({' ± '.join(rounded(values[term], u[term]))}; weak combination "
-                f"{known.weakest()}, condition {known.condition:.0f}; {_least(fit, triad)}): {_CURE[triad]}",
+                f"{known.weakest()}, condition {known.condition:.0f}; {_least(fit, triad)}): {_cure(fit, triad)}",
             )
     if not fit.converged:
         return Status.NOT_CONVERGED, "the fit of all sensors together did not settle: look at the residuals"
@@ -66,6 +103,44 @@ def verdict(fit: Fit, values: Mapping[str, float], u: Mapping[str, float], rests
         Status.OK,
         f"{len(values)} coefficients from {counted(rests, 'rest')} and the turns between; condition {conditions}",
     )
+
+
+def _cure(fit: Fit, triad: str) -> str:
+    """What to do for a triad of which the test says too little."""
+    clipped = of_triad(fit, triad)[0].side.blocks.clipped
+    if clipped:
+        what = "turn slower" if triad == "gyro" else "avoid knocks"
+        return f"{_listed([f'{triad}_{axis}' for axis in clipped])} saturated, {what} or set a wider range"
+    return _CURE[triad]
+
+
+def _sensor_names(fit: Fit) -> list[str]:
+    """Names of the sensors in the fit."""
+    return [f"{sensor.side.sensor}_{'xyz'[k % 3]}" for k, sensor in enumerate(fit.sensors)]
+
+
+def _in_turns(sensor: Sensor) -> float:
+    """Root mean square of the residuals while the table turns."""
+    moving = ~sensor.side.blocks.resting
+    return float(np.sqrt(np.mean(sensor.residual[moving] ** 2))) if moving.any() else 0.0
+
+
+def _shift(sensor: Sensor) -> float:
+    """Standard deviation of the shift of an output by one turn."""
+    resting, length = sensor.side.blocks.resting, sensor.side.blocks.length
+    turns = max(np.count_nonzero(np.diff(resting.astype(np.int8)) == -1), 1)
+    return sensor.noise.walk_moving * float(np.sqrt(length[~resting].sum() / turns))
+
+
+def scatter(fit: Fit, gravity: float) -> float:
+    """Angle [rad] that shifts of the accelerometers with each turn amount to; 0 where there are none."""
+    sensors = of_triad(fit, "acc")
+    scale = np.abs(np.diag(fit.x[fit.unknowns.places["gain acc"]].reshape(3, 3)))
+    angles = [
+        _shift(sensor) / (gravity * size) if sensor.noise.excess > 0.0 else 0.0
+        for sensor, size in zip(sensors, scale, strict=True)
+    ]
+    return max(angles)
 
 
 def _relative(name: str, values: Mapping[str, float], u: Mapping[str, float]) -> float:
@@ -107,8 +182,30 @@ def _unit_words(fit: Fit, triad: str) -> str:
     )
 
 
-def findings(fit: Fit, lag: float) -> Iterator[Finding]:
-    """Findings about clocks and biases."""
+def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding]:
+    """Findings about clocks and biases, saturation, and faults found in the residuals."""
+    for fault in faults:
+        yield Finding(fault.code, f"{fault.message}; the uncertainties allow for it")
+    for triad in fit.known:
+        blocks = of_triad(fit, triad)[0].side.blocks
+        if blocks.clipped:
+            lost = ", ".join(f"{triad}_{axis} {count}" for axis, count in blocks.clipped.items())
+            yield Finding(
+                "saturation",
+                f"blocks of {float(np.median(blocks.length)):.2g} s in which a sensor is at an end of its range are "
+                f"left out: {lost}; {len(blocks.y)} are left",
+            )
+    moved = [
+        f"{name} {_shift(sensor):.2g} {sensor.side.blocks.triad.unit.symbol}"
+        for sensor, name in zip(fit.sensors, _sensor_names(fit), strict=True)
+        if sensor.noise.excess > 0.0
+    ]
+    if moved and not faults:
+        yield Finding(
+            "excess_scatter",
+            f"outputs shift with each turn of the table, and not at rest, by some {', '.join(moved)}: errors of the "
+            "table that are not stated, or hysteresis; the uncertainties use it",
+        )
     for triad in fit.known:
         group = f"time shift of {triad}"
         own = float(fit.x[fit.unknowns.places[group][0]])
