@@ -447,3 +447,31 @@ def test_exchanged_channels_and_a_reversed_axis_are_no_less_contradictory_when_d
     ):
         found = calibrate_ferraris(unlabelled(record), SETTINGS, OPTIONS).estimate
         assert found.status is not Status.OK
+
+
+GERMAN = {
+    "x_p": "X oben", "x_a": "X unten", "y_p": "Y oben", "y_a": "Y unten", "z_p": "Z oben", "z_a": "Z unten",
+    "x_rot": "Drehung X", "y_rot": "Drehung Y", "z_rot": "Drehung Z",
+}  # fmt: skip
+
+
+def test_labels_of_ones_own_are_stated_in_the_study():
+    """Sections by labels of any name are the sections by the program's own names."""
+    whole = record_of("ferraris")
+    own = relabelled(whole, **GERMAN)
+    a = calibrate_ferraris(whole, SETTINGS, OPTIONS).estimate
+    b = calibrate_ferraris(own, SETTINGS, replace(OPTIONS, sections=GERMAN)).estimate
+    np.testing.assert_array_equal(a.values, b.values)
+    with pytest.raises(
+        StudyError, match=r"sections.x_p: found no row labelled 'X up', the record has Drehung X, "
+    ):
+        calibrate_ferraris(own, SETTINGS, replace(OPTIONS, sections=GERMAN | {"x_p": "X up"}))
+
+
+def test_labels_that_name_no_section_are_not_passed_over_in_silence():
+    own = relabelled(record_of("ferraris"), **GERMAN)
+    found = calibrate_ferraris(own, SETTINGS, OPTIONS).estimate.findings
+    (said,) = (f.message for f in found if f.code == "unused_labels")
+    assert said.startswith("the labels Drehung X, Drehung Y, Drehung Z, X oben, X unten and 4 more name none")
+    typo = calibrate_ferraris(relabelled(record_of("ferraris"), x_p="xp"), SETTINGS, OPTIONS).estimate
+    assert typo.message.endswith("label it in the recording (found the labels xp)")

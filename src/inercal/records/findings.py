@@ -29,6 +29,7 @@ CODES: dict[str, str] = {
     "g_sensitivity": "the gyro output changes with the pose",
     "bias_drift": "a bias drifts over the recording",
     "between_runs": "a coefficient changes from run to run by more than its uncertainty",
+    "unused_labels": "labels of a recording that were of no use",
     "hysteresis": "values on rising and on falling temperature differ",
     "outside_range": "a value is stated outside the range it was measured over",
     "excess_scatter": "the scatter of the residuals exceeds what the sensor noise explains",

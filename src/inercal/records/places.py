@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -11,6 +13,12 @@ _SHOWN = 3
 def counted(count: int, noun: str) -> str:
     """The count with its noun, in the plural unless it is one."""
     return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def counted_names(names: Sequence[str], most: int = 5) -> str:
+    """The first few names, and how many more: ``a, b, c and 4 more``."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def places(word: str, numbers: ArrayLike) -> str:

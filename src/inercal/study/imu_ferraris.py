@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
@@ -15,9 +14,7 @@ from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.study.fields import QuantityText, refusal
 from inercal.units import Quantity, parse_quantity, shown
 
-_EXPECTED = (
-    'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271]'
-)
+_EXPECTED = 'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a label'
 
 TurnAngle = Annotated[
     Quantity,
@@ -37,8 +34,10 @@ Alignment = Annotated[
 
 
 def _ends(value: object) -> object:
-    """A section: two times, or two sample numbers."""
+    """A section: two times, two sample numbers, or the label of its rows."""
     match value:
+        case str() if value.strip():
+            return value
         case [int(start), int(end)] if not isinstance(start, bool) and not isinstance(end, bool):
             if 0 <= start < end - 1:
                 return value
@@ -57,15 +56,17 @@ def _seconds(text: str) -> float:
         raise refusal(error.message) from error
 
 
+_Ends = Field(min_length=2, max_length=2)
+
 Section = Annotated[
-    list[str] | list[int],
+    Annotated[list[str], _Ends] | Annotated[list[int], _Ends] | str,
     BeforeValidator(_ends),
-    Field(min_length=2, max_length=2, examples=[["5.2 s", "12.4 s"], [540, 1271]]),
+    Field(examples=[["5.2 s", "12.4 s"], [540, 1271], "X up"]),
 ]
 
 
 class SectionsTable(Strict):
-    """Where the sections are: times of the record's time axis, or samples from 0, the end not included."""
+    """Where the sections are: times of the record's time axis, samples from 0, the end not included, or labels."""
 
     x_p: Section | None = Field(default=None, description="+x up: accelerometer x reads +g")
     x_a: Section | None = Field(default=None, description="-x up: accelerometer x reads -g")
@@ -101,12 +102,15 @@ class FerrarisTable(Strict):
 def ferraris_settings(table: FerrarisTable) -> FerrarisSettings:
     """The options in SI."""
     given = {name: ends for name in NAMES if (ends := getattr(table.sections, name)) is not None}
-    sections: Mapping[str, tuple[Any, Any]] = {
-        name: (
-            (ends[0], ends[1]) if isinstance(ends[0], int) else (_seconds(ends[0]), _seconds(str(ends[1])))
-        )
-        for name, ends in given.items()
-    }
+    sections = {name: _span(ends) for name, ends in given.items()}
     turn = {} if table.turn is None else {"turn": table.turn.value, "turn_u": table.turn.u}
     alignment = None if table.alignment is None else table.alignment.value
     return FerrarisSettings(**turn, alignment=alignment, sections=sections)
+
+
+def _span(ends: list[str] | list[int] | str) -> tuple[float, float] | str:
+    """A section as the settings have it: seconds, samples or a label."""
+    if isinstance(ends, str):
+        return ends
+    start, end = (_seconds(each) if isinstance(each, str) else each for each in ends)
+    return start, end

@@ -18,7 +18,13 @@ from inercal.imu.ferraris.sections import Sections, find_sections
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.transitions import misses
 from inercal.imu.ferraris.uncertainty import propagation
-from inercal.imu.ferraris.verdict import contradictions, scatter_findings, sense_finding, wrong_axes
+from inercal.imu.ferraris.verdict import (
+    contradictions,
+    scatter_findings,
+    sense_finding,
+    unused_labels,
+    wrong_axes,
+)
 from inercal.imu.settings import ImuSettings
 from inercal.records.record import Record, Triad
 
@@ -102,6 +108,7 @@ def calibrate_ferraris(
         *against,
         *(() if turns is None else turns.findings),
         *readings.findings,
+        *unused_labels(sections),
         *([] if against else sense_finding(found, carried)),
         *scatter_findings(scatter, options),
     ]

@@ -14,8 +14,9 @@ from inercal.imu.ferraris.choice import Choice, choose
 from inercal.imu.ferraris.detection import detect
 from inercal.imu.ferraris.names import NAMES, TURNS
 from inercal.imu.ferraris.settings import FerrarisSettings
-from inercal.records.places import places
+from inercal.records.places import counted_names, places
 from inercal.records.record import Record, Triad
+from inercal.units import shown
 
 Integers = NDArray[np.int64]
 
@@ -25,12 +26,14 @@ _SIGNED = re.compile(r"([+-])([xyz])")
 @dataclass(frozen=True, eq=False)
 class Sections:
     """The rows of each section, by name, for the accelerometers and for the gyro; ``found_by`` says how: labels,
-    study or detection, and ``turns`` in the last case what there is to say of the choice."""
+    study or detection, and ``turns`` in the last case what there is to say of the choice; ``strange`` are labels of
+    the record that name no section."""
 
     acc: Mapping[str, Integers]
     gyro: Mapping[str, Integers]
     found_by: str
     turns: Choice | None = None
+    strange: tuple[str, ...] = ()
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -50,7 +53,11 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
     """
     turns = None
     if options.sections:
-        rows, found_by = {name: _rows(name, ends, acc) for name, ends in options.sections.items()}, "study"
+        rows = {
+            name: _named(name, at, record.labels, acc) if isinstance(at, str) else _rows(name, at, acc)
+            for name, at in options.sections.items()
+        }
+        found_by = "study"
     elif any(_canonical(label) for label in set(record.labels)):
         rows, found_by = _labelled(record.labels, acc), "labels"
     else:
@@ -66,7 +73,8 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
                 acc.source.path, f"section {name} has {len(found)} rows of numbers, expected a recording"
             )
     other = {name: _finite(_on(gyro, acc, found), gyro) for name, found in known.items()}
-    return Sections(known, other, found_by, turns)
+    strange = () if options.sections else tuple(sorted(filter(_is_strange, set(record.labels))))
+    return Sections(known, other, found_by, turns, strange)
 
 
 def _canonical(label: str) -> str:
@@ -76,6 +84,23 @@ def _canonical(label: str) -> str:
     if signed:
         plain = f"{signed[2]}_{'p' if signed[1] == '+' else 'a'}"
     return plain if plain in NAMES else ""
+
+
+def _is_strange(label: str) -> bool:
+    """True for a label that names no section."""
+    return bool(label.strip()) and not _canonical(label)
+
+
+def _named(name: str, label: str, labels: Sequence[str], acc: Triad) -> Integers:
+    """Rows of a label that the study states for a section."""
+    if len(labels) == len(acc.t):
+        rows = np.flatnonzero(np.array([each.strip() for each in labels]) == label.strip())
+        if rows.size:
+            return rows
+    there = counted_names(sorted({each.strip() for each in labels} - {""})) if labels else "no labels"
+    raise StudyError(
+        f"imu.ferraris.sections.{name}", f"found no row labelled {shown(label)}, the record has {there}"
+    )
 
 
 def _labelled(labels: Sequence[str], acc: Triad) -> dict[str, Integers]:

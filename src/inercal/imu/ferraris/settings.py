@@ -22,10 +22,11 @@ class FerrarisSettings:
         two directions across it and independent from one to the next; None: taken from the scatter of the positions.
     sections : mapping
         Where the sections are, by name: (start, end) in seconds of the record's time axis as floats, or in samples
-        (from 0, the end not included) as integers. Empty: from the labels of the record, or detected.
+        (from 0, the end not included) as integers, or the label of its rows. Empty: from the labels of the record
+        that are names of sections, or detected.
     """
 
     turn: float = 2.0 * math.pi
     turn_u: float = 0.0
     alignment: float | None = None
-    sections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)

@@ -18,6 +18,7 @@ from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.verdict import WORST_MISS, unit_words
 from inercal.records.findings import Finding
+from inercal.records.places import counted_names
 from inercal.records.record import Triad
 
 Array = NDArray[np.float64]
@@ -40,7 +41,19 @@ def too_few(sections: Sections) -> str:
         "detection": "record it, or name it under imu.ferraris.sections",
     }[sections.found_by]
     plural = how if len(missing) == 1 else how.replace(" it", " them")
-    return f"found {found} of the nine sections, not {wanted}: {plural}"
+    strange = f" (found the labels {counted_names(sections.strange)})" if sections.strange else ""
+    return f"found {found} of the nine sections, not {wanted}: {plural}{strange}"
+
+
+def unused_labels(sections: Sections) -> list[Finding]:
+    """``unused_labels``: the record is labelled, but no label names a section, so that these were detected."""
+    if sections.found_by != "detection" or not sections.strange:
+        return []
+    text = (
+        f"the labels {counted_names(sections.strange)} name none of the sections x_p to z_rot, which were detected "
+        'instead: state them under imu.ferraris.sections, such as x_p = "LABEL"'
+    )
+    return [Finding("unused_labels", text)]
 
 
 def contradictions(
