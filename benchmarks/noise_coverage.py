@@ -22,7 +22,14 @@ from inercal.noise.campaign import MIXES, one_recording
 
 SEED, LEVEL = 20261121, 0.95
 
-CAMPAIGNS = (("mems", 0.0), ("counting", 0.0), ("mems", 0.01), ("weak", 0.0))
+CAMPAIGNS = (
+    ("mems", 0.0),
+    ("counting", 0.0),
+    ("mems", 0.01),
+    ("weak", 0.0),
+    ("steps", 0.005),
+    ("steps", 0.02),
+)
 """Mix of noise, and share of the samples that is lost."""
 
 

@@ -16,7 +16,8 @@ from inercal.units import parse_unit
 def shipped(name: str, *overrides: str) -> tuple[Record, ImuSettings]:
     """A shipped recording and its study."""
     example = EXAMPLES[name]
-    record = read([FOLDER / file for file in example.records], read_map(FOLDER / example.map))
+    record_map = read_map(FOLDER / example.map) if example.map else None
+    record = read([FOLDER / file for file in example.records], record_map)
     return record, load_imu_study(FOLDER / example.study, overrides)
 
 

@@ -96,6 +96,26 @@ def test_a_difference_between_branches_is_measured_and_said():
     assert abs(quiet["gyro_x_hyst"].value) < 5 * quiet["gyro_x_hyst"].u
 
 
+@pytest.mark.parametrize("wander", [0, 30, 300])
+def test_noise_alone_is_no_hysteresis(wander):
+    """Flat outputs of six channels with white noise, or wander beside it: in 20 records a finding in one at most, where
+    each may have one by chance at a risk of 1 % (two of 20 and more: 1.7 % of the time)."""
+    rng = np.random.default_rng(20261121)
+    T = sweep_of()
+    said = 0
+    for _ in range(20):
+        noise = rng.normal(0.0, 0.02, (6, len(T)))
+        if wander:
+            a = np.exp(-1.0 / wander)
+            noise += lfilter(
+                [1.0], [1.0, -a], rng.normal(0.0, 0.05 * np.sqrt(1.0 - a**2), noise.shape), axis=1
+            )
+        names = [f"{sensor}_{axis}" for sensor in ("gyro", "acc") for axis in "xyz"]
+        found = fit_recording(record_of(T, **dict(zip(names, noise, strict=True)))).estimate
+        said += any(finding.code == "hysteresis" for finding in found.findings)
+    assert said <= 1
+
+
 def test_one_way_only_has_no_hysteresis():
     T = np.linspace(-20.0, 60.0, 1000)
     found = fit_recording(record_of(T, gyro_x=cubic(T))).estimate
@@ -199,6 +219,24 @@ def test_few_temperatures_carry_a_polynomial_of_lower_degree():
     assert [finding.code for finding in found.findings] == ["few_degrees_of_freedom"]
 
 
+def test_what_a_neglected_power_does_is_in_u():
+    """Four temperatures carry a parabola; the truth has a third power, large beside the scatter or not. Intervals of
+    400 series hold constant, slope and curvature at T0 in at least 95 %, less 4.5 standard deviations of the count."""
+    rng = np.random.default_rng(20261121)
+    T = np.array([-10.0, 10.0, 35.0, 60.0])
+    for third in (0.0, 3e-6, 1e-5):
+        truth = np.array([1.0, -0.02, 3e-4, third])
+        hits = np.zeros(3)
+        for _ in range(400):
+            y = np.polynomial.polynomial.polyval(T - 25.0, truth) + rng.normal(0.0, 0.05, 4)
+            found = fit_calibrations(
+                [calibration(x, [v], 0.05) for x, v in zip(T, y, strict=True)], files(4)
+            ).estimate
+            hits += np.abs(found.values - truth[:3]) <= found.k * found.u
+        assert np.all(hits / 400 > 0.95 - 4.5 * np.sqrt(0.95 * 0.05 / 400))
+    assert "higher ones are not" in found.findings[0].message
+
+
 def test_hysteresis_between_calibrations_on_the_way_up_and_down():
     up = np.array([-20.0, 0.0, 20.0, 40.0, 60.0])
     T = np.concatenate([up, up[::-1][1:]])
@@ -218,6 +256,9 @@ def test_what_cannot_be_a_series_of_calibrations_is_refused():
         fit_calibrations([*three[:2], replace(three[2], status=Status.INCONSISTENT)], files(3))
     with pytest.raises(InputError, match="other coefficients"):
         fit_calibrations([*three[:2], calibration(40.0, [1.0, 2.0])], files(3))
+    twice = [Source("a.json", "1"), Source("b.json", "2"), Source("copy.json", "1")]
+    with pytest.raises(InputError, match=r"copy\.json: holds the same as a file before it"):
+        fit_calibrations(three, twice)
     still = fit_calibrations([calibration(20.0 + x, [1.0]) for x in (0, 1, 2)], files(3)).estimate
     assert still.status is Status.UNOBSERVABLE
 

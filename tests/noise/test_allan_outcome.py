@@ -111,6 +111,25 @@ def test_quantisation_is_seen_where_it_rules():
     assert p.value == pytest.approx(step / np.sqrt(12.0), rel=0.05)
 
 
+def test_the_fit_is_that_of_a_recording_with_gaps():
+    """Of quantisation 2 % of lost samples leave far more than without: fit and curve agree, and N is the true one."""
+    rng = np.random.default_rng(20261121)
+    model = NoiseModel(N=3e-4, Q=2e-4)
+    x = model.simulate(40000, 1.0 / RATE, rng)[:, 0]
+    kept = rng.random(len(x)) >= 0.02
+    t = np.arange(len(x)) / RATE
+    found = noise_of(record(column("gyro_x", "rad/s", x[kept], t[kept])))
+    (channel,) = found.channels
+    used = channel.curve.tau < 20.0  # of 20 means and more
+    assert np.all(
+        np.abs(channel.deviation / channel.fitted - 1.0)[used] < 4.5 / np.sqrt(2 * channel.curve.dof[used, 0])
+    )
+    without = np.sqrt(channel.fit.variance(channel.curve.tau))
+    assert np.max(channel.fitted / without) > 1.2
+    for name, truth in (("N_gyro_x", model.N), ("Q_gyro_x", model.Q)):
+        assert abs(found.estimate[name].value - truth) < 4.5 * found.estimate[name].u
+
+
 # Channels.
 
 

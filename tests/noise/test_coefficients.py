@@ -17,7 +17,10 @@ def exact(model, n=100_000, interval=0.01):
     tau = lengths * interval
     deviation = np.sqrt(model.variance(tau))[:, None]
     ones, counts = np.ones((len(tau), 1)), (n + 1 - 2 * lengths)[:, None].astype(np.int64)
-    return AllanDeviation(tau, deviation, deviation, deviation, ones, 0 * counts, counts, 0.683, n, interval)
+    gain = np.ones((len(tau), 1, len(SYMBOLS)))
+    return AllanDeviation(
+        tau, deviation, deviation, deviation, ones, 0 * counts, counts, gain, 0.683, n, interval
+    )
 
 
 def simulated(model, seed, n=20_000, interval=0.01):

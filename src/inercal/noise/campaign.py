@@ -19,7 +19,9 @@ MIXES = {
     "mems": NoiseModel(N=1e-4, B=2e-4, K=2e-4),
     # an accelerometer of 100 ug/sqrt(Hz) that counts velocity in steps and warms up [m/s^2]
     "counting": NoiseModel(N=1e-3, Q=2e-4, R=4e-5),
-    # the gyro with a drift that two hundred seconds hardly show
+    # a gyro that counts angle in steps, whose quantisation rules to a second [rad/s]
+    "steps": NoiseModel(N=3e-4, K=3e-4, Q=2e-4),
+    # the first gyro with a drift that two hundred seconds hardly show
     "weak": NoiseModel(N=1e-4, B=2e-4, K=6e-5),
 }
 

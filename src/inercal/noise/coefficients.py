@@ -28,6 +28,8 @@ SPACING = 1.7
 
 FEWEST_TIMES = 3
 
+_N, _Q = SYMBOLS.index("N"), SYMBOLS.index("Q")
+
 SIGNIFICANT = 2.5
 """A term is reported if a fit without it asks for it by that many standard deviations."""
 
@@ -64,10 +66,13 @@ class NoiseCoefficients:
         """Standard uncertainties (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    def variance(self, tau: Array) -> Array:
-        """Fitted Allan variance (*tau.shape) at averaging times ``tau`` [s]."""
+    def variance(self, tau: Array, gain: Array | float = 1.0) -> Array:
+        """Fitted Allan variance (*tau.shape) at averaging times ``tau`` [s].
+
+        That of a recording with gaps by the ``gain`` (*tau.shape, 5) of its terms; by default without.
+        """
         columns = [SYMBOLS.index(name) for name in self.names]
-        return np.asarray(allan_terms(tau)[..., columns] @ self.values**2)
+        return np.asarray((allan_terms(tau) * gain)[..., columns] @ self.values**2)
 
 
 def noise_coefficients(
@@ -123,10 +128,14 @@ def noise_coefficients(
         return _nothing(deviation, terms, Finding("few_degrees_of_freedom", few))
     lengths = deviation.lengths[rows]
     scale = float(np.max(deviation.deviation[rows, channel]))
+    gain = deviation.gain[rows, channel]
     whole = Curve(
         (deviation.deviation[rows, channel] / scale) ** 2,
+        allan_terms(lengths) * gain,
         deviation.terms[rows, channel] / (deviation.samples + 1.0 - 2.0 * lengths),
-        sums(deviation.samples, tuple(lengths.tolist())),
+        sums(deviation.samples, tuple(lengths.tolist())).with_gaps(
+            deviation.samples, gain[:, _N], gain[:, _Q]
+        ),
     )
     tried = _tried(whole, columns, cut=fit_range is None)
     if not tried:

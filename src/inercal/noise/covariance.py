@@ -49,6 +49,29 @@ class Sums:
         """Those without the shortest averaging time."""
         return Sums(self.lengths[1:], self.products[1:, 1:], self.singles[1:, 1:])
 
+    def with_gaps(self, n: int, white: Array, steps: Array) -> Sums:
+        """Those of ``n`` samples whose gaps enlarge the variance of N by ``white`` (k,), of Q by ``steps`` (k,).
+
+        What gaps add to Q has, on average over where they are, the covariance of white noise. But it comes in shots,
+        one of variance 2 Q^2 a gap, so that C varies with them: for gaps that are independent of each other, r a
+        sample, by r (2 Q^2)^2 times the sum over gaps of the squared weights in D and in D'. The mean of C^2 is larger
+        than the square of the mean C by that, and the differences D to which a gap belongs are 2 m.
+        """
+        k = len(self.lengths)
+        mixed = np.zeros((k, k, KINDS, KINDS)) + np.eye(KINDS)  # covariances with gaps by those without
+        mixed[:, :, 0, 0] = np.sqrt(np.outer(white, white))
+        # 6 Q^2 of a second difference without gaps; N^2 has 2 m
+        added = 6.0 * np.maximum(steps - 1.0, 0.0) / (2.0 * self.lengths)
+        mixed[:, :, -1, 0] = np.sqrt(np.outer(added, added))
+        products = mixed @ self.products @ mixed.swapaxes(2, 3)
+        shots = self.lengths * np.sqrt(added)  # 2 r = added
+        products[:, :, -1, -1] += 8.0 * np.outer(shots, shots) / n
+        return Sums(
+            self.lengths,
+            products,
+            np.einsum("ijab,ijb->ija", mixed, self.singles),
+        )
+
     def covariance(self, squares: Array, ramp: float = 0.0) -> Array:
         """(k, k) of the Allan variances for squared coefficients N, B, K, Q and of a ramp, in samples."""
         k, m = len(self.lengths), self.lengths.astype(float)

@@ -6,12 +6,11 @@ Squared coefficients (5,) are in the order of `inercal.instruments.noise.SYMBOLS
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.instruments.noise import SYMBOLS, allan_terms
+from inercal.instruments.noise import SYMBOLS
 from inercal.noise.covariance import Sums
 
 Array = NDArray[np.float64]
@@ -38,20 +37,19 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Allan ``variances`` (k,) over ``sums.lengths`` samples, of which gaps left the ``share`` (k,) of the terms."""
+    """Allan ``variances`` (k,) over ``sums.lengths`` samples, and ``terms`` (k, 5): those of unit coefficients.
+
+    Gaps left the ``share`` (k,) of the differences of adjacent means.
+    """
 
     variances: Array
+    terms: Array
     share: Array
     sums: Sums
 
-    @cached_property
-    def terms(self) -> Array:
-        """Allan variances (k, 5) of unit coefficients."""
-        return allan_terms(self.sums.lengths)
-
     def without_first(self) -> Curve:
         """The curve without its shortest averaging time."""
-        return Curve(self.variances[1:], self.share[1:], self.sums.without_first())
+        return Curve(self.variances[1:], self.terms[1:], self.share[1:], self.sums.without_first())
 
     def covariance(self, squares: Array) -> Array:
         """Covariance (k, k) of the variances under noise of these squared coefficients."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inercal.errors import InputError, RecordError
+from inercal.instruments.noise import SYMBOLS
 from inercal.noise.covariance import ALPHA, degrees_of_freedom, lag_one
 from inercal.noise.kernels import mean_square, mean_square_with_gaps
 
@@ -20,6 +21,8 @@ PRESENT = 0.9
 FEWEST = 30
 """Means by which the kind of noise can be told; at longer averaging times the last kind told is kept."""
 
+_WHITE_AND_STEPS = [SYMBOLS.index("N"), SYMBOLS.index("Q")]
+
 _MOST = 1 << 14  # places that are enough to tell it
 
 
@@ -31,8 +34,9 @@ class AllanDeviation:
     the limits at confidence ``level`` (NaN where gaps leave no difference); ``dof`` (k, channels) equivalent degrees
     of freedom of the variance; ``alpha`` (k, channels) the exponent of the spectrum taken for them: 2 (quantisation),
     0 (white), -1 (flicker) or -2 (random walk);
-    ``terms`` (k, channels) how many differences of adjacent means were there. ``samples`` (with the missing ones) and
-    ``interval`` [s] are those of the record.
+    ``terms`` (k, channels) how many differences of adjacent means were there, and ``gain`` (k, channels, 5) the
+    variance to be expected of those over that without gaps, of N, B, K, R and Q (1 without gaps). ``samples`` (with
+    the missing ones) and ``interval`` [s] are those of the record.
     """
 
     tau: Array
@@ -42,6 +46,7 @@ class AllanDeviation:
     dof: Array
     alpha: Integers
     terms: Integers
+    gain: Array
     level: float
     samples: int
     interval: float
@@ -78,7 +83,9 @@ def allan_deviation(
     -----
     A mean with missing samples is that of the samples there, if they are `PRESENT` of it at least: to ask for all of
     them would leave nothing at long averaging times in a record that lost one sample in a thousand. White noise is
-    then overstated by the share that is missing, drift not at all.
+    then overstated by the share that is missing, drift hardly. Quantisation is overstated by far more: the errors at
+    the ends of a gap within a mean no longer cancel, and add as white noise of 2 Q^2 a gap does. ``gain`` says by how
+    much, for the gaps that there are.
 
     The limits take the variance for chi-square with the equivalent degrees of freedom of one kind of noise (see
     `inercal.noise.covariance`): at each averaging time the kind whose differences of adjacent means have a lag 1
@@ -110,15 +117,19 @@ def allan_deviation(
     lengths = _default_lengths(n) if tau is None else _stated_lengths(tau, interval, n)
     shape = (len(lengths), values.shape[1])
     squares, terms, alpha = np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    gain = np.ones((*shape, len(SYMBOLS)))
     for channel, samples in enumerate(values.T):
         sums, present = _running_sums(samples)
+        runs = None if present is None else _runs(samples)
         for row, m in enumerate(lengths.tolist()):
-            squares[row, channel], terms[row, channel] = _mean_square(sums, present, m)
+            squares[row, channel], terms[row, channel], *of_noise = _mean_square(sums, present, runs, m)
+            gain[row, channel, _WHITE_AND_STEPS] = of_noise
             last = int(alpha[row - 1, channel]) if row else max(ALPHA)
             alpha[row, channel] = _exponent(sums, present, m, last)
     if tau is None:
         there = terms.any(axis=1)
-        lengths, squares, terms, alpha = lengths[there], squares[there], terms[there], alpha[there]
+        lengths, squares, terms = lengths[there], squares[there], terms[there]
+        alpha, gain = alpha[there], gain[there]
     deviation = np.sqrt(np.where(terms > 0, squares, np.nan) / 2.0) / lengths[:, None]
     dof = np.ones(alpha.shape)
     for row, channel in np.ndindex(*alpha.shape):
@@ -136,6 +147,7 @@ def allan_deviation(
         dof,
         alpha,
         terms,
+        gain,
         level,
         n,
         float(interval),
@@ -227,11 +239,21 @@ def _running_sums(samples: Array) -> tuple[Array, Integers | None]:
     return sums, np.concatenate([[0], np.cumsum(there)])
 
 
-def _mean_square(sums: Array, present: Integers | None, m: int) -> tuple[float, int]:
-    """Mean square of the second differences over ``m`` samples, and their number."""
-    if present is None:
-        return mean_square(sums, m), len(sums) - 2 * m
-    return mean_square_with_gaps(sums, present, m, _least(m))
+def _runs(samples: Array) -> Integers:
+    """Running number (n+1,) of runs of present samples that have begun."""
+    there = np.isfinite(samples)
+    begun = there & ~np.concatenate([[False], there[:-1]])
+    return np.concatenate([[0], np.cumsum(begun)])
+
+
+def _mean_square(
+    sums: Array, present: Integers | None, runs: Integers | None, m: int
+) -> tuple[float, int, float, float]:
+    """Mean square of the second differences over ``m`` samples, their number, and the gain of N and of Q by gaps."""
+    if present is None or runs is None:
+        return mean_square(sums, m), len(sums) - 2 * m, 1.0, 1.0
+    square, count, white, steps = mean_square_with_gaps(sums, present, runs, m, _least(m))
+    return (square, count, white / (2.0 * m), steps / 6.0) if count else (square, count, 1.0, 1.0)
 
 
 def _least(m: int) -> int:

@@ -42,22 +42,39 @@ def mean_square(sums: Array, m: int) -> float:
 
 
 @kernel
-def mean_square_with_gaps(sums: Array, present: Integers, m: int, least: int) -> tuple[float, int]:
-    """The same of m times the difference of adjacent means over the samples present, and how many there are.
+def mean_square_with_gaps(
+    sums: Array, present: Integers, runs: Integers, m: int, least: int
+) -> tuple[float, int, float, float]:
+    """The same of D, m times the difference of adjacent means over the samples present, and how many there are.
 
-    ``sums`` and ``present`` (n+1,) are running sums of samples (missing ones as 0) and of their number; both
-    means need ``least`` samples. 0 of 0 where there is none.
+    And what it is expected to be of white samples of variance 1, and of differences of such (quantisation): each run
+    of present samples within a mean has two ends that no neighbour cancels, of weight 1 in m over those present; where
+    a run goes on into the other mean, its ends there add up.
+
+    ``sums``, ``present`` and ``runs`` (n+1,) are running sums of samples (missing ones as 0), of their number and of
+    the number of runs begun; both means need ``least`` samples. All 0 where there is none.
     """
-    total = 0.0
+    total = white = steps = 0.0
     found = 0
     for i in range(len(sums) - 2 * m):
-        before = present[i + m] - present[i]
-        after = present[i + 2 * m] - present[i + m]
+        k = i + m
+        before = present[k] - present[i]
+        after = present[k + m] - present[k]
         if before >= least and after >= least:
-            d = m * ((sums[i + 2 * m] - sums[i + m]) / after - (sums[i + m] - sums[i]) / before)
+            d = m * ((sums[k + m] - sums[k]) / after - (sums[k] - sums[i]) / before)
             total += d * d
             found += 1
-    return (total / found if found else 0.0), found
+            a = m / before
+            b = m / after
+            white += m * (a + b)
+            # runs begun after a mean's first sample, and one that this belongs to
+            here = runs[k] - runs[i + 1] + present[i + 1] - present[i]
+            there = runs[k + m] - runs[k + 1] + present[k + 1] - present[k]
+            goes_on = (present[k] - present[k - 1]) * (present[k + 1] - present[k])
+            steps += 2.0 * (a * a * here + b * b * there + a * b * goes_on)
+    if found == 0:
+        return 0.0, 0, 0.0, 0.0
+    return total / found, found, white / found, steps / found
 
 
 @kernel

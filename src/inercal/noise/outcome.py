@@ -71,6 +71,13 @@ class ChannelNoise:
         return self.curve.deviation[:, self.at]
 
     @property
+    def fitted(self) -> Array:
+        """Deviation (k,) that the fit expects at ``curve.tau`` with the gaps there are; NaN without a fit."""
+        if self.fit is None:
+            return np.full(len(self.curve.tau), np.nan)
+        return np.sqrt(self.fit.variance(self.curve.tau, self.curve.gain[:, self.at]))
+
+    @property
     def limits(self) -> tuple[Array, Array]:
         """Its confidence limits (k,), (k,)."""
         return self.curve.lower[:, self.at], self.curve.upper[:, self.at]
@@ -270,7 +277,7 @@ def _curve(channel: ChannelNoise) -> dict[str, Any]:
     }
     if fit is not None:
         out |= {
-            "fitted": np.sqrt(fit.variance(curve.tau)),
+            "fitted": channel.fitted,
             "fit_range_s": list(fit.fit_range),
             "resolved": list(fit.names),
             "upper_limits": dict(fit.bounds),

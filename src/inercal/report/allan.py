@@ -95,8 +95,7 @@ def curves_csv(noise: Noise) -> str:
     lines = ["channel,unit,tau [s],deviation,lower,upper,fitted"]
     for channel in noise.channels:
         tau = channel.curve.tau
-        fitted = np.full(len(tau), np.nan) if channel.fit is None else np.sqrt(channel.fit.variance(tau))
-        for row in zip(tau, channel.deviation, *channel.limits, fitted, strict=True):
+        for row in zip(tau, channel.deviation, *channel.limits, channel.fitted, strict=True):
             numbers = ("" if np.isnan(x) else repr(float(x)) for x in row)
             lines.append(",".join([channel.name, channel.unit, *numbers]))
     return "\n".join(lines) + "\n"
@@ -163,8 +162,8 @@ def _curve(axes: Axes, channel: ChannelNoise, noise: Noise) -> None:
     axes.fill_between(tau, lower, upper, color=COLOURS[0], alpha=0.25, lw=0)
     axes.plot(tau, deviation, "o-", color=COLOURS[0], ms=2.2, lw=0.7, label="measured")
     if channel.fit is not None:
-        fitted = tau[_fitted(channel)]
-        axes.plot(fitted, np.sqrt(channel.fit.variance(fitted)) / size, color=INK, lw=1.0, label="fit")
+        used = _used(channel)
+        axes.plot(tau[used], channel.fitted[used] / size, color=INK, lw=1.0, label="fit")
         falls = deviation[-1] <= deviation[0]  # then the upper right is free, else the upper left
         for k, symbol in enumerate(channel.fit.names):
             p = noise.estimate[f"{symbol}_{channel.name}"]
@@ -208,14 +207,14 @@ def _residuals(axes: Axes, channel: ChannelNoise) -> None:
     axes.grid(axis="x", which="major")
     if channel.fit is None:
         return
-    tau, used = channel.curve.tau, _fitted(channel)
+    tau, used = channel.curve.tau, _used(channel)
     off, lower, upper = _off(channel)
     axes.fill_between(tau, lower, upper, color=COLOURS[0], alpha=0.25, lw=0)
     axes.plot(tau[used], off[used], "o", color=COLOURS[0], ms=2.2)
     axes.plot(tau[~used], off[~used], "o", color=QUIET, ms=2.2)
 
 
-def _fitted(channel: ChannelNoise) -> NDArray[np.bool_]:
+def _used(channel: ChannelNoise) -> NDArray[np.bool_]:
     """True for the averaging times (k,) that took part in the fit."""
     assert channel.fit is not None
     low, high = channel.fit.fit_range
@@ -225,10 +224,10 @@ def _fitted(channel: ChannelNoise) -> NDArray[np.bool_]:
 
 def _off(channel: ChannelNoise) -> tuple[Array, Array, Array]:
     """Deviation and its limits (k,) over the fit, less one [%]."""
-    assert channel.fit is not None
-    fitted = np.sqrt(channel.fit.variance(channel.curve.tau))
     with np.errstate(divide="ignore", invalid="ignore"):
-        off, lower, upper = (100.0 * (each / fitted - 1.0) for each in (channel.deviation, *channel.limits))
+        off, lower, upper = (
+            100.0 * (each / channel.fitted - 1.0) for each in (channel.deviation, *channel.limits)
+        )
     return off, lower, upper
 
 
@@ -239,7 +238,7 @@ def _common_limits(above: Axes, below: Axes, channels: Sequence[ChannelNoise]) -
     known = curves[np.isfinite(curves) & (curves > 0)]
     if known.size:
         above.set_ylim(0.5 * known.min(), 3.0 * known.max())
-    off = [_off(channel)[0][_fitted(channel)] for channel in channels if channel.fit is not None]
+    off = [_off(channel)[0][_used(channel)] for channel in channels if channel.fit is not None]
     largest = 1.3 * float(np.nanmax(np.abs(np.concatenate(off)), initial=10.0)) if off else 10.0
     below.set_ylim(max(-largest, -100.0), largest)
 

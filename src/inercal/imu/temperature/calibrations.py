@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,8 @@ def fit_calibrations(
 ) -> TemperatureModel:
     """Fit every coefficient of calibrations against the temperatures in their conditions.
 
-    A cubic needs five temperatures; with fewer the polynomial is of the degree that leaves one of them over. Where
+    A cubic needs five temperatures; with fewer the polynomial is of the degree that leaves one of them over, and u is
+    that of a fit with the next power, and by what this would move the coefficients counts as one more. Where
     temperature rose to some and fell to others (in the order given), the difference is a coefficient too, if
     degrees of freedom are left for it.
 
@@ -54,6 +56,9 @@ def fit_calibrations(
     """
     if len(estimates) < FEWEST:
         raise InputError(files[0].path, f"found {len(estimates)} calibrations, expected at least {FEWEST}")
+    for number, file in enumerate(files):
+        if file.sha256 and file.sha256 in (other.sha256 for other in files[:number]):
+            raise InputError(file.path, "holds the same as a file before it, expected each calibration once")
     first = estimates[0]
     for estimate, file in zip(estimates, files, strict=True):
         if estimate.status is not Status.OK:
@@ -82,6 +87,8 @@ def fit_calibrations(
             fit_points(T, y, own, float(np.mean(known)), reference, more, terms)
             for more in ((nothing, rising[:, None]) if both else (nothing,))
         ]
+        if terms < 4:
+            fits[0] = _with_neglected(fits[0], T, y, own, float(np.mean(known)))
         curves.append(
             Curve(
                 name,
@@ -91,14 +98,15 @@ def fit_calibrations(
                 rising,
                 fits[0],
                 fits[1] if both else None,
-                _apart(fits[-1], both),
+                *_apart(fits[-1], both),
                 np.sqrt(variances),
             )
         )
     findings = []
     if terms < 4:
         text = (
-            f"{distinct} temperatures carry a polynomial of degree {terms - 1} only, expected 5 for a cubic"
+            f"{distinct} temperatures carry a polynomial of degree {terms - 1} only, expected 5 for a cubic: what the "
+            f"power {terms} of temperature would change is in u, higher ones are not"
         )
         findings.append(Finding("few_degrees_of_freedom", text))
     what = f"{len(curves)} coefficients from {len(T)} calibrations"
@@ -106,10 +114,22 @@ def fit_calibrations(
     return TemperatureModel(assemble(curves, reference, files, findings, given, what), tuple(curves))
 
 
-def _apart(fit: Cubic, both: bool) -> float:
-    """The difference between rising and falling where it is more than chance, else 0."""
+def _with_neglected(fit: Cubic, T: Array, y: Array, variances: Array, common: float) -> Cubic:
+    """The fit with the next power counted in: the u of a fit that has it too, and by how much that one moves."""
+    birge = max(1.0, float(np.sum(fit.residuals**2 / variances)) / (len(T) - fit.terms))
+    more = fit_points(T, y, birge * variances, common, fit.reference, np.empty((len(T), 0)), fit.terms + 1)
+    own = slice(fit.terms)
+    moves = more.coefficients[own] - fit.coefficients
+    covariance = more.covariance[own, own] + np.outer(moves, moves)
+    return replace(fit, covariance=covariance, dof=np.minimum(fit.dof, more.dof[own]))
+
+
+def _apart(fit: Cubic, both: bool) -> tuple[float, bool]:
+    """The difference between rising and falling, 0 where there are not both, and whether it is more than chance."""
+    if not both:
+        return 0.0, False
     difference, u = abs(float(fit.coefficients[-1])), float(np.sqrt(fit.covariance[-1, -1]))
-    return difference if both and difference > coverage_factor(float(fit.dof[-1])) * u else 0.0
+    return difference, difference > coverage_factor(float(fit.dof[-1])) * u
 
 
 def _temperature(estimate: Estimate, file: Source) -> float:

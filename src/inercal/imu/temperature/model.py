@@ -41,8 +41,9 @@ class Curve:
 
     ``values`` (n,) [``unit``] at ``temperature`` (n,) [degC], on branches ``rising`` (n,) of +1/2, -1/2 or 0 where it
     is neither; ``cubic`` the fit through all, ``branched`` the one whose last coefficient is the difference between the
-    branches (None where there are not both), ``apart`` the largest difference between two passes at one temperature,
-    ``u`` (n,) standard uncertainties of single values (None: of samples).
+    branches (None where there are not both), ``apart`` the largest difference between two passes at one temperature
+    and ``beyond_chance`` whether that is more than noise can make, ``u`` (n,) standard uncertainties of single values
+    (None: of samples).
     """
 
     name: str
@@ -53,6 +54,7 @@ class Curve:
     cubic: Cubic
     branched: Cubic | None
     apart: float
+    beyond_chance: bool
     u: Array | None = None
 
     @property
@@ -176,8 +178,8 @@ def _range(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def _shows_hysteresis(curve: Curve) -> bool:
-    """Whether passes at one temperature differ by more than a tenth of the change with temperature."""
-    return curve.apart > 0.1 * curve.change
+    """Whether passes at one temperature differ by more than chance, and than a tenth of the change with temperature."""
+    return curve.beyond_chance and curve.apart > 0.1 * curve.change
 
 
 def _hysteresis(curve: Curve) -> Finding:

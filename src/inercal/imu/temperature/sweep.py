@@ -9,6 +9,7 @@ through the middle; the difference is a coefficient of its own.
 from __future__ import annotations
 
 import re
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,11 @@ Array = NDArray[np.float64]
 
 _MEASURED = re.compile(r"acc_[xyz]|gyro_[xyz]|a[1-9]\d*|gyro(_roll|_yaw)?")
 _NEITHER = 0.05
+
+_MEDIAN_OF_A_SQUARE = 0.455  # of a standard normal variable
+
+_RISK = 0.01
+"""Probability at which chance alone makes passes of any of the channels differ."""
 
 
 def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureModel:
@@ -52,7 +58,8 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
     low, high = float(known.min()), float(known.max())
     if high - low < LEAST_SPAN:
         return TemperatureModel(no_span(low, high, record.sources, record.findings))
-    curves = tuple(_curve(channel, temperature, reference) for channel in channels)
+    risk = _RISK / len(channels)
+    curves = tuple(_curve(channel, temperature, reference, risk) for channel in channels)
     what = f"{counted(len(curves), 'channel')} at rest"
     estimate = assemble(
         curves, reference, record.sources, record.findings, {"reference_degC": reference}, what
@@ -60,7 +67,7 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
     return TemperatureModel(estimate, curves)
 
 
-def _curve(channel: Column, temperature: Column, reference: float) -> Curve:
+def _curve(channel: Column, temperature: Column, reference: float, risk: float) -> Curve:
     """One channel, at its samples that have both a value and a temperature."""
     at = temperature.si()
     if channel.t is not temperature.t:
@@ -85,23 +92,42 @@ def _curve(channel: Column, temperature: Column, reference: float) -> Curve:
         rising,
         fit_sweep(T, y, reference, nothing),
         fit_sweep(T, y, reference, rising[:, None]) if both else None,
-        _apart(T, y),
+        *_apart(T, y, risk),
     )
 
 
-def _apart(T: Array, y: Array) -> float:
-    """Largest difference between the means of two passes (stretches of one direction) at the same temperature."""
+def _apart(T: Array, y: Array, risk: float) -> tuple[float, bool]:
+    """Largest difference between two passes (stretches of one direction) at one temperature, and is it beyond chance.
+
+    Chance is at worst a random walk with the second differences of neighbouring parts: over k parts its deviation is
+    sqrt(k) times that of a step. White noise and wander of any other length make less. Each pair of parts counts as a
+    comparison.
+    """
+    from scipy.special import ndtri
+
     at, means = _part_means(T), _part_means(y)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(at))) != 0) + 1
     passes = [part for part in np.split(np.arange(PARTS), turns) if len(part) > 2]
     grid = np.linspace(at.min(), at.max(), 101)
-    curves = []
+    values: list[Array] = []
+    times: list[Array] = []
     for part in passes:
         order = part[np.argsort(at[part])]
-        curves.append(np.interp(grid, at[order], means[order], left=np.nan, right=np.nan))
-    drawn = np.array(curves)
-    shared = drawn[:, np.count_nonzero(np.isfinite(drawn), axis=0) > 1]
-    return float(np.max(np.nanmax(shared, axis=0) - np.nanmin(shared, axis=0), initial=0.0))
+        for drawn, of in ((values, means), (times, np.arange(float(PARTS)))):
+            drawn.append(np.interp(grid, at[order], of[order], left=np.nan, right=np.nan))
+    bends = [np.diff(means[part], 2) ** 2 for part in passes]
+    # of a step: by the median, for the ends of the passes are no noise
+    step = np.sqrt(np.median(np.concatenate(bends)) / _MEDIAN_OF_A_SQUARE / 2.0) if passes else 0.0
+    most = -float(ndtri(risk / (PARTS * (PARTS - 1.0)))) * step
+    largest, beyond = 0.0, False
+    for one, other in combinations(range(len(passes)), 2):
+        apart = np.abs(values[one] - values[other])
+        shared = np.isfinite(apart)
+        if shared.any():
+            apart, k = apart[shared], np.abs(times[one] - times[other])[shared]
+            largest = max(largest, float(np.max(apart)))
+            beyond |= bool(np.any(apart > most * np.sqrt(np.maximum(k, 1.0))))
+    return largest, beyond
 
 
 def _part_means(values: Array) -> Array:
