@@ -25,6 +25,9 @@ from inercal.cli.outcome import hand_over, printed
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
+    from inercal.imu.aided.calibration import AidedCalibration
+    from inercal.imu.ferraris.calibration import FerrarisCalibration
+    from inercal.imu.multiposition import Calibration
     from inercal.records.record import Record
     from inercal.report.html import Picture
 
@@ -86,11 +89,10 @@ def calibrate_imu(
     return hand_over(estimate, [printed(estimate)], page, output)
 
 
-def _imu_pictures(found: Calibrated) -> list[Picture]:
+def _imu_pictures(found: Calibration | FerrarisCalibration | AidedCalibration) -> list[Picture]:
     """The pictures of whichever method was used."""
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.imu.multiposition import Calibration
 
     match found:
         case FerrarisCalibration():
@@ -101,12 +103,10 @@ def _imu_pictures(found: Calibrated) -> list[Picture]:
             from inercal.imu.aided.figures import pictures as of_aided
 
             return of_aided(found)
-        case Calibration():
+        case _:
             from inercal.imu.figures import pictures
 
             return pictures(found)
-        case _:
-            return []
 
 
 def calibrate_turntable(

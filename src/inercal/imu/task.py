@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from inercal.estimate.result import Estimate
+from inercal.imu.aided.settings import AidedSettings
+from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
+from inercal.records.findings import Finding
 from inercal.records.record import Record
 
+if TYPE_CHECKING:
+    from inercal.imu.aided.calibration import AidedCalibration
+    from inercal.imu.ferraris.calibration import FerrarisCalibration
+    from inercal.imu.multiposition import Calibration
 
-class Calibrated(Protocol):
-    """What every method brings back: an estimate, and the evidence behind it."""
-
-    @property
-    def estimate(self) -> Estimate:
-        """Its status says whether the values can be used."""
+    Calibrated = Calibration | FerrarisCalibration | AidedCalibration
 
 
 def calibrate(
@@ -36,16 +38,19 @@ def calibrate(
     Returns
     -------
     `inercal.imu.multiposition.Calibration`, or that of the method asked for
-        Nothing is raised for a poor fit.
+        An estimate and the evidence behind it; nothing is raised for a poor fit.
 
     Raises
     ------
     InputError
         The record does not hold what the method needs.
     """
-    from inercal.imu.aided.settings import AidedSettings
-    from inercal.imu.ferraris.settings import FerrarisSettings
+    found = _by_method(record, settings, progress)
+    return found if settings.site.inputs else _with_exact_gravity(found, settings.site.gravity)
 
+
+def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], None]) -> Calibrated:
+    """The calibration by the method of the settings; only its module is loaded."""
     match settings.method:
         case FerrarisSettings():
             from inercal.imu.ferraris.calibration import calibrate_ferraris
@@ -59,3 +64,13 @@ def calibrate(
             from inercal.imu.multiposition import calibrate_multiposition
 
             return calibrate_multiposition(record, settings, progress)
+
+
+def _with_exact_gravity(found: Calibrated, gravity: float) -> Calibrated:
+    """The calibration, saying that gravity without an uncertainty was taken as it stands."""
+    text = (
+        f"gravity is taken as exactly {gravity:.6g} m/s^2, and the scale factors are too sure by what it is not: state "
+        'it with its uncertainty, such as gravity = "9.81(1) m/s^2", or the latitude and height in its place'
+    )
+    findings = (*found.estimate.findings, Finding("stated_exact", text))
+    return replace(found, estimate=replace(found.estimate, findings=findings))

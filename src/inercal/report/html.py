@@ -33,9 +33,17 @@ class Picture:
 #: group of terms -> how their symbols begin
 _GROUPS = {
     "Accelerometers": ("K", "M_"),
-    "Gyro": ("D_F_", "S_", "T_", "G_"),
+    "Gyro": ("D_F_", "D_R_", "S_", "T_", "G_"),
     "Axis X": ("DX_", "k_"),
     "Axis Y": ("DY_", "kY_"),
+}
+
+#: ending of a coefficient of a temperature model -> what it is of its term
+_OVER_TEMPERATURE = {
+    "T1": ", per kelvin",
+    "T2": ", per kelvin squared",
+    "T3": ", per kelvin cubed",
+    "hyst": ", rising less falling temperature",
 }
 
 #: key -> plain name and unit, where the key alone does not say them
@@ -165,7 +173,8 @@ def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
     """The coefficients by instrument, each with its printed numbers and its shares of the budget."""
     groups: dict[str, list[_Row]] = {}
     for p in estimate.parameters.values():
-        begun = (name for name, ways in _GROUPS.items() if p.name in TERMS and p.name.startswith(ways))
+        term, _ = _term(p.name)
+        begun = (name for name, ways in _GROUPS.items() if term in TERMS and p.name.startswith(ways))
         group = next(begun, "Coefficients")
         groups.setdefault(group, []).append(_row(p, estimate.budget))
     return list(groups.items())
@@ -174,9 +183,16 @@ def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
 def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _Row:
     """One coefficient, rounded as in `Estimate.table`."""
     value, u, U = rounded(p.value, p.u, p.U)
-    name = TERMS[p.name].name if p.name in TERMS else ""
+    term, order = _term(p.name)
+    name = TERMS[term].name + order if term in TERMS else ""
     dof = "∞" if math.isinf(p.dof) else f"{p.dof:.{0 if p.dof >= 100 else 1}f}"
     return _Row(p, name, value, u, U, dof, tuple(item.share.get(p.name) for item in budget))
+
+
+def _term(name: str) -> tuple[str, str]:
+    """The term that a coefficient belongs to, and what of it, in words, where it follows a temperature."""
+    term, _, end = name.rpartition("_")
+    return (term, _OVER_TEMPERATURE[end]) if end in _OVER_TEMPERATURE else (name, "")
 
 
 def _percent(share: float) -> str:
