@@ -298,3 +298,17 @@ def test_a_span_of_the_record():
         within(whole, 20.0, 30.0)
     with pytest.raises(InputError, match=r"found 20 s and later, expected .* which lasts 9.99 s"):
         within(whole, 20.0, None)
+
+
+@pytest.mark.parametrize("samples", [21, 51, 200])
+def test_a_short_record_shows_white_noise_alone(samples):
+    """100 white records: nothing but N is reported, and N is covered by its interval (at least 85 of 100: 95 less
+    4.5 standard deviations)."""
+    hits = 0
+    for seed in range(100):
+        found = noise_of(record(column("acc_x", "m/s^2", white(samples, seed))))
+        assert {c.fit.names for c in found.channels if c.fit is not None} <= {("N",)}
+        assert "few_degrees_of_freedom" in {f.code for f in found.estimate.findings}
+        low, high = found.estimate["N_acc_x"].interval(0.95)
+        hits += low < 1.0 < high
+    assert hits >= 85

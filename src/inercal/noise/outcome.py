@@ -33,6 +33,9 @@ LEVEL = 0.683
 FEWEST = 16
 """Samples of a channel, below which there is no curve worth the name."""
 
+ENOUGH = 300
+"""Samples below which only white noise is looked for: in fewer, chance too often looks like the other kinds."""
+
 ONE_SIDED = 1.6449
 """Standard uncertainties to the one-sided 95 % limit of a normal distribution."""
 
@@ -194,8 +197,15 @@ def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, t
     """The fit of one channel, None where it shows nothing, and what is to be said of it."""
     if not np.nanmax(curve.deviation[:, at], initial=0.0) > 0:
         return None, (Finding("resolution", "the output never changes, there is no noise to be seen"),)
-    fit = noise_coefficients(curve, at)
-    return (fit if fit.names else None), fit.findings
+    if curve.samples >= ENOUGH:
+        fit = noise_coefficients(curve, at)
+        return (fit if fit.names else None), fit.findings
+    fit = noise_coefficients(curve, at, terms=("N",))
+    few = (
+        f"{curve.samples} samples show white noise at most: only N was looked for, expected at least {ENOUGH} samples, "
+        "and minutes of them for the others"
+    )
+    return (fit if fit.names else None), (*fit.findings, Finding("few_degrees_of_freedom", few))
 
 
 def _assemble(
