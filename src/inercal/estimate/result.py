@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from typing import Any
@@ -146,6 +146,13 @@ def provenance(given: Mapping[str, Any]) -> dict[str, Any]:
 
     versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
     return {"settings": given, "seed": None, "versions": versions}
+
+
+def timed(estimate: Estimate, begun: float) -> Estimate:
+    """The estimate with the time since ``begun`` (`time.perf_counter`) as that of its solution."""
+    import time
+
+    return replace(estimate, timing={"solve": time.perf_counter() - begun})
 
 
 def without_parameters(command: str, status: Status, message: str, **other: Any) -> Estimate:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, timed
 from inercal.imu.drivers import drivers_of
 from inercal.imu.earth_rate import earth_rate_at
 from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
 from inercal.imu.joint import Scatter, force_error, join
 from inercal.imu.outcome import assemble, without_fit
 from inercal.imu.poses import Poses, choose, sweep
-from inercal.imu.recording import Recording, prepare
+from inercal.imu.recording import LOST, Recording, clipped_rows, prepare
 from inercal.imu.settings import ImuSettings
 from inercal.imu.turns import Turns, cut_turns
 from inercal.imu.verdict import (
@@ -29,7 +29,6 @@ from inercal.imu.verdict import (
     scatter_findings,
 )
 from inercal.instruments.triad import TriadModel
-from inercal.records.checks.values import saturated
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
@@ -38,9 +37,6 @@ Array = NDArray[np.float64]
 
 WORST_START = 0.5
 """Miss [rad] of the first guess beyond which no fit is tried: large misalignments leave 0.3."""
-
-LOST = 3.5
-"""Longest step of time in a turn, in sample intervals: two lost samples hardly matter to its integral."""
 
 FEWEST_TURNS = 7
 """Turns without which the gyro is not fitted: two equations each, for twelve parameters."""
@@ -88,7 +84,7 @@ def calibrate_multiposition(
     gravity = settings.site.gravity
     candidates = list(sweep(recording, gravity))
     if not candidates:
-        return Calibration(_timed(without_fit(record, recording, settings), clock), recording)
+        return Calibration(timed(without_fit(record, recording, settings), clock), recording)
     poses = choose(candidates)
     scatter = _scatter(poses)
     progress("fitting the gyro to the turns")
@@ -96,12 +92,7 @@ def calibrate_multiposition(
     findings = [*scatter_findings(poses, scatter), *of_gyro]
     joint = join(poses.accelerometer, gyro)
     estimate = assemble(record, recording, poses, scatter, joint, settings, findings)
-    return Calibration(_timed(estimate, clock), recording, poses, gyro)
-
-
-def _timed(estimate: Estimate, clock: float) -> Estimate:
-    """The estimate with the time since ``clock`` as that of the solution."""
-    return replace(estimate, timing={"solve": time.perf_counter() - clock})
+    return Calibration(timed(estimate, clock), recording, poses, gyro)
 
 
 def _scatter(poses: Poses) -> Scatter:
@@ -140,9 +131,7 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
     gyro = recording.gyro
     assert gyro is not None
     longest = LOST / gyro.rate
-    clipped = np.zeros(len(gyro.t), dtype=bool)
-    for values in gyro.values.T:
-        clipped[saturated(values)] = True
+    clipped = clipped_rows(gyro)
     spans, left_out = [], []
     for k, (here, there) in enumerate(itertools.pairwise(poses.dwells)):
         start, stop = _gyro_index(recording, here.stop - 1), _gyro_index(recording, there.start)

@@ -14,7 +14,7 @@ from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
 from inercal.imu.recording import Recording
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.imu.verdict import rms_miss, spread_words, verdict
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
@@ -22,8 +22,6 @@ from inercal.records.places import counted
 from inercal.records.record import Record, Triad
 
 Array = NDArray[np.float64]
-
-COMMAND = "calibrate imu"
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError, StudyError
 from inercal.noise.allan import AllanFit
 from inercal.noise.allan import fit as fit_allan
+from inercal.records.checks.values import saturated
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
 from inercal.records.record import Record, Triad
 
@@ -20,6 +21,9 @@ MOVING = 30.0
 
 SHORTEST_START = 5.0
 """Shortest initial static period [s]."""
+
+LOST = 3.5
+"""Longest step of time in a motion, in sample intervals: two lost samples hardly matter to its integral."""
 
 
 @dataclass(frozen=True)
@@ -203,3 +207,11 @@ def _initial(
             f"found {static_start:g} s, expected a still period: {event} after {still:.1f} s",
         )
     return Dwell(0, stated)
+
+
+def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
+    """Rows (n,) in which an axis saturates."""
+    clipped = np.zeros(len(gyro.t), dtype=bool)
+    for values in gyro.values.T:
+        clipped[saturated(values)] = True
+    return clipped

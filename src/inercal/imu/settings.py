@@ -11,6 +11,9 @@ from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.units import Quantity
 
+COMMAND = "calibrate imu"
+"""The command behind every method of this room, as its results have it."""
+
 
 @dataclass(frozen=True)
 class ImuSettings:

@@ -14,7 +14,10 @@ from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.study.fields import QuantityText, refusal
 from inercal.units import Quantity, parse_quantity, shown
 
-_EXPECTED = 'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a label'
+_EXPECTED = (
+    'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a '
+    "label"
+)
 
 TurnAngle = Annotated[
     Quantity,

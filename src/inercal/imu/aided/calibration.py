@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, timed
 from inercal.estimate.status import Status
 from inercal.imu.aided.blocks import Blocks, cut
 from inercal.imu.aided.coefficients import gain_names
 from inercal.imu.aided.fit import Fit, fit
 from inercal.imu.aided.misfit import knocks
 from inercal.imu.aided.model import side_of, unknowns
-from inercal.imu.aided.outcome import assemble, timed, without_fit
+from inercal.imu.aided.outcome import assemble, without_fit
 from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, tells, travel
 from inercal.imu.aided.table import Motion, motion_of, shifted, times
@@ -110,7 +110,7 @@ def calibrate_aided(
         bad = Status.INCONSISTENT, _contradiction(wrong, blocks, motion)
     if bad is not None:
         estimate = without_fit(record, settings, *bad, said=(*said, *motion.findings))
-        return AidedCalibration(timed(estimate, time.perf_counter() - clock), motion, rests)
+        return AidedCalibration(timed(estimate, clock), motion, rests)
     progress("fitting all sensors")
     known = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
     names = {each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity) for each in blocks}
@@ -128,7 +128,7 @@ def calibrate_aided(
         blocks = [each.only(~knocked[each.triad.sensor]) for each in blocks]
         done = fitted()
     estimate = assemble(record, motion, rests, done, late, settings, said)
-    return AidedCalibration(timed(estimate, time.perf_counter() - clock), motion, rests, done)
+    return AidedCalibration(timed(estimate, clock), motion, rests, done)
 
 
 def _contradiction(wrong: list[str], blocks: list[Blocks], motion: Motion) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,14 +24,12 @@ from inercal.imu.aided.fit import Fit
 from inercal.imu.aided.misfit import misfits
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record
 
 Array = NDArray[np.float64]
-
-COMMAND = "calibrate imu"
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along frame "
@@ -200,8 +197,3 @@ def _conditions(fit: Fit, settings: ImuSettings) -> dict[str, Any]:
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,
     }
-
-
-def timed(estimate: Estimate, seconds: float) -> Estimate:
-    """The estimate with the time of its solution."""
-    return replace(estimate, timing={"solve": seconds})

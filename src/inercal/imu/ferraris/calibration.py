@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.errors import RecordError, StudyError
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, timed
 from inercal.imu.ferraris.method import Matrices, matrices
 from inercal.imu.ferraris.outcome import assemble, without_sections
 from inercal.imu.ferraris.readings import Readings, read_sections
@@ -90,12 +90,12 @@ def calibrate_ferraris(
     sections = find_sections(record, acc, gyro, options)
     if sections.missing:
         estimate = without_sections(record, acc, sections, settings)
-        return FerrarisCalibration(_timed(estimate, clock), acc, gyro, sections)
+        return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections)
     readings = read_sections(acc, gyro, sections, settings.site, options)
     wrong = list(wrong_axes(readings.inputs, readings.weights))
     if wrong:
         estimate = without_sections(record, acc, sections, settings, wrong)
-        return FerrarisCalibration(_timed(estimate, clock), acc, gyro, sections)
+        return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections)
     found = matrices(readings.inputs, readings.weights)
     carried = misses(acc, gyro, sections, found)
     turns = sections.turns
@@ -114,7 +114,7 @@ def calibrate_ferraris(
     ]
     errors = propagation(readings, found, scatter)
     estimate = assemble(record, (acc, gyro), sections, errors, settings, options, against, findings)
-    return FerrarisCalibration(_timed(estimate, clock), acc, gyro, sections, readings, found, scatter)
+    return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections, readings, found, scatter)
 
 
 def _stamped(triad: Triad) -> Triad:
@@ -139,8 +139,3 @@ def _check(triad: Triad) -> None:
         finite = values[np.isfinite(values)]
         if not finite.size or np.ptp(finite) == 0.0:
             raise RecordError(where, f"{triad.sensor}_{axis} never changes, expected a live sensor")
-
-
-def _timed(estimate: Estimate, clock: float) -> Estimate:
-    """The estimate with the time since ``clock`` as that of the solution."""
-    return replace(estimate, timing={"solve": time.perf_counter() - clock})

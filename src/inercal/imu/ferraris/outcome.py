@@ -19,8 +19,7 @@ from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_covariance, type_a, type_b
 from inercal.imu.ferraris.verdict import too_few, verdict
-from inercal.imu.outcome import COMMAND
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record, Triad

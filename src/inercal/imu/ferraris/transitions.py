@@ -15,7 +15,8 @@ from inercal.geometry.rotations import angle_between
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import POSITIONS
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.ways import clipped_rows, followed
+from inercal.imu.ferraris.ways import followed
+from inercal.imu.recording import clipped_rows
 from inercal.imu.turns import carried, cut_turns
 from inercal.records.record import Triad
 

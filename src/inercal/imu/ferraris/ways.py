@@ -5,25 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.records.checks.values import saturated
+from inercal.imu.recording import LOST
 from inercal.records.record import Triad
-
-LOST = 3.5
-"""Longest step of time in a motion, in sample intervals: two lost samples hardly matter to its integral."""
 
 LONGEST = 60.0
 """Longest way that is followed [s]."""
 
 SHORTEST = 0.25
 """Shortest way that can be one [s]: in a recording cut down to its sections there is none left between them."""
-
-
-def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
-    """Rows (n,) in which an axis saturates."""
-    clipped = np.zeros(len(gyro.t), dtype=bool)
-    for values in gyro.values.T:
-        clipped[saturated(values)] = True
-    return clipped
 
 
 def followed(gyro: Triad, clipped: NDArray[np.bool_], start: int, stop: int) -> bool:
