@@ -5,9 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inercal.convert.correct import ImuModel, imu_model, not_applied
+from inercal.convert.correct import ImuModel, apply_to, imu_model, not_applied
 from inercal.errors import InputError
 from inercal.instruments.triad import TriadModel
+from inercal.records.record import Column, Record, Source
+from inercal.units import parse_unit
 
 TRIAD = TriadModel(np.array([2.0, 3.0, 4.0]), np.eye(3) + 0.01 * np.triu(np.ones((3, 3)), 1), np.ones(3))
 
@@ -94,3 +96,30 @@ def test_what_is_no_calibration_is_not_applied(command):
     """A difference of scale factors is no scale factor."""
     with pytest.raises(InputError, match=f"a result of `inercal {command}`, expected a calibration"):
         imu_model(estimate(command=command), "c.json")
+
+
+def test_a_recording_in_another_unit_of_the_same_kind_is_corrected_alike():
+    """An instrument calibrated in mg and deg/s, and its outputs in m/s^2 and rad/s: the same true values."""
+    model = ImuModel(TRIAD, TRIAD, np.zeros((3, 3)), {"acc": "mg", "gyro": "deg/s"})
+    rng = np.random.default_rng(3)
+    t, source = np.arange(5) / 100.0, Source("log.csv", "")
+
+    def recorded(acc_unit, gyro_unit, acc, gyro):
+        units = {"acc": (acc_unit, acc), "gyro": (gyro_unit, gyro)}
+        return Record(
+            {
+                f"{sensor}_{axis}": Column(
+                    f"{sensor}_{axis}", sensor, axis, parse_unit(unit), values[:, i].copy(), t, source
+                )
+                for sensor, (unit, values) in units.items()
+                for i, axis in enumerate("xyz")
+            }
+        )
+
+    acc, gyro = rng.normal(0, 500, (5, 3)), rng.normal(0, 20, (5, 3))
+    same = apply_to(recorded("mg", "deg/s", acc, gyro), model)
+    other = apply_to(recorded("m/s^2", "rad/s", acc * 9.80665e-3, np.radians(gyro)), model)
+    for name in same.columns:
+        np.testing.assert_allclose(other[name].values, same[name].values, rtol=1e-12)
+    with pytest.raises(InputError, match="acc is in count, expected mg"):
+        apply_to(recorded("count", "deg/s", acc, gyro), model)

@@ -126,7 +126,7 @@ def correction(record: Record, model: ImuModel, invert: bool = False) -> Correct
     Raises
     ------
     InputError
-        Units that are not those of the calibration, missing or uncalibrated channels, two clocks. A gyro that
+        Units of another kind than those of the calibration, missing or uncalibrated channels, two clocks. A gyro that
         the calibration does not cover is an error, not passed on as if it were corrected.
     """
     acc = record.triad("acc")
@@ -143,14 +143,14 @@ def correction(record: Record, model: ImuModel, invert: bool = False) -> Correct
         if triad is None:
             continue
         wanted = (truth if invert else output).get(triad.sensor, triad.unit)
-        if triad.unit.dimension != wanted.dimension or (not invert and triad.unit != wanted):
+        if triad.unit.dimension != wanted.dimension:
             raise InputError(
                 triad.source.path,
                 f"{triad.sensor} is in {triad.unit.symbol}, expected {wanted.symbol} as "
                 f"{'true values' if invert else 'the instrument was calibrated'}",
             )
         units[triad.sensor] = (output if invert else truth).get(triad.sensor, triad.unit)
-        factors[triad.sensor] = triad.unit.factor if invert else 1.0
+        factors[triad.sensor] = triad.unit.factor / wanted.factor  # exactly 1 for one and the same unit
     return Correction(model, invert, units, factors)
 
 

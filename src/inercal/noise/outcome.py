@@ -197,15 +197,19 @@ def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, t
     """The fit of one channel, None where it shows nothing, and what is to be said of it."""
     if not np.nanmax(curve.deviation[:, at], initial=0.0) > 0:
         return None, (Finding("resolution", "the output never changes, there is no noise to be seen"),)
+    whole = noise_coefficients(curve, at)
     if curve.samples >= ENOUGH:
-        fit = noise_coefficients(curve, at)
-        return (fit if fit.names else None), fit.findings
-    fit = noise_coefficients(curve, at, terms=("N",))
+        return (whole if whole.names else None), whole.findings
+    white = noise_coefficients(curve, at, terms=("N",))
+    seen = {
+        name: value + ONE_SIDED * u for name, value, u in zip(whole.names, whole.values, whole.u, strict=True)
+    }
+    bounds = {name: limit for name, limit in {**whole.bounds, **seen}.items() if name not in white.names}
     few = (
-        f"{curve.samples} samples show white noise at most: only N was looked for, expected at least {ENOUGH} samples, "
-        "and minutes of them for the others"
+        f"{curve.samples} samples show white noise at most: of the others only limits are given, expected at least "
+        f"{ENOUGH} samples, and minutes of them"
     )
-    return (fit if fit.names else None), (*fit.findings, Finding("few_degrees_of_freedom", few))
+    return replace(white, bounds=bounds), (*white.findings, Finding("few_degrees_of_freedom", few))
 
 
 def _assemble(
