@@ -1,6 +1,7 @@
 """Quantities as typed: units, dimensions, uncertainties, and nothing but `QuantityError` for junk."""
 
 import math
+import re
 
 import pytest
 from hypothesis import example, given, settings
@@ -116,6 +117,20 @@ def test_rare_units_are_looked_up_in_pint(unit, dimension, factor):
 def test_no_unit(unit):
     with pytest.raises(QuantityError, match=r"found the unit .* expected one such as"):
         parse_unit(unit)
+
+
+@pytest.mark.parametrize(
+    ("unit", "meant"),
+    [("MG", "mg"), ("milli-g", "mg"), ("micro g", "ug"), ("Deg/S", "deg/s"), ("M/S^2", "m/s^2")],
+)
+def test_a_unit_in_other_letters_is_asked_for(unit, meant):
+    with pytest.raises(QuantityError, match=rf"found the unit .* did you mean {re.escape(meant)}\?"):
+        parse_unit(unit)
+
+
+@pytest.mark.parametrize("sign", ["m°/s", "mGrad/s", "mdps"])
+def test_thousandths_of_a_degree_are_written_in_many_ways(sign):
+    assert parse_unit(sign).factor == pytest.approx(math.pi / 180e3, rel=1e-12)
 
 
 @pytest.mark.parametrize(

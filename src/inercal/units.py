@@ -94,10 +94,15 @@ _ALIASES = {
     "degrees": "deg",
     '"': "arcsec",
     "'": "arcmin",
+    "m°": "mdeg",
+    "mGrad": "mdeg",
     "Grad": "deg",  # the German degree, to pint a billion rad
     "dps": "deg/s",
     "mdps": "mdeg/s",
     "Grad/s": "deg/s",
+    "Grad/h": "deg/h",
+    "mGrad/s": "mdeg/s",
+    "m°/s": "mdeg/s",
     "°/s": "deg/s",
     "°/h": "deg/h",
     "°/√h": "deg/sqrt(h)",
@@ -179,7 +184,14 @@ def parse_unit(text: str, where: object = "unit", dimension: str | None = None) 
     for measured, (_, factors) in _TABLE.items():
         if plain in factors:
             return Unit(plain, measured, factors[plain], _ZERO.get(plain, 0.0))
-    return _from_pint(plain, text, where, _everyday(dimension))
+    return _from_pint(plain, text, where, _meant(plain) or f"expected {_everyday(dimension)}")
+
+
+def _meant(plain: str) -> str | None:
+    """A question whether a unit of the table was meant, written in other letters: ``MG``, ``milli-g``."""
+    short = re.sub("^milli[-*]?", "m", re.sub("^micro[-*]?", "u", plain.lower()))
+    units = {unit.lower(): unit for _, factors in reversed(_TABLE.values()) for unit in factors}
+    return f"did you mean {units[short]}?" if short in units else None
 
 
 def _everyday(dimension: str | None) -> str:
@@ -189,9 +201,8 @@ def _everyday(dimension: str | None) -> str:
     return f"a unit of {dimension}: {', '.join(_TABLE[dimension][1])}"
 
 
-def _from_pint(plain: str, text: str, where: object, wanted: str) -> Unit:
-    """Ask pint, loaded only now, for a unit outside the table; ``wanted`` is for the error."""
-    expected = f"expected {wanted}"
+def _from_pint(plain: str, text: str, where: object, expected: str) -> Unit:
+    """Ask pint, loaded only now, for a unit outside the table; what is ``expected`` is for the error."""
     if len(plain) > 40 or not _FOR_PINT.fullmatch(plain):
         raise QuantityError(where, f"found the unit {shown(text)}, {expected}")
     import pint

@@ -206,6 +206,15 @@ def test_new_names_the_files_it_wrote_and_asks_for_the_rate(folder, capsys):
     refused(command, capsys, "my-map.toml: time.rate", "PUT THE SAMPLE RATE HERE")
 
 
+def test_new_says_that_no_sensor_was_recognised(folder, capsys):
+    """A temperature alone is nothing to calibrate: the map lists the columns, and is refused as it is."""
+    Path("raw.csv").write_text("temp,strain\n" + "".join(f"2{i % 7}.5,0.{i % 3}\n" for i in range(50)))
+    assert run(["new", "imu", "raw.csv", "--out", "my.toml"]) == 0
+    assert "no accelerometer or gyro was recognised: the map lists the columns" in capsys.readouterr().out
+    assert '"strain" (0, 0.1, 0.2)' in Path("my-map.toml").read_text("utf-8")
+    refused(["inspect", "raw.csv", "--map", "my-map.toml"], capsys, "columns: missing")
+
+
 @POSIX
 def test_standard_output_may_be_closed(folder):
     done = shell("$INERCAL inspect log.csv >&-")

@@ -12,7 +12,11 @@ from inercal.imu.task import calibrate
 
 
 def test_the_settings_choose_the_method():
-    for name, kind in (("mpu6050", Calibration), ("ferraris", FerrarisCalibration), ("table", AidedCalibration)):
+    for name, kind in (
+        ("mpu6050", Calibration),
+        ("ferraris", FerrarisCalibration),
+        ("table", AidedCalibration),
+    ):
         assert isinstance(calibrate(*shipped(name)), kind)
 
 

@@ -156,6 +156,8 @@ def test_a_guess_about_a_damaged_file_is_a_map_or_refused(tmp_path, content):
         text = guess_map(path)
     except InputError:
         return
+    if all(line.startswith("#") for line in text.splitlines()):  # nothing recognised: the columns, to fill in
+        return
     record_map = put(tmp_path / "map.toml", re.sub('rate = "PUT .*"', 'rate = "100 Hz"', text).encode())
     assert read_map(record_map).parts
     assert is_sound(lambda: read(path, record_map))

@@ -173,7 +173,7 @@ def test_a_folder_of_ros_2_must_be_whole(tmp_path):
     with pytest.raises(RecordError, match=r"cannot be read as a bag .*missing"):
         read(path)
     (path / "metadata.yaml").unlink()
-    with pytest.raises(RecordError, match="found the ending 'none', expected one of"):
+    with pytest.raises(RecordError, match=r"a folder without metadata\.yaml \(a ROS 2 bag has one\)"):
         read(path)
 
 

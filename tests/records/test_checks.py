@@ -222,6 +222,37 @@ class TestUnits:
     def test_gravity_in_its_unit_counts_and_heavy_loads_are_fine(self, norm, unit):
         assert check(self.triad(norm, unit)) == ()
 
+    @pytest.mark.parametrize(
+        ("unit", "largest", "looks"),
+        [("deg/s", 129305.0, "mdeg/s"), ("mdeg/s", 1e8, "a smaller unit"), ("rpm", 2000.0, "a smaller unit")],
+    )
+    def test_rates_beyond_16_turns_a_second_are_said_in_any_unit(self, unit, largest, looks):
+        """100 rad/s is 5730 deg/s; gyros of up to 4000 deg/s are made."""
+        motion = np.sin(np.arange(self.N) / 50)
+        (finding,) = check(columns(unit, gyro_y=largest * motion))
+        assert finding.code == "unit_suspect"
+        assert finding.message.endswith(f"{unit} look like {looks}")
+        (factor,) = {column.unit.factor for column in columns(unit, gyro_y=motion).values()}
+        assert check(columns(unit, gyro_y=np.deg2rad(4000.0) / factor * motion)) == ()
+
+    @pytest.mark.parametrize(("unit", "wrong"), [("degC", 2345.0), ("K", 23.0), ("degF", -400.0)])
+    def test_temperatures_no_instrument_stands_are_said(self, unit, wrong):
+        (finding,) = check(columns(unit, temperature=wrong + 0.1 * noise(self.N)))
+        assert finding.code == "unit_suspect"
+        room = {"degC": 23.0, "K": 296.0, "degF": 73.0}[unit]
+        assert check(columns(unit, temperature=room + 0.1 * noise(self.N))) == ()
+
+    def test_a_dead_axis_is_said_and_tells_no_unit(self):
+        """Without the vertical axis the norm, 0.1 m/s^2, is no gravity in any unit."""
+        found = self.triad(9.8, "m/s^2")
+        dead = columns(
+            "m/s^2", acc_x=0.1 + 1e-3 * noise(self.N), acc_y=1e-3 * noise(self.N), acc_z=noise(self.N) * 0
+        )
+        (finding,) = check(dead)
+        assert (finding.code, finding.message.split(":")[0]) == ("dead_channel", "acc_z")
+        assert "all 1000 samples are 0" in finding.message
+        assert check(found) == ()
+
     def test_rates_no_gyro_has_are_said(self):
         fast = 300 * np.sin(np.arange(self.N) / 50)
         (finding,) = check(columns("rad/s", gyro_x=fast))

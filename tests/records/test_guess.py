@@ -179,7 +179,89 @@ def test_each_guess_says_why(tmp_path):
     assert all(block.startswith("# ") for block in tables)
 
 
-@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "1,2\n3,4\n", "\x00\x00", "hello\n"])
+G_MG = ACC / 9.80665 * 1000
+RATES = 5000.0 * GYRO
+
+
+@pytest.mark.parametrize(
+    ("header", "time", "found"),
+    [
+        ("t (s),ax (mg),ay (mg),az (mg),wx (mGrad/s),wy (mGrad/s),wz (mGrad/s)", 1.0, "mdeg/s"),
+        ("t (s),ax (mg),ay (mg),az (mg),wx (m°/s),wy (m°/s),wz (m°/s)", 1.0, "mdeg/s"),
+        ("t_ms,acc_x_mg,acc_y_mg,acc_z_mg,gyro_x_mdps,gyro_y_mdps,gyro_z_mdps", 1e3, "mdeg/s"),
+        ("temps (ms),gX [mg],gY [mg],gZ [mg],wx (dps),wy (dps),wz (dps)", 1e3, "deg/s"),
+        (
+            "Laufzeit [ms],Beschl. X [mg],Beschl. Y [mg],Beschl. Z [mg],"
+            "Drehrate X [Grad/s],Drehrate Y [Grad/s],Drehrate Z [Grad/s]",
+            1e3,
+            "deg/s",
+        ),
+        ("t,K1 1 [mg],K1 2 [mg],K1 3 [mg],K2 1 [mdeg/s],K2 2 [mdeg/s],K2 3 [mdeg/s]", 1.0, "mdeg/s"),
+        ("t,ax,ay,az,gx,gy,gz", 1.0, "mdeg/s"),
+    ],
+)
+def test_units_tell_the_channel_and_never_become_counts(tmp_path, header, time, found):
+    """In brackets, as the end of a name, beside names in other languages, and by size alone."""
+    path = table(tmp_path / "a.csv", header, np.column_stack([T * time, G_MG, 20.0 * RATES]))
+    _, record = guessed(tmp_path, [path])
+    assert units(record) == ["mg"] * 3 + [found] * 3
+    np.testing.assert_allclose(record.triad("gyro").values, 20.0 * RATES, rtol=1e-8)
+    np.testing.assert_allclose(record["acc_x"].t, T, atol=1e-9)
+
+
+def test_whole_numbers_of_the_size_of_a_thousand_are_counts(tmp_path):
+    """A converter of 1000 counts per g looks like mg, but for its whole numbers."""
+    path = table(tmp_path / "a.csv", "t,ax,ay,az", np.column_stack([T, np.round(G_MG)]))
+    _, record = guessed(tmp_path, [path])
+    assert set(units(record)) == {"count"}
+
+
+def test_an_unknown_unit_is_said(tmp_path):
+    path = table(tmp_path / "a.csv", "t,ax [foo],ay [foo],az [foo]", np.column_stack([T, ACC]))
+    assert '"foo" is no unit known here; the median norm' in guess_map(path)
+
+
+def test_an_interval_in_seconds_is_no_time(tmp_path):
+    rows = np.column_stack([0.01 + 0.001 * GYRO[:, 0], T, ACC])
+    text = guess_map(table(tmp_path / "a.csv", "dt [s],elapsed [s],ax,ay,az", rows))
+    assert '[columns.t]\nfrom = "elapsed [s]"' in text
+    assert '# not used: "dt [s]"' in text
+
+
+def test_dates_are_not_read_and_a_rate_is_asked_for(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = [f"2026-01-01T00:00:{t:05.2f},{x},{y},{z}" for t, (x, y, z) in zip(T, ACC, strict=True)]
+    path.write_text("\n".join(["time,ax,ay,az", *rows]) + "\n")
+    text = guess_map(path)
+    assert '# not used: "time" (no numbers; dates and words are not read)' in text
+    (tmp_path / "map.toml").write_text(text.replace("PUT THE SAMPLE RATE HERE, such as 100 Hz", "100 Hz"))
+    record = read(path, tmp_path / "map.toml")
+    np.testing.assert_allclose(record["acc_z"].values, ACC[:, 2])
+    np.testing.assert_allclose(record["acc_z"].t, T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "held"),
+    [
+        (
+            "foo,temp,bar",
+            np.column_stack([T, T, T]),
+            ['"foo" (0, 0.01, 0.02)', '"temp" (perhaps temperature)'],
+        ),
+        ("", np.column_stack([ACC, GYRO, 0 * T]), ["6 (0, 0, 0)"]),
+    ],
+)
+def test_where_no_sensor_is_told_the_columns_are_listed(tmp_path, header, rows, held):
+    path = table(tmp_path / "a.csv", header, rows)
+    text = guess_map(path)
+    assert all(line.startswith("#") for line in text.splitlines())
+    assert all(f"#   {each}" in text for each in held)
+    (tmp_path / "map.toml").write_text(text)
+    with pytest.raises(InputError, match="columns: missing, expected at least one"):
+        read_map(tmp_path / "map.toml")
+
+
+@pytest.mark.parametrize("content", ["", "\x00\x00", "hello\n"])
 def test_nothing_to_guess_is_said(tmp_path, content):
     path = tmp_path / "a.csv"
     path.write_text(content)

@@ -235,10 +235,23 @@ def test_a_missing_file_a_folder_and_an_unknown_ending_are_said(tmp_path):
     with pytest.raises(RecordError, match=r"found the ending '.xyz', expected one of .csv"):
         read(written(tmp_path / "a.xyz", table()))
     (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(RecordError, match=r"is a folder without metadata\.yaml"):
+        read(tmp_path / "bag")
     with pytest.raises(RecordError, match="a folder"):
         read(tmp_path / "folder.csv")
     with pytest.raises(RecordError, match="no file"):
         read([])
+
+
+def test_of_many_strange_columns_whole_names_are_said(tmp_path):
+    names = [f"Drehrate {i} [mdeg/s]" for i in range(12)]
+    path = written(tmp_path / "a.csv", ";".join(names) + "\n" + ";".join("1" * 12) + "\n")
+    said = (
+        r"Drehrate 7 \[mdeg/s\] and 4 more, expected known ones .* or a map \(`inercal new imu` writes one\)"
+    )
+    with pytest.raises(RecordError, match=said):
+        read(path)
 
 
 def test_positions_need_no_clock(tmp_path):

@@ -189,6 +189,23 @@ def test_any_rows_are_read_as_in_a_file(tmp_path_factory, rows):
     same_as_a_file(tmp_path_factory.mktemp("rows"), f"{HEADER}{text}\n")
 
 
+def test_stamps_that_repeat_or_run_backward_are_said_as_they_come(tmp_path):
+    """The first of a run of equal stamps, and each step back: the rows that a file's findings name, in lines."""
+    stamps = [0.0, 0.1, 0.2, 0.2, 0.2, 0.3, 0.15, 0.25, "", 0.2, 0.4, 0.4]
+    data = HEADER + "".join(f"{t},1,2\n" for t in stamps)
+    record, _, said = same_as_a_file(tmp_path, data)
+    odd = [(each.code, each.where) for each in said if each.code.endswith("_time")]
+    assert odd == [
+        ("duplicate_time", "line 5"),
+        ("backward_time", "line 8"),
+        ("backward_time", "line 11"),
+        ("duplicate_time", "line 13"),
+    ]
+    whole = {each.code: each.where for each in record.findings}
+    assert whole["backward_time"] == "rows 7, 10"
+    assert whole["duplicate_time"] == "rows 4-5, 12"
+
+
 def test_a_flood_is_counted():
     _, said, _ = samples(HEADER + "0,1,2\n" + "junk\n" * 30 + "1,,2\n")
     assert [finding.where for finding in said] == [*(f"line {n}" for n in range(3, 8)), "line 33", ""]

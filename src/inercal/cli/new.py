@@ -75,4 +75,6 @@ def _new(
         write_text(map_file, column_map)
     result = {"study": str(study), "map": None if map_file is None else str(map_file)}
     words = "\n".join(f"{path}: look it over and correct it" for path in written)
+    if column_map is not None and not _mapped(column_map):
+        words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
     output.emit(envelope(f"new {kind}", words, result, map(source_of, files)), words)

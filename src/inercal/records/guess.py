@@ -5,30 +5,24 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from inercal.errors import QuantityError, RecordError
-from inercal.records.channels import Origin, is_channel, misfit, of_a_table
+from inercal.errors import RecordError
+from inercal.records.channels import Origin, of_a_table
+from inercal.records.places import counted_names
 from inercal.records.read import format_of
+from inercal.records.read.canonical import bare
 from inercal.records.read.table import Sample
 from inercal.records.record import Array
-from inercal.units import parse_unit
+from inercal.records.titles import fits, titled
 
-_SENSORS = {
-    "acc": r"a|f|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha",
-    "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega",
-}
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
-_TIME = (
-    r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds|time (?:s|ms|us|ns)"
-    r"|timestamp (?:s|ms|us|ns)"
-)
-_LABEL = r"label|part|section|pose"
-_ANGLE = re.compile(r"phi ?([123])(?: ?(deg|rad|arcmin|arcsec))?")
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
+_MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
+_LISTED = 40
 _EVERYDAY = ("s", "m/s^2", "deg/s", "deg", "degC", "1")
 
 
@@ -50,14 +44,15 @@ class _File:
     path: Path
     guesses: Mapping[str, _Guess]
     leading: tuple[str, ...]
+    unused: tuple[str, ...] = ()
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) -> str:
     """Guess a column map from the files themselves.
 
-    Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``), arrays without a header
-    by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
+    Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``) and units, arrays without a
+    header by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
     a unit by the size of gravity.
 
     Parameters
@@ -70,7 +65,8 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
     Returns
     -------
     str
-        A map in TOML that reads these files, with a comment on each guess.
+        A map in TOML that reads these files, with a comment on each guess and on columns not used. Where no
+        sensor was recognised, there are only comments, to write the map by.
 
     Raises
     ------
@@ -82,6 +78,8 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
         looked = _look(Path(path), on_table)
         if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
             files += looked
+    if not any(_MEASURED.fullmatch(name) for file in files for name in file.guesses):
+        return _skeleton(files)
     names = dict.fromkeys(_quoted(file.path.name) for file in files)
     lines = [
         f"# Guessed from {', '.join(names)}: check each line, above all",
@@ -94,6 +92,8 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
             table = f"file.{name}"
             lines += ["", f"[{table}]", f"path = {_quoted(file.path.name)}", *_options(file, "")]
             lines += _columns(file, f"{table}.columns")
+    for file in files:
+        lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
     if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
         lines += _rate([line for file in files for line in file.leading])
     return "\n".join(lines) + "\n"
@@ -118,58 +118,76 @@ def _look(path: Path, on_table: bool) -> list[_File]:
         new = {name: guess for name, guess in guesses.items() if name not in known}
         if "t" in new and len(new) > 1:
             found.append(_File(path, new, ()))
-    if not longest.keys() - {"t", "label"}:
-        held = "; ".join(", ".join(sample.names) or f"{sample.values.shape[1]} columns" for sample in samples)
-        wanted = (
-            "a header such as phi1,phi2,acc_x"
-            if on_table
-            else "columns that look like those of an instrument"
-        )
-        raise RecordError(path, f"found {held[:100]}, expected {wanted}")
-    return found
+    if on_table and not longest.keys() - {"t", "label"}:
+        raise RecordError(path, f"found {_held(samples)}, expected a header such as phi1,phi2,acc_x")
+    if all(np.isnan(sample.values).all() for sample in samples):
+        raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
+    return [replace(found[0], unused=_unused(samples, found)), *found[1:]]
+
+
+def _held(samples: Sequence[Sample]) -> str:
+    """What a file holds, in words."""
+    return "; ".join(
+        counted_names(sample.names, 8) or f"{sample.values.shape[1]} columns" for sample in samples
+    )
+
+
+def _unused(samples: Sequence[Sample], files: Sequence[_File]) -> tuple[str, ...]:
+    """The columns that are no channel: how a map names them, and how they begin."""
+    used = [guess.origin for file in files for guess in file.guesses.values()]
+    columns = []
+    for sample in samples:
+        for index, values in enumerate(sample.values.T):
+            if (origin := _origin(sample, index)) in used:
+                continue
+            begins = ", ".join(f"{value:.6g}" for value in values[:3])
+            if np.isnan(values).all():
+                begins = "no numbers; dates and words are not read"
+            place = _quoted(list(origin) if isinstance(origin, tuple) else origin)
+            columns.append(f"{place} ({begins})")
+    more = [f"{len(columns) - _LISTED} more"] if len(columns) > _LISTED else []
+    return (*columns[:_LISTED], *more)
+
+
+def _skeleton(files: Sequence[_File]) -> str:
+    """A map that says nothing yet: what to write, and the columns there are."""
+    lines = ["# No accelerometer or gyro was recognised. Give each channel its column and unit, for example"]
+    lines += ["# [columns.acc_x]", "# from = 1", '# unit = "m/s^2"', "#"]
+    lines += ["# and likewise t, acc_y, gyro_x. Without a time column, state the rate:"]
+    lines += ["# [time]", '# rate = "100 Hz"', "#", "# What there is, with the first numbers:"]
+    for file in files:
+        held = [f"{_quoted(guess.origin)} (perhaps {name})" for name, guess in file.guesses.items()]
+        lines += [f"# {_quoted(file.path.name)}", *(f"#   {column}" for column in (*held, *file.unused))]
+    return "\n".join(lines) + "\n"
 
 
 def _by_header(sample: Sample) -> list[_Guess]:
     """Channels by the names in the header."""
     guesses = []
     for index, title in enumerate(sample.names):
-        match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title)
-        plain, unit = (match[1], match[2]) if match else (title, None)
-        unit = unit or (sample.units[index] if sample.units else None)
-        name = plain if is_channel(plain) else _named(plain)
-        if name is not None:
-            angle = _ANGLE.fullmatch(_words(plain))
-            unit = unit or (angle[2] if angle else None)
-            origin = title if sample.names.count(title) == 1 else index
-            reason = f"the header says {_quoted(title)}"
-            guesses.append(_Guess(name, origin, sample.values[:, index], unit, reason))
+        name, unit = titled(title, sample.units[index] if sample.units else None)
+        values = sample.values[:, index]
+        # what is no number, as dates, can be a label alone; a time by its unit alone may be some interval
+        if name is None or (name != "label" and np.isnan(values).all()):
+            continue
+        if name == "t" and titled(bare(title))[0] != "t" and not _is_clock(values):
+            continue
+        reason = f"the header says {_quoted(title)}"
+        guesses.append(_Guess(name, _origin(sample, index), values, unit, reason))
     return guesses
 
 
-def _named(title: str) -> str | None:
-    """The channel a header's name stands for, if any."""
-    words = _words(title)
-    if angle := _ANGLE.fullmatch(words):
-        return f"phi{angle[1]}"
-    for sensor, names in _SENSORS.items():
-        match = re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz]) (?:{names})", words)
-        if match:
-            return f"{sensor}_{match[1] or match[2]}"
-    for channel, names in (
-        ("t", _TIME),
-        ("label", _LABEL),
-        ("temperature", r"temp|temperature"),
-        ("position", "position"),
-    ):
-        if re.fullmatch(rf"(?:.* )?(?:{names})", words):
-            return channel
-    return None
+def _is_clock(values: Array) -> bool:
+    """True for numbers that never fall, and rise somewhere."""
+    step = np.diff(values[np.isfinite(values)])
+    return bool((step >= 0.0).all() and (step > 0.0).any())
 
 
-def _words(title: str) -> str:
-    """A header's name as words in small letters."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title)
-    return re.sub(r"[^a-z0-9]+", " ", words.lower()).strip()
+def _origin(sample: Sample, index: int) -> Origin:
+    """How a map names a column."""
+    if sample.names:
+        return sample.names[index] if sample.names.count(sample.names[index]) == 1 else index
+    return (sample.variable, index) if sample.variable else index
 
 
 def _by_shape(sample: Sample, path: Path) -> list[_Guess]:
@@ -177,8 +195,7 @@ def _by_shape(sample: Sample, path: Path) -> list[_Guess]:
     values = sample.values
 
     def guess(name: str, index: int, reason: str) -> _Guess:
-        origin: Origin = (sample.variable, index) if sample.variable else index
-        return _Guess(name, origin, values[:, index], None, reason)
+        return _Guess(name, _origin(sample, index), values[:, index], None, reason)
 
     rising = [index for index in range(values.shape[1]) if (np.diff(values[:, index]) > 0).all()]
     guesses = [guess("t", rising[0], "the column that always rises")] if rising else []
@@ -227,28 +244,24 @@ def _median(values: Array) -> float:
 
 def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
     """Unit of each channel, and why."""
-    acc = _acc_unit(guesses)
+    stated = guesses["acc_x"].unit if "acc_x" in guesses else None
+    acc = (stated, "as x") if stated and fits("acc_x", stated) else _acc_unit(guesses)
     units = {}
     for name, guess in guesses.items():
-        if guess.unit is not None and _fits(name, guess.unit):
+        if guess.unit is not None and fits(name, guess.unit):
             units[name] = (guess.unit, "with this unit")
-        elif name == "t":
+            continue
+        if name == "t":
             units[name] = _time_unit(guess.values)
         elif name.startswith("acc_"):
             units[name] = acc
         elif name.startswith("gyro"):
             units[name] = _gyro_unit(guesses, acc[0])
         else:
-            units[name] = (next(unit for unit in _EVERYDAY if _fits(name, unit)), "the unit is an example")
+            units[name] = (next(unit for unit in _EVERYDAY if fits(name, unit)), "the unit is an example")
+        if guess.unit is not None and name not in ("label", "position"):
+            units[name] = (units[name][0], f"{_quoted(guess.unit)} is no unit known here; {units[name][1]}")
     return units
-
-
-def _fits(name: str, unit: str) -> bool:
-    """True if there is such a unit and the channel may have it."""
-    try:
-        return misfit(name, parse_unit(unit)) is None
-    except QuantityError:
-        return False
 
 
 def _acc_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
@@ -257,8 +270,8 @@ def _acc_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
     if len(axes) < 3:
         return "count", "no triad to tell the unit by"
     norm = _median(np.linalg.norm(axes, axis=0))
-    for unit, low, high in (("m/s^2", 8.5, 11.0), ("g", 0.85, 1.15)):
-        if low < norm < high:
+    for unit, low, high in (("m/s^2", 8.5, 11.0), ("g", 0.85, 1.15), ("mg", 850, 1150)):
+        if low < norm < high and not (unit == "mg" and _whole(axes)):
             return unit, f"the median norm is {norm:.4g}, gravity in {unit}"
     return "count", f"the median norm is {norm:.5g}, gravity in neither m/s^2 nor g"
 
@@ -266,14 +279,18 @@ def _acc_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
 def _gyro_unit(guesses: Mapping[str, _Guess], acc_unit: str) -> tuple[str, str]:
     """Unit of the gyros: counts if they are whole numbers, else by the largest rate."""
     axes = [guess.values for name, guess in guesses.items() if name.startswith("gyro")]
-    known = np.concatenate([axis[np.isfinite(axis)] for axis in axes])
-    if (known == np.round(known)).all():
+    if _whole(axes):
         return "count", "all are whole numbers"
     if acc_unit == "count" and "acc_x" in guesses:
         return "count", "as the accelerometers"
-    largest = np.abs(known).max()
-    unit = "deg/s" if largest > 35.0 else "rad/s"
-    return unit, f"the largest is {largest:.4g}; check whether deg/s or rad/s"
+    largest = max(np.abs(axis[np.isfinite(axis)]).max(initial=0.0) for axis in axes)
+    unit = "mdeg/s" if largest > 5700.0 else "deg/s" if largest > 35.0 else "rad/s"
+    return unit, f"the largest is {largest:.4g}; check whether mdeg/s, deg/s or rad/s"
+
+
+def _whole(axes: Iterable[Array]) -> bool:
+    """True if all numbers are whole ones, as those of a converter are."""
+    return all((axis[np.isfinite(axis)] % 1.0 == 0.0).all() for axis in axes)
 
 
 def _time_unit(t: Array) -> tuple[str, str]:

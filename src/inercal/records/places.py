@@ -1,4 +1,4 @@
-"""Counts and places in words: ``3 gaps``, ``line 17``, ``rows 102-118, 240 and 3 more``."""
+"""Counts, places and names in words: ``3 gaps``, ``line 17``, ``rows 102-118, 240 and 3 more``."""
 
 from __future__ import annotations
 

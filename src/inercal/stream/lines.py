@@ -91,8 +91,8 @@ class Lines:
         The columns of one file. Increments need its ``[time] rate``, for the median interval of a stream is
         not known before its end.
     say : callable
-        Told of rows and values that could not be read: the first few of a kind as they come, the number of
-        all others by `close`.
+        Told of rows and values that could not be read, and of stamps that repeat or run backward: the first
+        few of a kind as they come, the number of all others by `close`.
 
     Raises
     ------
@@ -107,6 +107,7 @@ class Lines:
         self._stream, self.where, self._say = stream, where, say
         self._number = 0
         self._flaws: Counter[tuple[str, str]] = Counter()
+        self._t, self._odd = math.nan, ""
         self._form, self._held = self._begin(record_map)
         self._layout = self._form.layout
 
@@ -162,7 +163,7 @@ class Lines:
                     )
             stamp = 0.0 if form.time is None else self._layout.number(fields[form.time.column])
             bad = stamp is None or None in found
-            t = self._value(form.time, stamp, bad, line) if form.time is not None else t
+            t = self._stamp(form.time, stamp, bad, line) if form.time is not None else t
             values = [
                 self._value(field, value, bad, line) for field, value in zip(form.fields, found, strict=True)
             ]
@@ -172,10 +173,23 @@ class Lines:
         return Sample(row, row / form.rate if form.time is None else t, values, label)
 
     def close(self) -> None:
-        """Say how many rows and values more could not be read."""
+        """Say how many more there were of what has been said too often."""
         for (code, text), count in self._flaws.items():
             if count > _SAID:
                 self._say(Finding(code, f"{text}: {count - _SAID} more"))
+
+    def _stamp(self, field: _Field, value: float | None, bad: bool, line: Line) -> float:
+        """A time stamp [s]; the first of some that repeat is said, and each that runs backward."""
+        t = self._value(field, value, bad, line)
+        if math.isnan(t):
+            return t
+        odd = "duplicate_time" if t == self._t else "backward_time" if t < self._t else ""
+        if odd == "backward_time":
+            self._flaw(odd, "t: backward stamp", line)
+        elif odd and odd != self._odd:
+            self._flaw(odd, "t: repeated stamp", line)
+        self._t, self._odd = t, odd
+        return t
 
     def _value(self, field: _Field, value: float | None, bad: bool, line: Line) -> float:
         """A value in its unit; NaN where there is none, which is said unless the row is bad anyway."""

@@ -16,11 +16,19 @@ from numpy.typing import ArrayLike
 from inercal.records.channels import of_a_table
 from inercal.records.checks.angles import angles
 from inercal.records.checks.time import time_axis, time_unit
-from inercal.records.checks.values import accelerometer_unit, gyro_unit, outliers, saturation
+from inercal.records.checks.values import (
+    accelerometer_unit,
+    dead_channel,
+    gyro_unit,
+    outliers,
+    saturation,
+    temperature_unit,
+)
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Array, Column
 
+_SENSOR = re.compile(r"acc_[xyz]|a\d+|gyro\w*")
 _MEASURED = re.compile(r"acc_[xyz]|a\d+|gyro\w*|y_[xy]|temperature")
 
 
@@ -44,6 +52,10 @@ def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
             if _MEASURED.fullmatch(column.name):
                 findings += saturation(column.values, column.name)
                 findings += outliers(column.values, column.name)
+            if _SENSOR.fullmatch(column.name):
+                findings += dead_channel(column.values, column.name)
+            if column.name == "temperature":
+                findings += temperature_unit(column)
         findings += accelerometer_unit(columns)
         findings += gyro_unit(columns)
         findings += angles(columns)

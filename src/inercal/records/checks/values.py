@@ -15,6 +15,7 @@ from inercal.records.record import Array, Column
 from inercal.units import STANDARD_GRAVITY, parse_unit
 
 _AROUND = 42
+_FEWEST = 10
 
 
 def saturation(values: Array, name: str) -> list[Finding]:
@@ -37,7 +38,7 @@ def saturated(values: Array) -> NDArray[np.int64]:
     """
     none = np.zeros(0, dtype=np.int64)
     signal, rows = known(values)
-    if signal.size < 10:
+    if signal.size < _FEWEST:
         return none
     low, high = signal.min(), signal.max()
     if max(np.count_nonzero(signal == low), np.count_nonzero(signal == high)) < 3:
@@ -95,6 +96,8 @@ def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
     axes = [columns[name] for name in ("acc_x", "acc_y", "acc_z") if name in columns]
     if len(axes) < 3 or any(axis.unit != axes[0].unit or axis.t is not axes[0].t for axis in axes):
         return []
+    if any(is_dead(axis.values) for axis in axes):  # what is left of gravity tells no unit
+        return []
     stated = axes[0].unit
     norms = np.sqrt(sum(thinned(axis.values) ** 2 for axis in axes))
     norms = norms[np.isfinite(norms)]
@@ -113,12 +116,40 @@ def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
 
 
 def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
-    """``unit_suspect``: rates in rad/s that only deg/s can be, one in a thousand beyond 100 rad/s."""
+    """``unit_suspect``: rates that no gyro measures, one in a thousand beyond 100 rad/s."""
     findings = []
-    for name in ("gyro_x", "gyro_y", "gyro_z", "gyro"):
-        if name in columns and columns[name].unit.symbol == "rad/s":
+    for name in ("gyro_x", "gyro_y", "gyro_z", "gyro", "gyro_roll", "gyro_yaw"):
+        if name in columns and (unit := columns[name].unit).dimension == "rate":
             signal, _ = known(columns[name].values)
-            if 1000 * np.count_nonzero(np.abs(signal) > 100.0) > signal.size:
-                text = f"{name}: rates up to {np.abs(signal).max():.4g} rad/s look like deg/s"
+            if 1000 * np.count_nonzero(np.abs(signal) > 100.0 / unit.factor) > signal.size:
+                looks = {"rad/s": "deg/s", "deg/s": "mdeg/s"}.get(unit.symbol, "a smaller unit")
+                text = f"{name}: rates up to {np.abs(signal).max():.6g} {unit.symbol} look like {looks}"
                 findings.append(Finding("unit_suspect", text))
     return findings
+
+
+def temperature_unit(column: Column) -> list[Finding]:
+    """``unit_suspect``: temperatures that no instrument stands, one in a thousand outside -100 to 200 degC."""
+    signal, _ = known(column.values)
+    if column.unit.dimension != "temperature" or signal.size == 0:
+        return []
+    low, high = ((limit - column.unit.zero) / column.unit.factor for limit in (-100.0, 200.0))
+    if 1000 * np.count_nonzero((signal < low) | (signal > high)) <= signal.size:
+        return []
+    span = f"{signal.min():.6g} to {signal.max():.6g} {column.unit.symbol}"
+    return [Finding("unit_suspect", f"{column.name}: {span} are hardly temperatures of an instrument")]
+
+
+def dead_channel(values: Array, name: str) -> list[Finding]:
+    """``dead_channel``: a sensor that never changes, which its noise alone would make it do."""
+    if not is_dead(values):
+        return []
+    signal, _ = known(values)
+    text = f"{name}: all {signal.size} samples are {signal[0]:.6g}, a dead or empty channel"
+    return [Finding("dead_channel", text)]
+
+
+def is_dead(values: Array) -> bool:
+    """True if all of at least ten values (n,) are equal."""
+    signal, _ = known(values)
+    return bool(signal.size >= _FEWEST and (signal == signal[0]).all())

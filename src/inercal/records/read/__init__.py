@@ -255,6 +255,10 @@ def format_of(path: Path) -> Format:
                 found = "a folder" if path.is_dir() else "no such file"
                 raise RecordError(path, f"found {found}, expected a recording")
             return _module(module)
+    if path.is_dir():
+        raise RecordError(
+            path, "is a folder without metadata.yaml (a ROS 2 bag has one), expected a recording"
+        )
     ending = "".join(Path(name).suffixes[-2:]) if name.endswith(".gz") else Path(name).suffix
     raise RecordError(path, f"found the ending {ending or 'none'!r}, expected one of {', '.join(FORMATS)}")
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from inercal.errors import RecordError
 from inercal.records.channels import Channel, Origin, is_channel, misfit, needs_unit
+from inercal.records.places import counted_names
 from inercal.units import parse_unit, shown
 
 EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
@@ -58,6 +59,9 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
             raise RecordError(where, f"{name}: {problem}")
         channels[name] = Channel(name, origin, unit)
     if not channels.keys() - {"label"}:
-        names = ", ".join(found)[:100]
-        raise RecordError(where, f"found the columns {names}, expected known ones as in {EXAMPLE}, or a map")
+        raise RecordError(
+            where,
+            f"found the columns {counted_names(found, 8)}, expected known ones as in {EXAMPLE}, or a map "
+            "(`inercal new imu` writes one)",
+        )
     return tuple(channels.values())

@@ -26,6 +26,7 @@ from inercal.records.read.layout import Layout, find_layout, is_rounded
 from inercal.records.read.lines import Block, blocks
 from inercal.records.read.table import FileOptions, Sample, Table
 from inercal.records.record import Array
+from inercal.units import shown
 
 _HEADER_LINES = 50
 _LAYOUT_LINES = 400
@@ -78,7 +79,7 @@ def read(
     if all(np.isnan(column).all() for column in values.values()):
         line = head.lines[layout.first]
         raise RecordError(
-            path, f"no row of numbers, line {layout.first + 1} is {line[:60]!r}, expected numbers"
+            path, f"no row of numbers, line {layout.first + 1} is {shown(line)}, expected numbers"
         )
     count = len(next(iter(values.values())))
     findings = _findings(flaws, tuple(numbers), block, layout.width)
@@ -135,7 +136,9 @@ def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, .
     if not layout.header:
         line = layout.first
         raise RecordError(
-            path, f"line {line + 1}: found {lines[line][:60]!r}, expected a header such as {EXAMPLE}"
+            path,
+            f"line {line + 1}: found {shown(lines[line])}, expected a header such as {EXAMPLE}, "
+            "or a map (`inercal new imu` writes one)",
         )
     return canonical(((index, title, None) for index, title in enumerate(layout.header)), where)
 

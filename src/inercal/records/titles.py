@@ -1,0 +1,104 @@
+"""What the title of a column says: which channel is in it, and in which unit."""
+
+from __future__ import annotations
+
+import re
+
+from inercal.errors import QuantityError
+from inercal.records.channels import is_channel, misfit
+from inercal.units import Unit, parse_unit
+
+_SENSORS = {
+    "acc": r"a|f|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha|beschl"
+    r"|beschleunigung",
+    "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega|drehrate",
+}
+_TIME = r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds"
+_LABEL = r"label|part|section|pose"
+_SPELLED = {
+    "m/s^2": "m_s2|mps2|ms2|m_s_2",
+    "rad/s": "rad_s|radps",
+    "mdeg/s": "mdeg_s",
+    "deg/s": "deg_s|degps",
+}
+_BY_DIMENSION = {"acceleration": "acc", "rate": "gyro", "temperature": "temperature", "time": "t"}
+
+
+def titled(title: str, stated: str | None = None) -> tuple[str | None, str | None]:
+    """The channel and the unit that a title such as ``gyro_x_mdps`` or ``Drehrate X [mdeg/s]`` speaks of.
+
+    A unit stands in brackets, beside the title (``stated``), or behind the last ``_`` or blank. Where the name says
+    nothing, or another quantity than the unit, the channel goes by the unit and by X, Y, Z or 1, 2, 3 in the name.
+
+    Returns
+    -------
+    channel, unit : str or None
+        The unit as it is written, known or not; plainly where a name spells it, as ``acc_x_m_s2``.
+    """
+    match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title.strip())
+    plain, unit = (match[1], match[2] or stated) if match else (title, stated)
+    name = _named(plain)
+    if unit is None:
+        stem, _, suffix = plain.replace(" ", "_").rpartition("_")
+        for spelled, texts in _SPELLED.items():
+            if found := re.fullmatch(rf"(.+)_(?:{texts})", plain):
+                stem, suffix = found[1], spelled
+        if (meant := _named(stem)) and fits(meant, suffix):
+            return meant, suffix
+        return name, None
+    measured = _known(unit)
+    if measured is None or (name is not None and misfit(name, measured) is None):
+        return name, unit
+    return _by_unit(plain, measured), unit
+
+
+def fits(name: str, unit: str) -> bool:
+    """True if there is such a unit and the channel may have it."""
+    known = _known(unit)
+    return known is not None and misfit(name, known) is None
+
+
+def _known(unit: str) -> Unit | None:
+    """The unit, None if there is none such."""
+    try:
+        return parse_unit(unit) if unit else None
+    except QuantityError:
+        return None
+
+
+def _by_unit(plain: str, unit: Unit) -> str | None:
+    """The channel of a quantity, by the axis in the name."""
+    sensor = _BY_DIMENSION.get(unit.dimension)
+    if sensor not in ("acc", "gyro"):
+        return sensor
+    axes = re.findall(r"(?:(?<=[^a-z])|^(?:acc|gyro|a|f|g|w)?)([xyz123])(?![a-z0-9])", _words(plain))
+    return f"{sensor}_{axes[-1].translate(str.maketrans('123', 'xyz'))}" if axes else None
+
+
+def _named(title: str) -> str | None:
+    """The channel a name stands for, if any."""
+    if is_channel(title):
+        return title
+    words = _words(title)
+    if angle := re.fullmatch(r"phi ?([123])", words):
+        return f"phi{angle[1]}"
+    for sensor, names in _SENSORS.items():
+        match = re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz])(?: (?:{names})|{sensor})", words)
+        if match:
+            return f"{sensor}_{match[1] or match[2]}"
+    for channel, names in (
+        ("t", _TIME),
+        ("label", _LABEL),
+        ("temperature", r"temp|temperature|temperatur"),
+        ("position", "position"),
+    ):
+        if re.fullmatch(rf"(?:.* )?(?:{names})", words):
+            return channel
+    return None
+
+
+def _words(title: str) -> str:
+    """A name as words in small letters."""
+    # uT is no u and t
+    words = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])|(?<=[A-Za-z][a-z])(?=[A-Z])", " ", title)
+    return re.sub(r"[^a-z0-9]+", " ", words.lower()).strip()
