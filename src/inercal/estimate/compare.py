@@ -25,6 +25,7 @@ from inercal.estimate.identifiability import in_words
 from inercal.estimate.result import Estimate, Parameter, coverage_factor, provenance
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
+from inercal.records.places import counted_names
 from inercal.units import parse_unit
 
 Array = NDArray[np.float64]
@@ -358,7 +359,7 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
         and any((item.source, item.u) == (other.source, other.u) for other in b.budget)
     ]
     if constant:
-        shown = ", ".join(constant[:6]) + (f" and {len(constant) - 6} more" if len(constant) > 6 else "")
+        shown = counted_names(constant, 6)
         found.append(
             Finding(
                 "perhaps_common",

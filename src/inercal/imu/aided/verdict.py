@@ -13,7 +13,7 @@ from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.aided.misfit import Misfit, variation
 from inercal.records.findings import Finding
-from inercal.records.places import counted
+from inercal.records.places import counted, counted_names
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def verdict(
         if weak:
             return (
                 Status.UNOBSERVABLE,
-                f"the test says next to nothing of {_listed(weak)} ({_least(fit, triad)}): {_cure(fit, triad)}",
+                f"the test says next to nothing of {counted_names(weak)} ({_least(fit, triad)}): {_cure(fit, triad)}",
             )
     for triad in triads:
         known = fit.known[triad]
@@ -110,7 +110,9 @@ def _cure(fit: Fit, triad: str) -> str:
     clipped = of_triad(fit, triad)[0].side.blocks.clipped
     if clipped:
         what = "turn slower" if triad == "gyro" else "avoid knocks"
-        return f"{_listed([f'{triad}_{axis}' for axis in clipped])} saturated, {what} or set a wider range"
+        return (
+            f"{counted_names([f'{triad}_{axis}' for axis in clipped])} saturated, {what} or set a wider range"
+        )
     return _CURE[triad]
 
 
@@ -148,11 +150,6 @@ def _relative(name: str, values: Mapping[str, float], u: Mapping[str, float]) ->
     if name.startswith("G_"):
         return 0.0
     return u[name] / abs(values[name]) if name.startswith(("K1", "S")) else u[name]
-
-
-def _listed(names: list[str]) -> str:
-    """Up to four names."""
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
 
 
 def _least(fit: Fit, triad: str) -> str:
