@@ -19,10 +19,12 @@ SEED, RUNS = 20261121, 500
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("mix", "lost"), [("mems", 0.0), ("counting", 0.0), ("steps", 0.005), ("steps", 0.02)]
+    ("mix", "lost", "least"),
+    [("mems", 0.0, 0.95), ("counting", 0.0, 0.95), ("steps", 0.005, 0.9), ("steps", 0.02, 0.9)],
 )
-def test_intervals_hold_the_truth_as_often_as_they_say(mix, lost):
-    """A coefficient that was not seen counts as a hit where its upper limit holds the truth."""
+def test_intervals_hold_the_truth_as_often_as_they_say(mix, lost, least):
+    """A coefficient that was not seen counts as a hit where its upper limit holds the truth; ``least`` is the share of
+    recordings in which every coefficient of a mix must be seen."""
     task = partial(one_recording, mix, lost)
     sample = run(task, runs=RUNS, seed=SEED, executor=Processes(min(2, os.cpu_count() or 1)))
     truth = {name: getattr(MIXES[mix], name) for name in SYMBOLS}
@@ -34,6 +36,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say(mix, lost):
         half = np.array([coverage_factor(dof, 0.95) for dof in sample["dof"][seen, k]]) * sample["u"][seen, k]
         hits = np.sum(np.abs(sample["error"][seen, k]) <= half)
         hits += np.sum(sample["limit"][~seen, k] >= truth[name])
-        assert np.mean(seen) >= 0.9, name
+        assert np.mean(seen) >= least, name
         assert 0.91 <= hits / RUNS <= 0.984, (name, hits / RUNS)
     assert np.mean(sample["sound"]) > 0.98

@@ -224,6 +224,8 @@ def _assemble(
     A coefficient that a curve does not show has the value 0 and a u by which its upper limit is 1.645 u; it is
     listed in ``result`` with that limit.
     """
+    from scipy.linalg import block_diag
+
     names, units, values, dof = [], [], [], []
     blocks = []
     for channel in channels:
@@ -246,10 +248,6 @@ def _assemble(
                 values.append(0.0)
                 dof.append(np.inf)
         blocks.append(block)
-    covariance = np.zeros((len(names), len(names)))
-    for k, block in enumerate(blocks):
-        own = slice(k * len(SYMBOLS), (k + 1) * len(SYMBOLS))
-        covariance[own, own] = block
     status, message = _verdict(channels, disturbed)
     longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
     return Estimate(
@@ -257,7 +255,7 @@ def _assemble(
         names=tuple(names),
         units=tuple(units),
         values=np.array(values),
-        covariance=covariance,
+        covariance=block_diag(np.zeros((0, 0)), *blocks),
         dof=np.array(dof),
         k=np.array([coverage_factor(nu) for nu in dof]),
         status=status,

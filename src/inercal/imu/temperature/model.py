@@ -91,6 +91,8 @@ def assemble(
     what: str,
 ) -> Estimate:
     """Put the estimate together; quantities count as independent of each other."""
+    from scipy.linalg import block_diag
+
     names: list[str] = []
     units: list[str] = []
     values: list[float] = []
@@ -112,11 +114,6 @@ def assemble(
         if curve.branched is not None:
             names.append(f"{curve.name}_hyst")
             units.append(curve.unit)
-    covariance = np.zeros((len(names), len(names)))
-    at = 0
-    for block in blocks:
-        covariance[at : at + len(block), at : at + len(block)] = block
-        at += len(block)
     low, high = _range(curves)
     more = []
     if not low <= reference <= high:
@@ -128,7 +125,7 @@ def assemble(
         names=tuple(names),
         units=tuple(units),
         values=np.array(values),
-        covariance=covariance,
+        covariance=block_diag(*blocks),
         dof=np.array(dof),
         k=np.array([coverage_factor(each) for each in dof]),
         status=Status.OK,
