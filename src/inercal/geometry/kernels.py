@@ -20,6 +20,9 @@ Array: TypeAlias = NDArray[np.float64]
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
 
+# Below it, four terms of the series of (angle - sin angle) lose less than the closed form does.
+SERIES_ANGLE = 0.1
+
 
 @kernel
 def multiply(p_ab: Quaternion | Array, q_bc: Quaternion | Array) -> Quaternion:
@@ -63,6 +66,43 @@ def exp(rotvec: Vector | Array) -> Quaternion:
     else:
         half_sinc = math.sin(0.5 * angle) / angle
     return math.cos(0.5 * angle), half_sinc * rotvec[0], half_sinc * rotvec[1], half_sinc * rotvec[2]
+
+
+@kernel
+def log(q: Quaternion | Array) -> Vector:
+    """Shortest rotation vector (3,) [rad] of an attitude (4,) of any length but zero; of ``q`` and ``-q`` the same."""
+    sign = -1.0 if q[0] < 0.0 else 1.0
+    w, x, y, z = sign * q[0], sign * q[1], sign * q[2], sign * q[3]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < SMALL_ANGLE * w:
+        tangent2 = (length / w) * (length / w)
+        scale = (2.0 - tangent2 * (2.0 / 3.0 - 0.4 * tangent2)) / w
+    else:
+        scale = 2.0 * math.atan2(length, w) / length
+    return scale * x, scale * y, scale * z
+
+
+@kernel
+def right_jacobian(rotvec: Vector | Array) -> tuple[Vector, Vector, Vector]:
+    """Rows of J (3, 3) with ``exp(rotvec + d) = exp(rotvec) exp(J d)`` to first order in d (Sola 2017, eq. (183)).
+
+    ``J = 1 - (1 - cos a)/a^2 [v]x + (a - sin a)/a^3 [v]x^2`` with a the length of v (3,) [rad].
+    """
+    x, y, z = rotvec[0], rotvec[1], rotvec[2]
+    angle2 = x * x + y * y + z * z
+    if angle2 < SERIES_ANGLE * SERIES_ANGLE:
+        a = 0.5 - angle2 * (1.0 / 24.0 - angle2 * (1.0 / 720.0 - angle2 / 40320.0))
+        b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 * (1.0 / 5040.0 - angle2 / 362880.0))
+    else:
+        angle = math.sqrt(angle2)
+        half_sine = math.sin(0.5 * angle)
+        a = 2.0 * half_sine * half_sine / angle2
+        b = (angle - math.sin(angle)) / (angle * angle2)
+    return (
+        (1.0 - b * (y * y + z * z), b * x * y + a * z, b * x * z - a * y),
+        (b * x * y - a * z, 1.0 - b * (x * x + z * z), b * y * z + a * x),
+        (b * x * z + a * y, b * y * z - a * x, 1.0 - b * (x * x + y * y)),
+    )
 
 
 @kernel

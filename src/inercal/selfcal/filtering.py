@@ -1,0 +1,146 @@
+"""One door to all estimators: a recording and a problem in, what was found out."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.selfcal.filtered import Filtered, History, Problem, Start, State, Trace
+from inercal.selfcal.kinematics import attitude
+from inercal.selfcal.recording import Recording
+from inercal.selfcal.settings import FilterKind
+
+Array = NDArray[np.float64]
+
+LOCK = 0.01
+"""Least |cos thy| at which the gimbal angles of a model can still be used."""
+
+LOST = -1e-9
+"""Eigenvalue of a correlation matrix below which a covariance has lost its sign by more than rounding."""
+
+
+def recursive(kind: FilterKind) -> ModuleType | None:
+    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
+    match kind:
+        case "error-state":
+            from inercal.selfcal import error_state as found
+        case "svd-qukf":
+            from inercal.selfcal import quaternion as found
+        case "mukf":
+            from inercal.selfcal import multiplicative as found
+        case "gimbal-ukf":
+            from inercal.selfcal import gimbal as found
+        case _:
+            return None
+    return found
+
+
+def estimate(
+    recording: Recording,
+    problem: Problem,
+    kind: FilterKind | None = None,
+    start: Start | None = None,
+    history: bool = True,
+) -> Filtered:
+    """Find the coefficients that a recording tells.
+
+    Parameters
+    ----------
+    recording : Recording
+    problem : Problem
+    kind : str, optional
+        Of the estimator; that of the problem if absent.
+    start : Start, optional
+        Of the attitude; the first encoder reading if absent.
+    history : bool
+        Whether to keep what is known after each row.
+    """
+    kind = problem.filter.kind if kind is None else kind
+    module = recursive(kind)
+    if module is None:
+        if kind == "map":
+            from inercal.selfcal.batch import estimate_map as whole
+        else:
+            from inercal.selfcal.start import estimate_lm as whole
+        return whole(recording, problem, start, history)
+    load_kernels(kind, problem)
+    began = time.perf_counter()
+    state: State = module.initial(problem, recording.th[0], start)
+    first = History(
+        _attitude_of(state, problem)[None],
+        np.sqrt(np.diag(state.covariance)[:3])[None],
+        state.coefficients[None].copy(),
+        problem.prior[None].copy(),
+    )
+    state, trace = module.advance(
+        state, problem, recording.dt, recording.rate, recording.acc[1:], recording.th[1:], history
+    )
+    seconds = time.perf_counter() - began
+    size = len(problem.prior)
+    found = Filtered(
+        kind=kind,
+        coefficients=state.coefficients,
+        covariance=state.covariance[-size:, -size:],
+        attitude=_attitude_of(state, problem),
+        nis=trace.nis,
+        dims=trace.dims,
+        innovations=trace.innovations,
+        history=_history(first, trace) if history else None,
+        seconds=seconds,
+        lowest_eigenvalue=trace.lowest_eigenvalue,
+        fallbacks=trace.fallbacks,
+        gimbal_cosine=trace.gimbal_cosine,
+        state=state,
+    )
+    message = _fault(found)
+    return replace(found, converged=False, message=message) if message else found
+
+
+def load_kernels(kind: FilterKind, problem: Problem) -> None:
+    """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
+    module = recursive(kind)
+    if module is not None:
+        none = np.empty((0, 3))
+        module.advance(module.initial(problem, np.zeros(3)), problem, np.empty(0), none, none, none)
+
+
+def _attitude_of(state: State, problem: Problem) -> Array:
+    """q_bp of a state."""
+    if len(state.attitude) == 4:
+        return state.attitude.copy()
+    return np.array(attitude(state.attitude, problem.world.axes, problem.world.signs))
+
+
+def _history(first: History, trace: Trace) -> History:
+    """The start and what followed."""
+    return History(
+        np.concatenate([first.attitude, trace.attitude]),
+        np.concatenate([first.attitude_u, trace.attitude_u]),
+        np.concatenate([first.coefficients, trace.coefficients]),
+        np.concatenate([first.u, trace.u]),
+    )
+
+
+def _fault(found: Filtered) -> str:
+    """Why the numbers of a filter must not be used; empty if they may."""
+    variances = np.diag(found.covariance)
+    if not (np.isfinite(found.coefficients).all() and np.isfinite(found.covariance).all()):
+        at = " where the gimbals lock" if found.gimbal_cosine < LOCK else ""
+        return f"the filter diverged{at}: coefficients or covariance are not finite"
+    if not (variances > 0.0).all() or found.lowest_eigenvalue < LOST:
+        return (
+            "the covariance lost its positive sign (lowest eigenvalue of the correlation matrix "
+            f"{found.lowest_eigenvalue:.1e}): use another filter or factor"
+        )
+    if found.kind == "gimbal-ukf" and found.gimbal_cosine < LOCK:
+        angle = math.degrees(math.acos(found.gimbal_cosine))
+        return (
+            f"the inner gimbal came to {angle:.2f} deg, where outer and platform axis coincide and the gimbal-angle "
+            "model does not hold: use a quaternion filter"
+        )
+    return ""

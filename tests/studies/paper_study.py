@@ -1,0 +1,60 @@
+"""The study of the paper, for tests: its defaults (spec of self-calibration, section 1) as settings."""
+
+import numpy as np
+
+from inercal.geometry.earth import gravity
+from inercal.geometry.site import Site
+from inercal.selfcal.plan import path as named_path
+from inercal.selfcal.settings import Noise, SelfcalSettings
+
+DEG = np.pi / 180.0
+PER_HOUR = DEG / 3600.0
+ARCSEC = DEG / 3600.0
+MICRO_G = 9.80665e-6
+PPM = 1e-6
+
+NOISE = {
+    "low": Noise(1e-4 * DEG / 60.0, 1.0 * MICRO_G, 0.5 * ARCSEC),
+    "nominal": Noise(5e-4 * DEG / 60.0, 10.0 * MICRO_G, 2.0 * ARCSEC),
+    "high": Noise(2e-3 * DEG / 60.0, 50.0 * MICRO_G, 5.0 * ARCSEC),
+}
+
+#: product form: kg0, eta, ds, do, ka0, ka1, kg1, beta
+TRUTH = np.concatenate(
+    [
+        np.array([0.08, -0.06, 0.10]) * PER_HOUR,
+        np.array([60.0, -90.0, 120.0]) * ARCSEC,
+        np.array([60.0, -45.0, 90.0]) * ARCSEC,
+        np.array([-75.0, 50.0, -100.0]) * ARCSEC,
+        np.array([100.0, -150.0, 200.0]) * MICRO_G,
+        np.array([500.0, -300.0, 800.0]) * PPM,
+        np.zeros(6),
+    ]
+)
+
+PRIOR = np.repeat(
+    [
+        0.3 * PER_HOUR,
+        300 * ARCSEC,
+        300 * ARCSEC,
+        300 * ARCSEC,
+        500 * MICRO_G,
+        1500 * PPM,
+        100 * PPM,
+        60 * ARCSEC,
+    ],
+    3,
+)
+
+
+def study(path="paper", noise="nominal", **changes):
+    """Settings of the paper's study with a named path and noise level; ``changes`` are fields of the settings."""
+    latitude = 40.0 * DEG
+    given = {
+        "site": Site(float(gravity(latitude)), (), latitude),
+        "noise": NOISE[noise],
+        "prior": PRIOR,
+        "truth": TRUTH,
+        "plan": named_path(path),
+    }
+    return SelfcalSettings(**(given | changes))
