@@ -27,7 +27,7 @@ Indices: TypeAlias = NDArray[np.int64]
 
 
 def initial(problem: Problem, th: Array, start: Start | None = None) -> State:
-    """The state before the first step: coefficients 0 with the prior, the attitude of angles ``th`` (3,) or ``start``."""
+    """The state before the first step: coefficients 0 with the prior, the attitude that of ``th`` (3,) or ``start``."""
     world, p = problem.world, len(problem.prior)
     covariance = np.zeros((3 + p, 3 + p))
     sigma = problem.noise.encoder if start is None else start.sigma

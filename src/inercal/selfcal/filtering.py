@@ -26,18 +26,23 @@ LOST = -1e-9
 
 def recursive(kind: FilterKind) -> ModuleType | None:
     """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
-    match kind:
-        case "error-state":
-            from inercal.selfcal import error_state as found
-        case "svd-qukf":
-            from inercal.selfcal import quaternion as found
-        case "mukf":
-            from inercal.selfcal import multiplicative as found
-        case "gimbal-ukf":
-            from inercal.selfcal import gimbal as found
-        case _:
-            return None
-    return found
+    if kind == "error-state":
+        from inercal.selfcal import error_state
+
+        return error_state
+    if kind == "svd-qukf":
+        from inercal.selfcal import quaternion
+
+        return quaternion
+    if kind == "mukf":
+        from inercal.selfcal import multiplicative
+
+        return multiplicative
+    if kind == "gimbal-ukf":
+        from inercal.selfcal import gimbal
+
+        return gimbal
+    return None
 
 
 def estimate(
@@ -63,10 +68,10 @@ def estimate(
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
     if module is None:
-        if kind == "map":
-            from inercal.selfcal.batch import estimate_map as whole
-        else:
-            from inercal.selfcal.start import estimate_lm as whole
+        from inercal.selfcal.batch import estimate_map
+        from inercal.selfcal.start import estimate_lm
+
+        whole = estimate_map if kind == "map" else estimate_lm
         return whole(recording, problem, start, history)
     load_kernels(kind, problem)
     began = time.perf_counter()

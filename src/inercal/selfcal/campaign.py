@@ -1,0 +1,214 @@
+"""Monte Carlo of self-calibration: are the stated uncertainties true, and do they reach the bound?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.runs import Threads, run
+from inercal.geometry.rotations import boxminus, conjugate
+from inercal.selfcal.bounds import bounds
+from inercal.selfcal.coefficients import names, product_slope, to_product
+from inercal.selfcal.filtered import Filtered, Problem, problem
+from inercal.selfcal.filtering import estimate, load_kernels
+from inercal.selfcal.settings import FilterKind, SelfcalSettings
+from inercal.selfcal.simulate import Experiment, Simulated, experiment, simulate
+
+if TYPE_CHECKING:
+    from inercal.estimate.coverage import Coverage, Nees
+
+Array = NDArray[np.float64]
+
+AWAY = 0.2
+"""|cos thy| above which rows count for the mean NIS: nearer to gimbal lock the encoder noise is overstated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """What many simulated runs say of one estimator; coefficients in the product form, SI.
+
+    Attributes
+    ----------
+    kind : str
+    names : tuple of str, length p
+    error, u : (runs, p)
+        Estimate less truth, and stated standard uncertainty.
+    joint_error, joint_covariance : (runs, m), (runs, m, m)
+        With the attitude (3) [rad, about the axes of p] before the coefficients, m = 3 + p; of estimators that state
+        none, coefficients alone.
+    bound : (p,)
+        Cramer-Rao bound of the standard uncertainties.
+    nis : (runs,)
+        Mean normalised innovation squared of each run over rows away from gimbal lock; ``rows`` how many, and ``dims``
+        its expectation.
+    converged : (runs,)
+        1 where the estimator said that its numbers can be used.
+    """
+
+    kind: FilterKind
+    names: tuple[str, ...]
+    error: Array
+    u: Array
+    joint_error: Array
+    joint_covariance: Array
+    bound: Array
+    nis: Array
+    rows: float
+    dims: float
+    converged: Array
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.error)
+
+    @property
+    def rms_over_bound(self) -> Array:
+        """(p,) root mean square error over the bound, 1 for an efficient estimator."""
+        return np.asarray(np.sqrt(np.mean(np.square(self.error), axis=0)) / self.bound)
+
+    @property
+    def coverage(self) -> Coverage:
+        """How often 95 % intervals held the truth."""
+        from inercal.estimate.coverage import coverage
+
+        return coverage(self.error, self.u)
+
+    @property
+    def nees(self) -> Nees:
+        """Do the stated covariances match the errors, all together?"""
+        from inercal.estimate.coverage import nees
+
+        return nees(self.joint_error, self.joint_covariance)
+
+    @property
+    def nis_limits(self) -> tuple[float, float]:
+        """Where the mean of ``nis`` lies in 99 of 100 campaigns of a consistent filter."""
+        half = 2.576 * np.sqrt(2.0 * self.dims / (self.rows * self.runs))
+        return self.dims - half, self.dims + half
+
+    def table(self) -> str:
+        """The figures as lines of text."""
+        ratio = "\n".join(
+            f"{name:8s} {value:6.3f}" for name, value in zip(self.names, self.rms_over_bound, strict=True)
+        )
+        low, high = self.nis_limits
+        return "\n".join(
+            [
+                f"{self.kind}: {self.runs} runs, {int(self.converged.sum())} of them converged",
+                self.coverage.table(self.names),
+                self.nees.table(),
+                f"NIS {self.nis.mean():.4f}, expected {low:.4f} to {high:.4f}",
+                "rms error over the bound:",
+                ratio,
+            ]
+        )
+
+
+def campaign(
+    settings: SelfcalSettings,
+    runs: int,
+    seed: int,
+    kind: FilterKind | None = None,
+    workers: int = 2,
+    folder: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Campaign:
+    """Simulate and estimate many times.
+
+    Parameters
+    ----------
+    settings : SelfcalSettings
+        With plan and truth.
+    runs, seed, folder, progress
+        As in `inercal.estimate.runs.run`.
+    kind : str, optional
+        Estimator; that of the study if absent.
+    workers : int
+        Threads; the kernels run side by side.
+
+    Raises
+    ------
+    StudyError
+        The study has no plan or no truth.
+    """
+    of_study, made = problem(settings), experiment(settings)
+    kind = of_study.filter.kind if kind is None else kind
+    load_kernels(kind, of_study)
+    sample = run(
+        partial(one_run, made, of_study, kind),
+        runs=runs,
+        seed=seed,
+        executor=Threads(workers),
+        folder=folder,
+        progress=progress,
+    )
+    truth = settings.truth
+    assert truth is not None
+    size = settings.size
+    return Campaign(
+        kind=kind,
+        names=names(size),
+        error=sample["error"],
+        u=sample["u"],
+        joint_error=sample["joint_error"],
+        joint_covariance=sample["joint_covariance"],
+        bound=bounds(made.motion, of_study, made.truth[:size]).u,
+        nis=sample["nis"],
+        rows=float(sample["rows"].mean()),
+        dims=float(sample["dims"].mean()),
+        converged=sample["converged"],
+    )
+
+
+def one_run(
+    experiment: Experiment, problem: Problem, kind: FilterKind, rng: np.random.Generator
+) -> Mapping[str, Array | float]:
+    """Simulate once, estimate, and compare with the truth; fields of `Campaign` by name."""
+    simulated = simulate(experiment, rng)
+    found = estimate(simulated.recording, problem, kind, history=False)
+    size = len(problem.prior)
+    slope = product_slope(found.coefficients)
+    error = to_product(found.coefficients) - to_product(experiment.truth)[:size]
+    joint_error, joint = _joint(found, simulated, error, slope)
+    away = np.abs(np.cos(simulated.angles[1:, 1])) > AWAY
+    counted = away & np.isfinite(found.nis)
+    return {
+        "error": error,
+        "u": np.sqrt(np.diag(slope @ found.covariance @ slope.T)),
+        "joint_error": joint_error,
+        "joint_covariance": joint,
+        "nis": found.nis[counted].mean() if counted.any() else np.nan,
+        "dims": found.dims[counted].mean() if counted.any() else 0.0,
+        "rows": float(counted.sum()),
+        "converged": float(found.converged),
+    }
+
+
+def _joint(found: Filtered, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
+    """Errors of attitude and coefficients together, and their covariance; the coefficients alone without an attitude."""
+    if found.state is None or len(found.state.attitude) != 4:
+        return error, slope @ found.covariance @ slope.T
+    q, P = found.attitude, found.state.covariance
+    if len(P) == 4 + len(error):
+        # from components of the quaternion to a rotation in p: dtheta = 2 Im(q* dq)
+        to_rotation = np.zeros((3 + len(error), len(P)))
+        to_rotation[:3, :4] = 2.0 * _left(conjugate(q))[1:]
+        to_rotation[3:, 4:] = np.eye(len(error))
+        P = to_rotation @ P @ to_rotation.T
+    whole = np.eye(len(P))
+    whole[3:, 3:] = slope
+    miss = -boxminus(simulated.attitude[-1], q)
+    return np.concatenate([miss, error]), whole @ P @ whole.T
+
+
+def _left(q: Array) -> Array:
+    """(4, 4) matrix of the product with ``q`` from the left."""
+    w, x, y, z = q
+    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])

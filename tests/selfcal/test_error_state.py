@@ -1,0 +1,294 @@
+"""The error-state filter: against a plain matrix twin, against differences of the model, and against its own laws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from paper_study import PRIOR, study
+
+from inercal.geometry.rotations import (
+    boxminus,
+    boxplus,
+    conjugate,
+    exp,
+    log,
+    multiply,
+    rotate,
+    skew,
+    to_matrix,
+)
+from inercal.selfcal import error_state, linearised, model
+from inercal.selfcal.coefficients import names
+from inercal.selfcal.filtered import Start, problem
+from inercal.selfcal.filtering import estimate
+from inercal.selfcal.kinematics import attitude, joint_axes
+from inercal.selfcal.rig import Gimbals
+from inercal.selfcal.settings import Filter
+from inercal.selfcal.simulate import experiment, simulate
+
+EXTENDED = Filter(extended=True)
+
+
+@pytest.fixture(scope="module")
+def short():
+    """The first 60 s and the first turn's end of the paper's path, nominal noise."""
+    settings = study()
+    return simulate(experiment(settings), np.random.default_rng(20261121)).recording
+
+
+def cut(recording, rows):
+    """Rows of a recording, in a piece."""
+    return replace(
+        recording,
+        t=recording.t[rows],
+        th=recording.th[rows],
+        acc=recording.acc[rows],
+        rate=recording.rate[rows][:-1],
+    )
+
+
+# A twin in plain matrices: the same filter, written from the equations.
+
+
+def gyro_matrix(w):
+    """dw / dc (3, 24): change of the platform's rate by the coefficients."""
+    G = np.zeros((3, 24))
+    G[:, 0:3] = np.eye(3)
+    G[0, 6], G[1, 7], G[2, 8] = w[1], w[2], w[0]
+    G[0, 9], G[1, 10], G[2, 11] = -w[2], -w[0], -w[1]
+    G[:, 18:21] = np.diag(w)
+    return G
+
+
+def right_jacobian(r):
+    """Of rotations, by its series."""
+    total, term = np.eye(3), np.eye(3)
+    for k in range(1, 30):
+        term = -term @ skew(r) / (k + 1)
+        total = total + term
+    return total
+
+
+def twin(recording, problem, steps):
+    """State and covariance after some steps, joint update of all six scalars, and the NIS."""
+    world, noise, p = problem.world, problem.noise, len(problem.prior)
+    q = np.array(attitude(recording.th[0], world.axes, world.signs))
+    c, P = np.zeros(p), np.diag(np.concatenate([np.full(3, noise.encoder), problem.prior]) ** 2)
+    nis = []
+    for k in range(steps):
+        dt, w = recording.dt[k], recording.rate[k]
+        full = np.append(c, np.zeros(24 - p))
+        beta = full[21:]
+        earth, up = rotate(exp(beta), world.earth), rotate(exp(beta), world.up)
+        rate = w + gyro_matrix(w) @ full
+        q = multiply(multiply(exp(-earth * dt), q), exp(rate * dt))
+        q = q / np.linalg.norm(q)
+        C = to_matrix(q)
+        left = right_jacobian(-beta)
+        F = np.eye(3 + p)
+        F[:3, :3] = to_matrix(exp(-rate * dt))
+        by_c = right_jacobian(rate * dt) @ gyro_matrix(w) * dt
+        by_c[:, 21:] = C.T @ skew(earth) @ left * dt
+        F[:3, 3:] = by_c[:, :p]
+        P = F @ P @ F.T
+        P[:3, :3] += np.eye(3) * noise.angle_random_walk**2 * dt
+        f = C.T @ up
+        K = np.diag(1.0 + full[15:18]) + np.array([[0, 0, 0], [-full[4], 0, 0], [full[3], -full[5], 0]])
+        H = np.zeros((6, 3 + p))
+        by = np.zeros((3, 24))
+        by[:, 12:15], by[:, 15:18] = np.eye(3), np.diag(f)
+        by[1, 4], by[2, 3], by[2, 5] = -f[0], f[0], -f[1]
+        by[:, 21:] = -K @ C.T @ skew(up) @ left
+        H[:3, :3], H[:3, 3:] = K @ skew(f), by[:, :p]
+        H[3:, :3] = np.eye(3)
+        J = np.array(joint_axes(recording.th[k + 1], world.axes, world.signs)).T
+        R = np.zeros((6, 6))
+        R[:3, :3] = np.eye(3) * noise.accelerometer**2
+        R[3:, 3:] = noise.encoder**2 * (J @ J.T + 0.05**2 * np.eye(3))
+        measured = np.array(attitude(recording.th[k + 1], world.axes, world.signs))
+        z = np.concatenate(
+            [recording.acc[k + 1] - full[12:15] - K @ f, log(multiply(conjugate(q), measured))]
+        )
+        kept = np.isfinite(z)
+        z, H, R = z[kept], H[kept], R[np.ix_(kept, kept)]
+        S = H @ P @ H.T + R
+        gain = np.linalg.solve(S, H @ P).T
+        x = gain @ z
+        nis.append(z @ np.linalg.solve(S, z))
+        P = (np.eye(3 + p) - gain @ H) @ P @ (np.eye(3 + p) - gain @ H).T + gain @ R @ gain.T
+        q, c = boxplus(q, x[:3]), c + x[3:]
+    return q, c, P, np.array(nis)
+
+
+@pytest.mark.parametrize("extended", [False, True])
+def test_the_kernel_is_its_matrix_twin(short, extended):
+    """Apart by rounding alone: 1e-7 of a standard deviation after 400 steps, over a change of turns."""
+    of = replace(problem(study(filter=EXTENDED if extended else Filter())))
+    recording = cut(short, np.r_[700:1101])
+    recording.acc[5], recording.th[50] = np.nan, np.nan
+    recording.acc[80, 1] = np.nan
+    found = estimate(recording, of)
+    q, c, P, nis = twin(recording, of, 400)
+    sigma = np.sqrt(np.diag(P))
+    assert np.abs((found.coefficients - c) / sigma[3:]).max() < 1e-7
+    assert np.abs(boxminus(found.attitude, q) / sigma[:3]).max() < 1e-7
+    assert np.abs(found.state.covariance / np.outer(sigma, sigma) - P / np.outer(sigma, sigma)).max() < 1e-7
+    assert found.nis == pytest.approx(nis, rel=1e-6)
+
+
+def random_case(seed):
+    """Attitude, coefficients of rough size, rate, and vectors of the base."""
+    rng = np.random.default_rng(seed)
+    q = rng.standard_normal(4)
+    c = 0.03 * rng.standard_normal(24)
+    return q / np.linalg.norm(q), c, rng.uniform(-1.0, 1.0, 3), rng.standard_normal(3), rng
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("turn", [1e-6, 1e-3])
+def test_the_transition_is_the_derivative_of_the_step(seed, turn):
+    """Differences of the exact step over errors of attitude and coefficients, at rates of radians per step.
+
+    ``turn`` [rad] is about that of the earth in a step: 1.5e-5 in 0.2 s.
+    """
+    q, c, w, _, rng = random_case(seed)
+    earth, dt = turn * rng.standard_normal(3), 0.7
+
+    def step(error):
+        moved = c + error[3:]
+        start = boxplus(q, error[:3])
+        end = model.propagate(start, model.platform_rate(w, moved), model.on_the_base(earth, moved), dt)
+        return np.array(end)
+
+    h, base = 1e-6, step(np.zeros(27))
+    F = np.eye(27)
+    for k in range(27):
+        e = np.zeros(27)
+        e[k] = h
+        F[:3, k] = (boxminus(step(e), base) - boxminus(step(-e), base)) / (2 * h)
+    A = rng.standard_normal((27, 27))
+    P = A @ A.T
+    expected = F @ P @ F.T + np.diag(np.r_[np.full(3, 0.4), np.zeros(24)])
+    rate, earth_e = model.platform_rate(w, c), model.on_the_base(earth, c)
+    linearised.propagate_covariance(P, c, tuple(w), rate, earth_e, tuple(base), dt, 0.4, np.empty((6, 27)))
+    # the kernel takes the earth's turn within a step for small
+    assert np.abs(P - expected).max() < 10.0 * turn * np.abs(expected).max()
+    assert np.array_equal(P, P.T)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_accelerometer_rows_are_derivatives(seed):
+    """Differences of the outputs over all errors, beta among them, at attitudes of any kind."""
+    q, c, _, up, _ = random_case(seed)
+
+    def read(error):
+        moved = c + error[3:]
+        f = model.specific_force(tuple(boxplus(q, error[:3])), model.on_the_base(up, moved))
+        return np.array(model.accelerometers(f, moved))
+
+    h = 1e-6
+    differences = np.stack([(read(e) - read(-e)) / (2 * h) for e in h * np.eye(27)], axis=1)
+    up_e = model.on_the_base(up, c)
+    f = model.specific_force(tuple(q), up_e)
+    for i in range(3):
+        places, row = np.empty(10, dtype=np.int64), np.empty(10)
+        count = linearised.accelerometer_row(i, f, c, up_e, tuple(q), places, row)
+        whole = np.zeros(27)
+        whole[places[:count]] = row[:count]
+        assert whole == pytest.approx(differences[i], abs=1e-8)
+
+
+def test_encoder_covariance_is_that_of_small_angle_errors():
+    """Noise of the three angles, put through the rig, has covariance sigma^2 J J^T about the axes of p."""
+    rig = Gimbals()
+    th, sigma = np.array([0.4, 0.7, -1.1]), 1e-5
+    rng = np.random.default_rng(20261121)
+    q = np.array(attitude(th, rig.index, rig.sign))
+    drawn = th + sigma * rng.standard_normal((20000, 3))
+    miss = np.array([boxminus(np.array(attitude(each, rig.index, rig.sign)), q) for each in drawn])
+    roots, variances = linearised.encoder_roots(th, rig.index, rig.sign, sigma)
+    L = np.linalg.inv(np.array(roots))
+    stated = L @ L.T - (linearised.FLOOR * sigma) ** 2 * np.eye(3)
+    assert np.diag(L @ L.T) == pytest.approx(np.array(variances))
+    # standard errors of a covariance of n samples
+    se = np.sqrt((np.outer(np.diag(stated), np.diag(stated)) + stated**2) / len(drawn))
+    assert (np.abs(np.cov(miss.T) - stated) < 5 * se).all()
+
+
+@pytest.mark.parametrize("extended", [False, True])
+def test_sample_by_sample_gives_the_same_digits(short, extended):
+    """What a stream computes is what a batch computes."""
+    of = problem(study(filter=EXTENDED if extended else Filter()))
+    recording = cut(short, np.r_[800:1000])
+    whole, _ = error_state.advance(
+        error_state.initial(of, recording.th[0]),
+        of,
+        recording.dt,
+        recording.rate,
+        recording.acc[1:],
+        recording.th[1:],
+    )
+    state = error_state.initial(of, recording.th[0])
+    for k in range(199):
+        one = slice(k, k + 1)
+        state, _ = error_state.advance(
+            state,
+            of,
+            recording.dt[one],
+            recording.rate[one],
+            recording.acc[1:][one],
+            recording.th[1:][one],
+            False,
+        )
+    for a, b in zip(whole, state, strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_full_turns_of_an_encoder_change_nothing(short):
+    """An angle is an angle: 2 pi jumps of encoders leave every digit but rounding."""
+    of = problem(study())
+    jumped = replace(short, th=np.mod(short.th, 2 * np.pi))
+    plain, other = estimate(short, of), estimate(jumped, of)
+    assert (
+        np.abs(other.coefficients - plain.coefficients).max()
+        < 1e-6 * np.sqrt(np.diag(plain.covariance)).max()
+    )
+    assert other.nis_mean == pytest.approx(plain.nis_mean, rel=1e-6)
+
+
+def test_nothing_measured_leaves_the_prior():
+    """Without measurements after the start the coefficients stay at 0 with their prior, and nothing is counted."""
+    settings = study()
+    recording = simulate(experiment(settings), np.random.default_rng(1)).recording
+    blind = replace(recording, acc=np.full_like(recording.acc, np.nan), th=np.full_like(recording.th, np.nan))
+    blind.th[0] = recording.th[0]
+    found = estimate(blind, problem(settings))
+    assert np.array_equal(found.coefficients, np.zeros(18))
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(PRIOR[:18])
+    assert not found.dims.any()
+    assert np.isnan(found.nis).all()
+
+
+def test_a_start_of_one_s_own_is_taken(short):
+    """A start 1 deg off with that standard deviation ends within 4 sigma of the one from the encoders."""
+    of = problem(study())
+    q = np.array(attitude(short.th[0], of.world.axes, of.world.signs))
+    off = Start(boxplus(q, np.radians([0.6, -0.6, 0.5])), float(np.radians(1.0)))
+    found, plain = estimate(short, of, start=off), estimate(short, of)
+    sigma = np.sqrt(np.diag(plain.covariance))
+    assert np.abs((found.coefficients - plain.coefficients) / sigma).max() < 4.0
+    assert len(names(18)) == len(sigma)
+
+
+@pytest.mark.parametrize(("rule", "few"), [("any", 0.0), ("two", 0.4), ("channel", 0.4)])
+def test_near_level_gating(short, rule, few):
+    """On the paper's path one axis is level at any time: rule `any` never admits an accelerometer, the others do."""
+    from inercal.selfcal.settings import Gating
+
+    of = problem(study(filter=Filter(gating=Gating(rule))))
+    found, plain = estimate(short, of), estimate(short, problem(study()))
+    used = np.isfinite(found.innovations[:, :3]).mean()
+    assert used <= few if rule == "any" else few < used < 1.0
+    assert np.isfinite(found.innovations[:, 3:]).all()  # encoders go on
+    # leaving out measurements never makes a coefficient better known
+    assert (np.diag(found.covariance) >= np.diag(plain.covariance) * (1 - 1e-9)).all()
