@@ -159,7 +159,7 @@ def campaign(
         u=sample["u"],
         joint_error=sample["joint_error"],
         joint_covariance=sample["joint_covariance"],
-        bound=bounds(made.motion, of_study, made.truth[:size]).u,
+        bound=bounds(made.motion, of_study, truth).u,
         nis=sample["nis"],
         rows=float(sample["rows"].mean()),
         dims=float(sample["dims"].mean()),
