@@ -93,6 +93,47 @@ def identify(J: Array, names: Sequence[str], sizes: Array | None = None) -> Iden
     return Identifiability(tuple(names), values, vt, u, scale, int(np.sum(values > tolerance)))
 
 
+@dataclass(frozen=True)
+class Learned:
+    """What data have added to a prior: principal axes of the covariance in units of the prior.
+
+    ``left`` (p,) descending, the part of its prior standard deviation that is left of a combination; ``directions``
+    (p, p), row i the combination of parameters, each over its own prior, that belongs to part i; ``ratio`` (p,) the
+    part left of each parameter by itself.
+    """
+
+    names: tuple[str, ...]
+    left: Array
+    directions: Array
+    ratio: Array
+
+    @property
+    def singular_values(self) -> Array:
+        """(p,) rising: those of the whitened Jacobian of the data, with parameters in units of the prior."""
+        return np.sqrt(np.maximum(1.0 / np.square(self.left) - 1.0, 0.0))
+
+    @property
+    def condition(self) -> float:
+        """Part left of the worst-known combination over that of the best-known."""
+        return float(self.left[0] / self.left[-1])
+
+    def at_prior(self, part: float = 0.5) -> tuple[str, ...]:
+        """Names of the parameters of which more than this part of the prior is left."""
+        return tuple(name for name, ratio in zip(self.names, self.ratio, strict=True) if ratio > part)
+
+    def weakest(self, count: int = 1) -> tuple[str, ...]:
+        """The worst-known combinations in words; terms count by their size over the prior."""
+        return tuple(in_words(direction, self.names) for direction in self.directions[:count])
+
+
+def learned(covariance: Array, prior: Array, names: Sequence[str]) -> Learned:
+    """Set what is known after the data, ``covariance`` (p, p), against ``prior`` (p,) standard deviations."""
+    scaled = covariance / np.outer(prior, prior)
+    values, vectors = np.linalg.eigh(scaled)
+    left = np.sqrt(np.maximum(values[::-1], np.finfo(float).tiny))
+    return Learned(tuple(names), left, vectors.T[::-1], np.sqrt(np.diag(scaled)))
+
+
 def in_words(direction: Array, names: Sequence[str], smallest: float = 0.3) -> str:
     """A combination in words: its terms by size, those of at least ``smallest`` of the largest."""
     order = np.argsort(-np.abs(direction))

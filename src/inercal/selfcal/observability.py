@@ -1,0 +1,118 @@
+"""What a path cannot see, for reports: bounds against prior and goal, the worst combinations in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TypeAlias, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.identifiability import Learned, learned
+from inercal.records.findings import Finding
+from inercal.selfcal.bounds import Bounds, bounds
+from inercal.selfcal.coefficients import units
+from inercal.selfcal.filtered import Problem
+from inercal.selfcal.plan import Motion
+from inercal.selfcal.settings import Gating
+
+Array: TypeAlias = NDArray[np.float64]
+
+AT_PRIOR = 0.5
+"""Part of its prior above which a coefficient counts as left at it."""
+
+UNOBSERVABLE = 0.9
+"""Part of its prior above which a path says nothing about a coefficient."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A path judged by its bounds.
+
+    ``learned`` against the prior; ``to_goal`` u over the wanted u, by name, of those coefficients that have a goal.
+    """
+
+    bounds: Bounds
+    learned: Learned
+    to_goal: Mapping[str, float]
+
+    @property
+    def rank(self) -> int:
+        """Number of combinations of coefficients of which the path tells something."""
+        return int(np.sum(self.learned.left <= UNOBSERVABLE))
+
+    @property
+    def at_prior(self) -> tuple[str, ...]:
+        """Names of the coefficients that the path leaves at their prior."""
+        return self.learned.at_prior(AT_PRIOR)
+
+    @property
+    def unmet(self) -> tuple[str, ...]:
+        """Names of the coefficients whose goal the path does not reach."""
+        return tuple(name for name, ratio in self.to_goal.items() if ratio > 1.0)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What the path cannot see: one for each coefficient at its prior, or wider than wanted."""
+        u = dict(zip(self.bounds.names, self.bounds.u, strict=True))
+        ratio = dict(zip(self.bounds.names, self.learned.ratio, strict=True))
+        unit = dict(zip(self.bounds.names, units(len(u)), strict=True))
+        left = [
+            Finding(
+                "at_prior",
+                f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]:.2g} {unit[name]}",
+            )
+            for name in self.at_prior
+        ]
+        wide = [
+            Finding(
+                "weak_term",
+                f"{name}: the path leaves u = {u[name]:.2g} {unit[name]}, {self.to_goal[name]:.3g} times the goal",
+            )
+            for name in self.unmet
+            if name not in self.at_prior
+        ]
+        return (*left, *wide)
+
+    def worst(self, count: int = 3) -> list[str]:
+        """The worst-known combinations in words, with what is left of the prior of each."""
+        weakest = self.learned.weakest(count)
+        return [
+            f"{words}: {100 * left:.3g} %" for words, left in zip(weakest, self.learned.left, strict=False)
+        ]
+
+    def table(self) -> str:
+        """Bounds, what is left of the prior, and what the goal asks, as aligned text."""
+        lines = [f"{'':<7}  {'bound u':>9}  {'unit':<7} {'of prior':>9}  {'of goal':>8}"]
+        rows = zip(
+            self.bounds.names, self.bounds.u, units(len(self.bounds.names)), self.learned.ratio, strict=True
+        )
+        for name, u, unit, ratio in rows:
+            goal = f"{self.to_goal[name]:8.3g}" if name in self.to_goal else "       –"
+            lines.append(f"{name:<7}  {u:9.2g}  {unit:<7} {100 * ratio:7.3g} %  {goal}")
+        return "\n".join(lines)
+
+
+def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:
+    """Judge a path; ``goal`` wanted standard uncertainty [SI] by name of coefficient."""
+    to_goal = {
+        name: float(u / goal[name]) for name, u in zip(bounds.names, bounds.u, strict=True) if name in goal
+    }
+    return Seen(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
+
+
+def gating_costs(
+    motion: Motion, problem: Problem, truth: Array | None = None
+) -> dict[tuple[str, str], Array]:
+    """What near-level gating costs: (rule, what it stops) -> u over that without gating (p,), each at least 1."""
+    kinds = get_type_hints(Gating)
+
+    def u(gating: Gating | None) -> Array:
+        return bounds(motion, replace(problem, filter=replace(problem.filter, gating=gating)), truth).u
+
+    free = u(None)
+    return {
+        (rule, stops): u(Gating(rule, stops)) / free
+        for rule in get_args(kinds["rule"])
+        for stops in get_args(kinds["stops"])
+    }
