@@ -1,0 +1,51 @@
+"""Are the stated uncertainties of self-calibration true, and do they reach the bound? A campaign of simulated runs.
+
+    python benchmarks/selfcal_coverage.py --study STUDY.toml --runs 1000 --filter error-state
+
+Without a study it is the paper's (`inercal examples selfcal`). An interrupted campaign with --folder goes on where it
+stopped. Its results are kept in docs/design/self-calibration-coverage.md.
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from inercal.examples import FOLDER
+from inercal.selfcal.campaign import campaign
+from inercal.selfcal.settings import KINDS
+from inercal.study.load import load_selfcal_study
+
+SEED = 20261121
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--study", type=Path, help="study with plan and truth")
+    parser.add_argument("--runs", type=int, default=1000)
+    parser.add_argument("--filter", choices=KINDS, default="error-state")
+    parser.add_argument("--set", action="append", default=[], help="override one key of the study: key=value")
+    parser.add_argument("--folder", type=Path, help="keep finished chunks here")
+    options = parser.parse_args()
+
+    settings = load_selfcal_study(options.study or FOLDER / "selfcal.toml", options.set)
+    began = time.perf_counter()
+    found = campaign(
+        settings,
+        options.runs,
+        SEED,
+        options.filter,
+        workers=os.cpu_count() or 1,
+        folder=options.folder,
+        progress=lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr, flush=True),
+    )
+    print(file=sys.stderr)
+    print(found.table())
+    print(f"{options.runs / (time.perf_counter() - began):.0f} runs/s on {os.cpu_count()} cores, simulation included")
+
+
+if __name__ == "__main__":
+    main()
