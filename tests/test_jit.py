@@ -70,8 +70,9 @@ from inercal.geometry import kernels
 q, v = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
 kernels.multiply(q, q), kernels.normalize(q), kernels.rotate(q, v), kernels.exp(v), kernels.step(q, v, 0.1)
 kernels.integrate(q, np.zeros((1, 3)), np.zeros(1), np.zeros((2, 4)))
+kernels.log(q), kernels.right_jacobian(v)
 every = [value for value in vars(kernels).values() if hasattr(value, "stats")]
-assert len(every) == 6 and all(kernel.signatures for kernel in every)
+assert len(every) == 8 and all(kernel.signatures for kernel in every)
 print(sum(sum(kernel.stats.cache_misses.values()) for kernel in every))
 """
     here = {"path": tmp_path, "XDG_CACHE_HOME": tmp_path / "cache"}

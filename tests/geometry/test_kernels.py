@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import expm
 
 from inercal.geometry import kernels, rotations
 
@@ -39,6 +40,37 @@ def test_rotate_agrees():
     v = RNG.normal(size=ROTVECS.shape)
     got = [kernels.rotate(q, row) for q, row in zip(QUATERNIONS, v, strict=True)]
     assert_allclose(got, rotations.rotate(QUATERNIONS, v), atol=8 * EPS)
+
+
+def test_log_agrees_relatively_also_for_tiny_angles_and_either_sign():
+    for q in (QUATERNIONS, -QUATERNIONS, 3.0 * QUATERNIONS):
+        assert_allclose([kernels.log(row) for row in q], rotations.log(q), rtol=8 * EPS, atol=1e-200)
+
+
+def right_jacobian(rotvec):
+    """The twin: expm of an augmented skew matrix holds its integral, J = int_0^1 exp(-s [v]x) ds."""
+    x, y, z = rotvec
+    block = np.zeros((6, 6))
+    block[:3, :3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    block[:3, 3:] = np.eye(3)
+    return expm(block)[:3, 3:]
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-9, 1e-3, 0.0999999, 0.1000001, 1.0, 3.0, 6.0])
+def test_right_jacobian_is_the_mean_of_the_turn_back(length):
+    for direction in rotations.normalize(RNG.normal(size=(5, 4)))[:, :3]:
+        v = length * direction / np.linalg.norm(direction)
+        assert_allclose(kernels.right_jacobian(v), right_jacobian(v), rtol=1e-13, atol=20 * EPS)
+
+
+def test_right_jacobian_is_how_a_rotation_answers_to_its_vector():
+    """exp(v + d) = exp(v) exp(J d) to first order."""
+    for v in ROTVECS:
+        d = 1e-6 * RNG.normal(size=3)
+        ends = [kernels.exp(v + d), kernels.exp(v - d)]
+        found = 0.5 * rotations.boxminus(*ends)
+        middle = np.array(kernels.right_jacobian(v)) @ d
+        assert_allclose(found, middle, atol=1e-15)
 
 
 def test_step_agrees():

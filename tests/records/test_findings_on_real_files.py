@@ -86,7 +86,18 @@ OF_FERRARIS = {
     ("outlier", "gyro_x", "row 5052"),
     ("outlier", "gyro_y", "row 5053"),
 }
-TRUE_OF = {"mpu6050": OF_MPU, "ferraris": OF_FERRARIS, "ferraris-si": {("outlier", "acc_y", "row 7685")}}
+#: by the contract of these records: rates act to the next row, and accelerometers are not used at the start
+OF_SELFCAL = {
+    ("nan", f"{sensor}_{axis}", where)
+    for sensor, where in (("wc", "line 2702"), ("acc", "line 2"))
+    for axis in "xyz"
+}
+TRUE_OF = {
+    "mpu6050": OF_MPU,
+    "ferraris": OF_FERRARIS,
+    "ferraris-si": {("outlier", "acc_y", "row 7685")},
+    "selfcal": OF_SELFCAL,
+}
 
 
 @pytest.mark.parametrize("example", EXAMPLES.values(), ids=EXAMPLES)

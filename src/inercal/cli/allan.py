@@ -23,6 +23,7 @@ def allan(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Tell the noise of an instrument at rest."""
+    from inercal._files import write_text
     from inercal.noise.outcome import noise_of, within
     from inercal.report.allan import curves_csv, page, table
     from inercal.units import parse_quantity
@@ -42,5 +43,10 @@ def allan(
     estimate = replace(noise.estimate, timing=timing)
     noise = replace(noise, estimate=estimate)
     return hand_over(
-        estimate, [table(noise)], lambda: page(noise), output, "noise", lambda: curves_csv(noise)
+        estimate,
+        [table(noise)],
+        lambda: page(noise),
+        output,
+        "noise",
+        lambda path: write_text(path, curves_csv(noise)),
     )

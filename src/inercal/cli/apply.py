@@ -13,11 +13,13 @@ from inercal.errors import InputError, UsageError
 from inercal.records.findings import Finding
 
 if TYPE_CHECKING:
-    from inercal.convert.correct import ImuModel
+    from inercal.convert.correct import Model
 
 
 def apply(
-    calibration: Annotated[Path, Parameter(help="Calibration that `inercal calibrate --out` wrote.")],
+    calibration: Annotated[
+        Path, Parameter(help="Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out.")
+    ],
     files: Annotated[
         list[Path] | None, Parameter(help="Recordings; several files with distinct channels are one record.")
     ] = None,
@@ -68,13 +70,18 @@ def apply(
     output.emit(envelope("apply", words, result, inputs, findings), words)
 
 
-def _model(calibration: Path) -> tuple[ImuModel, tuple[Finding, ...]]:
+def _model(calibration: Path) -> tuple[Model, tuple[Finding, ...]]:
     """The instrument of a calibration, and what to say of that: a bad verdict, terms that are not applied."""
-    from inercal.convert.correct import imu_model, not_applied
+    from inercal.convert import correct, platform
     from inercal.estimate.exchange import load
     from inercal.estimate.status import Status
 
     estimate = load(calibration)
     verdict = f"the calibration ended {estimate.status.value}: {estimate.message}"
     bad = () if estimate.status is Status.OK else (Finding("bad_verdict", verdict, str(calibration)),)
-    return imu_model(estimate, calibration), (*bad, *not_applied(estimate, calibration))
+    if estimate.command == platform.COMMAND:
+        return platform.platform_model(estimate, calibration), (
+            *bad,
+            *platform.not_applied(estimate, calibration),
+        )
+    return correct.imu_model(estimate, calibration), (*bad, *correct.not_applied(estimate, calibration))

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from cyclopts import Parameter
-
 from inercal.cli.options import MapFile, Output
-from inercal.cli.streaming import StreamFile, StreamOptions, run_stream
-from inercal.errors import InputError
+from inercal.cli.streaming import Every, StreamFile, StreamOptions, interval_of, run_stream
 
 
 def monitor(
@@ -16,9 +11,7 @@ def monitor(
     /,
     *,
     map_file: MapFile = None,
-    every: Annotated[
-        str | None, Parameter(help='Time from one line out to the next, such as "1 s"; each row if absent.')
-    ] = None,
+    every: Every = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
@@ -26,11 +19,8 @@ def monitor(
     from inercal._jit import compiling
     from inercal.noise.running import load_kernels
     from inercal.stream.monitor import Monitor
-    from inercal.units import parse_quantity
 
-    interval = 0.0 if every is None else parse_quantity(every, "time", "--every").value
-    if every is not None and interval <= 0.0:
-        raise InputError("--every", f"found {every}, expected a time above 0")
+    interval = interval_of(every)
     streaming.check(output, (file, map_file))
     with compiling("monitor", output.say):
         load_kernels()

@@ -43,6 +43,17 @@ def new_turntable(files: Recordings = None, /, *, output: FileOutput = FileOutpu
     _new("turntable", files or [], output, partial(turntable_template, channels=channels), column_map)
 
 
+def new_selfcal(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -> None:  # noqa: B008
+    """Write a study of a self-calibration, and a map guessed from recordings that do not say what they hold."""
+    from inercal.records.guess import guess_map
+    from inercal.records.read import canonical_units
+    from inercal.study.template import selfcal_template
+
+    channels = (canonical_units(files) if files else None) or {}
+    column_map = guess_map(files) if files and "th_x" not in channels else None
+    _new("selfcal", files or [], output, selfcal_template, column_map)
+
+
 def _mapped(column_map: str) -> list[str]:
     """The channels of a map."""
     import tomllib

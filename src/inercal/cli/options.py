@@ -49,7 +49,9 @@ class Output:
         False
     )
     quiet: Annotated[bool, Parameter(help="No messages and no progress on standard error.")] = False
-    _unsaid: list[str] = field(default_factory=list, init=False, repr=False, compare=False)
+    _unsaid: Annotated[list[str], Parameter(parse=False)] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     def say(self, text: str) -> None:
         """A message for people, on standard error; beside JSON once that is out, for an error must stand alone."""

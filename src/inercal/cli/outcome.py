@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from inercal.cli import EXIT_BAD_VERDICT
@@ -18,20 +19,20 @@ def hand_over(
     page: Callable[[], str],
     output: ReportOutput,
     what: str = "calibration",
-    curves: Callable[[], str] | None = None,
+    write: Callable[[Path], None] | None = None,
 ) -> int:
     """Write what was asked for, say the verdict, and give the exit code.
 
-    People see the ``tables`` that are not empty; ``what`` the file is, in a word, and ``curves`` is its text where a
-    .csv was asked for.
+    People see the ``tables`` that are not empty; ``what`` the file is, in a word. ``write`` writes it where its
+    suffix is neither .json nor .toml.
     """
     from inercal._files import write_text
     from inercal.estimate.exchange import save, to_json
     from inercal.estimate.status import Status
 
     if output.out is not None:
-        if curves is not None and output.out.suffix.lower() == ".csv":
-            write_text(output.out, curves())
+        if write is not None and output.out.suffix.lower() not in (".json", ".toml"):
+            write(output.out)
         else:
             save(estimate, output.out)
     if output.report is not None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import abandon_output
-from inercal.cli.options import FileOutput, Output
+from inercal.cli.options import FileOutput, Output, ReportOutput
 from inercal.errors import InputError, RecordError
 
 if TYPE_CHECKING:
@@ -26,6 +26,21 @@ _STANDARD_INPUT = "standard input"
 StreamFile = Annotated[
     Path | None, Parameter(help="Recording, pipe or device to read lines from; standard input if absent.")
 ]
+
+
+Every = Annotated[
+    str | None, Parameter(help='Time from one line out to the next, such as "1 s"; each row if absent.')
+]
+
+
+def interval_of(every: str | None) -> float:
+    """The interval [s] that `Every` states, 0 if absent; raises `InputError`."""
+    from inercal.units import parse_quantity
+
+    interval = 0.0 if every is None else parse_quantity(every, "time", "--every").value
+    if every is not None and interval <= 0.0:
+        raise InputError("--every", f"found {every}, expected a time above 0")
+    return interval
 
 
 @Parameter(name="*")
@@ -40,7 +55,11 @@ class StreamOptions:
 
     def check(self, output: Output, inputs: Iterable[Path | None]) -> None:
         """Fail before any work is done where lines or state could not be written; raises `InputError`."""
-        given = {"--json": output.json, "--out": isinstance(output, FileOutput) and output.out is not None}
+        given = {
+            "--json": output.json,
+            "--out": isinstance(output, FileOutput) and output.out is not None,
+            "--report": isinstance(output, ReportOutput) and output.report is not None,
+        }
         for option in (name for name, there in given.items() if there):
             raise InputError(option, "found with a stream, expected its lines on standard output and no more")
         if self.checkpoint_every < 1:

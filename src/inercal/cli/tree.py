@@ -27,6 +27,13 @@ COMMANDS = {
         "Nothing that exists is overwritten.",
         "inercal new turntable --out turntable.toml",
     ),
+    ("new", "selfcal"): (
+        "inercal.cli.new:new_selfcal",
+        "Write a commented study of a self-calibration: of its simulation, path design and estimation.\n\nGiven a "
+        "recording whose header does not say quantities and units, also a column map guessed from it. The study goes "
+        "to --out (selfcal.toml if absent), the map beside it (selfcal-map.toml). Nothing that exists is overwritten.",
+        "inercal new selfcal --out selfcal.toml",
+    ),
     ("inspect", ""): (
         "inercal.cli.inspect:inspect",
         "Look at a recording before it is used.\n\nChannels, units, rates, and everything suspicious about it; "
@@ -49,6 +56,17 @@ COMMANDS = {
         "the verdict is not ok.",
         "inercal calibrate turntable test.csv --study turntable.toml",
     ),
+    ("selfcal", ""): (
+        "inercal.cli.selfcal:selfcal",
+        "Calibrate a gimbaled platform, or hybrid system, from a recording made while it turns.\n\nGives bias, "
+        "misalignment and scale factor of gyros and accelerometers with uncertainties, and what the path could not "
+        "tell. --filter chooses the estimator, --compare runs all. --out saves the coefficients (.json or .toml), or "
+        "their histories: attitude, coefficients with u, and NIS of each row (.csv, .npz, .h5, .parquet or .nc). "
+        "--report writes a page to hand over. With --stream CSV lines come in, from FILE or standard input, and the "
+        "lines of that history go out, live; with --checkpoint the same command goes on where it was stopped. Exit "
+        "code 1: done, but the verdict is not ok.",
+        "inercal selfcal platform.csv --study selfcal.toml --report selfcal.html",
+    ),
     ("allan", ""): (
         "inercal.cli.allan:allan",
         "Tell the noise of an instrument from a recording at rest.\n\nOverlapping Allan deviation of each channel with "
@@ -70,12 +88,27 @@ COMMANDS = {
         "field.\n\n--out writes the positions (.csv) or the whole result (.json), --report a page with pictures.",
         "inercal design positions turntable.toml --out positions.csv",
     ),
+    ("design", "selfcal"): (
+        "inercal.cli.design:design_selfcal",
+        "Find the path on which a platform calibrates itself best, and compare it with others of the same "
+        "time.\n\nBounds of all coefficients before the test, within rate, time and limits of the gimbals. --out "
+        "writes the path as the table [plan] of a study (.toml) or the whole result (.json), --report a page with "
+        "pictures.",
+        "inercal design selfcal selfcal.toml --out plan.toml",
+    ),
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",
         "Simulate a test on a turntable, with the errors of the table and the noise of the instrument.\n\nThe study "
         "states the true coefficients under [instrument.coefficients]. The recording goes to --out (.csv, "
         ".npz, .h5, .parquet or .nc).",
         "inercal simulate turntable turntable.toml --seed 1 --out test.csv",
+    ),
+    ("simulate", "selfcal"): (
+        "inercal.cli.simulate:simulate_selfcal",
+        "Simulate a platform in gimbals that turns through the plan of a study.\n\nThe study states the true "
+        "coefficients under [truth], and under [disturbances] what real rigs add. The recording goes to --out (.csv, "
+        ".npz, .h5, .parquet or .nc): commanded rates, gimbal angles, accelerometers.",
+        "inercal simulate selfcal selfcal.toml --seed 1 --out platform.csv",
     ),
     ("temperature", ""): (
         "inercal.cli.temperature:temperature",
@@ -87,8 +120,10 @@ COMMANDS = {
     ("apply", ""): (
         "inercal.cli.apply:apply",
         "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv, "
-        ".npz, .h5, .parquet or .nc). With --invert the recording holds true values and the outputs of the instrument "
-        "are written. With --stream CSV lines come in on standard input and corrected ones go out, each at once.",
+        ".npz, .h5, .parquet or .nc). A self-calibration makes of wanted rates (wc) commands that turn the platform "
+        "so, and corrects its gyros and accelerometers, all in the units of the recording. With --invert the recording "
+        "holds true values and the outputs of the instrument are written. With --stream CSV lines come in on standard "
+        "input and corrected ones go out, each at once.",
         "inercal apply cal.json log.csv --out corrected.csv",
     ),
     ("compare", ""): (

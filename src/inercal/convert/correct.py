@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,32 @@ from inercal.records.record import Column, Record
 from inercal.units import Unit, parse_unit
 
 Array = NDArray[np.float64]
+Samples = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Correction:
+    """How the samples of a record are corrected, or made into outputs of the instrument.
+
+    ``work`` takes samples by sensor, times ``factors``, to results in ``units``; ``settings`` hold all that decides
+    them.
+    """
+
+    work: Callable[[Samples], Samples]
+    units: Mapping[str, Unit]
+    factors: Mapping[str, float]
+    settings: Mapping[str, object]
+
+    def __call__(self, samples: Samples) -> Samples:
+        """Results (*batch, 3) for samples (*batch, 3) of all its sensors, in the units of the record."""
+        return self.work({sensor: samples[sensor] * factor for sensor, factor in self.factors.items()})
+
+
+class Model(Protocol):
+    """An instrument that a calibration describes."""
+
+    def correction(self, record: Record, invert: bool = False) -> Correction:
+        """The correction of a record, whose columns may be without samples yet; raises `InputError`."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +71,51 @@ class ImuModel:
         if omega is None or self.gyro is None:
             return acc, None
         return acc, self.gyro.indicate(omega) + self._drift(f)
+
+    def correction(self, record: Record, invert: bool = False) -> Correction:
+        """The correction of a record, whose columns may be without samples yet; with ``invert`` it holds true values.
+
+        Raises
+        ------
+        InputError
+            Units of another kind than those of the calibration, missing or uncalibrated channels, two clocks. A gyro
+            that the calibration does not cover is an error, not passed on as if it were corrected.
+        """
+        acc = record.triad("acc")
+        gyro = record.triad("gyro") if "gyro_x" in record else None
+        if gyro is not None:
+            if self.gyro is None:
+                raise InputError(
+                    gyro.source.path, "has a gyro, but the calibration is of accelerometers alone"
+                )
+            if gyro.t is not acc.t and not np.array_equal(gyro.t, acc.t):
+                raise InputError(
+                    gyro.source.path, "gyro and accelerometers have different clocks, expected one"
+                )
+        truth = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
+        output = {sensor: parse_unit(symbol) for sensor, symbol in self.units.items()}
+        units, factors = {}, {}
+        for triad in (acc, gyro):
+            if triad is None:
+                continue
+            wanted = (truth if invert else output).get(triad.sensor, triad.unit)
+            if triad.unit.dimension != wanted.dimension:
+                raise InputError(
+                    triad.source.path,
+                    f"{triad.sensor} is in {triad.unit.symbol}, expected {wanted.symbol} as "
+                    f"{'true values' if invert else 'the instrument was calibrated'}",
+                )
+            units[triad.sensor] = (output if invert else truth).get(triad.sensor, triad.unit)
+            factors[triad.sensor] = triad.unit.factor / wanted.factor  # exactly 1 for one and the same unit
+        both = self.indicate if invert else self.correct
+
+        def work(samples: Samples) -> Samples:
+            results = zip(("acc", "gyro"), both(samples["acc"], samples.get("gyro")), strict=True)
+            return {sensor: found for sensor, found in results if found is not None}
+
+        triads = {"acc": self.accelerometer, **({} if self.gyro is None else {"gyro": self.gyro})}
+        settings = {**triads, "g": self.g_sensitivity, "units": self.units, "invert": invert}
+        return Correction(work, units, factors, settings)
 
     def _drift(self, f: Array) -> Array | float:
         """g-sensitive drift [gyro output]; where there is none, a missing specific force takes no part."""
@@ -102,71 +174,19 @@ def _invertible(triad: TriadModel) -> bool:
     )
 
 
-@dataclass(frozen=True)
-class Correction:
-    """How the samples of a record are corrected, or with ``invert`` made into outputs of the instrument.
-
-    ``units`` are those of the results by sensor; ``factors`` take the samples to what the model expects.
-    """
-
-    model: ImuModel
-    invert: bool
-    units: Mapping[str, Unit]
-    factors: Mapping[str, float]
-
-    def __call__(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:
-        """Results (*batch, 3) for samples (*batch, 3) of both sensors, in the units of the record."""
-        work = self.model.indicate if self.invert else self.model.correct
-        return work(acc * self.factors["acc"], None if gyro is None else gyro * self.factors["gyro"])
-
-
-def correction(record: Record, model: ImuModel, invert: bool = False) -> Correction:
-    """The correction of a record, whose columns may be without samples yet.
-
-    Raises
-    ------
-    InputError
-        Units of another kind than those of the calibration, missing or uncalibrated channels, two clocks. A gyro that
-        the calibration does not cover is an error, not passed on as if it were corrected.
-    """
-    acc = record.triad("acc")
-    gyro = record.triad("gyro") if "gyro_x" in record else None
-    if gyro is not None:
-        if model.gyro is None:
-            raise InputError(gyro.source.path, "has a gyro, but the calibration is of accelerometers alone")
-        if gyro.t is not acc.t and not np.array_equal(gyro.t, acc.t):
-            raise InputError(gyro.source.path, "gyro and accelerometers have different clocks, expected one")
-    truth = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
-    output = {sensor: parse_unit(symbol) for sensor, symbol in model.units.items()}
-    units, factors = {}, {}
-    for triad in (acc, gyro):
-        if triad is None:
-            continue
-        wanted = (truth if invert else output).get(triad.sensor, triad.unit)
-        if triad.unit.dimension != wanted.dimension:
-            raise InputError(
-                triad.source.path,
-                f"{triad.sensor} is in {triad.unit.symbol}, expected {wanted.symbol} as "
-                f"{'true values' if invert else 'the instrument was calibrated'}",
-            )
-        units[triad.sensor] = (output if invert else truth).get(triad.sensor, triad.unit)
-        factors[triad.sensor] = triad.unit.factor / wanted.factor  # exactly 1 for one and the same unit
-    return Correction(model, invert, units, factors)
-
-
-def apply_to(record: Record, model: ImuModel, invert: bool = False) -> Record:
-    """Correct the ``acc`` and ``gyro`` columns of a record, all others unchanged; raises as `correction` does.
+def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
+    """Correct the sensors of a record that a model covers, all other columns unchanged; raises as `correction` does.
 
     With ``invert`` the record holds true values and the outputs of the instrument are made of them.
     """
-    correct = correction(record, model, invert)
+    correct = model.correction(record, invert)
     triads = [record.triad(sensor) for sensor in correct.units]
-    acc, gyro = correct(triads[0].values, triads[1].values if len(triads) > 1 else None)
+    found = correct({triad.sensor: triad.values for triad in triads})
     columns = dict(record.columns)
-    for triad, new in zip(triads, (acc,) if gyro is None else (acc, gyro), strict=True):
+    for triad in triads:
         for i, axis in enumerate("xyz"):
-            name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(new[:, i])
+            name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(found[triad.sensor][:, i])
             columns[name] = Column(
-                name, triad.sensor, axis, correct.units[triad.sensor], values, triads[0].t, triad.source
+                name, triad.sensor, axis, correct.units[triad.sensor], values, triad.t, triad.source
             )
     return Record(columns, record.findings, record.sources, record.labels)

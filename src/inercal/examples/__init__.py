@@ -10,12 +10,12 @@ FOLDER = Path(__file__).resolve().parent
 
 @dataclass(frozen=True)
 class Example:
-    """A recording with its study and map: file names in `FOLDER`, what it is, and its licence."""
+    """A recording with its study and map: file names in `FOLDER`, what it is, and its licence, if not inercal's own."""
 
     name: str
     title: str
     records: tuple[str, ...]
-    licence: str
+    licence: str | None = None
     map: str | None = None
     study: str | None = None
     verb: str = "calibrate imu"
@@ -91,6 +91,13 @@ EXAMPLES: dict[str, Example] = {
             "licences/tofupilot.txt",
             "thermal-map.toml",
             verb="temperature",
+        ),
+        Example(
+            "selfcal",
+            "platform in three gimbals that turns for 540 s and calibrates itself, 5 Hz, simulated",
+            ("selfcal.csv.gz",),
+            study="selfcal.toml",
+            verb="selfcal",
         ),
     )
 }

@@ -113,9 +113,40 @@ _DRIFT = tuple(
     )
 )
 
+# eta pz, oy, oz: az reads eta_pz fx more and eta_oz fy less, ay reads eta_oy fx less; ds and do likewise for gyros
+_SELF_CALIBRATION = (
+    *(Term(f"kg0_{i}", f"gyro {i} bias: rate of the platform at zero command", "rad/s") for i in _AXES),
+    Term("eta_pz", "misalignment of accelerometer z: output per specific force along x", "rad"),
+    Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
+    Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
+    *(
+        Term(f"ds_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}", "rad")
+        for i, j in ("xy", "yz", "zx")
+    ),
+    *(
+        Term(f"do_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}, reversed", "rad")
+        for i, j in ("xz", "yx", "zy")
+    ),
+    *(Term(f"ka0_{i}", f"accelerometer {i} bias: reading at zero specific force", "m/s^2") for i in _AXES),
+    *(Term(f"ka1_{i}", f"accelerometer {i} scale error", "1") for i in _AXES),
+    *(Term(f"kg1_{i}", f"gyro {i} scale error", "1") for i in _AXES),
+    *(
+        Term(f"beta_{i}", f"zero of the encoders: turn of their frame about {i} of the base", "rad")
+        for i in _AXES
+    ),
+)
+
 #: every term, in the order results list them
 TERMS: dict[str, Term] = {
-    term.symbol: term for term in (*_ACCELEROMETER, *_GYRO, *_RATE_TEST, *_ACCELEROMETER_BY_ANGLE, *_DRIFT)
+    term.symbol: term
+    for term in (
+        *_ACCELEROMETER,
+        *_GYRO,
+        *_RATE_TEST,
+        *_ACCELEROMETER_BY_ANGLE,
+        *_DRIFT,
+        *_SELF_CALIBRATION,
+    )
 }
 
 ACCELEROMETER_TRIAD = tuple(term.symbol for term in _ACCELEROMETER)

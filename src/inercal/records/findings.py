@@ -54,6 +54,11 @@ CODES: dict[str, str] = {
     "bad_verdict": "a calibration that is used ended with a bad verdict",
     "other_model": "two calibrations are not of the same kind",
     "same_recording": "two calibrations rest on the same recording",
+    "goal_missed": "a coefficient is less well known than wanted",
+    "unmodelled": "the recording shows errors that the model leaves out",
+    "site_suspect": "earth rate does not fit the stated site",
+    "low_scatter": "the scatter of the residuals is below what the stated noise explains",
+    "filter_fails": "an estimator fails on a sound recording",
     "perhaps_common": "sources that may act alike in two calibrations",
 }
 

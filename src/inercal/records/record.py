@@ -33,7 +33,7 @@ class Column:
 
     ``values`` (n,) are in ``unit``, sign and scale of the map already applied; ``t`` (n,) [s] is the time
     axis of its file, the same object for all columns of that file. ``sensor``, ``axis`` and ``frame`` label
-    it: ``acc``, ``x``, ``b``.
+    it: ``acc``, ``x``, ``b``. ``increment``: a rate that was recorded as what was gained since the row before.
     """
 
     name: str
@@ -44,6 +44,7 @@ class Column:
     t: Array
     source: Source
     frame: str = "b"
+    increment: bool = False
 
     def si(self) -> Array:
         """Values (n,) in SI units; raises `RecordError` for raw counts and volts."""

@@ -12,6 +12,7 @@ from inercal.estimate.budget import BudgetItem
 from inercal.estimate.exchange import plain_objects
 from inercal.estimate.result import Estimate, Parameter, rounded
 from inercal.estimate.status import Status
+from inercal.estimate.table import Table
 from inercal.instruments.terms import TERMS
 from inercal.report.style import plain_unit
 
@@ -36,6 +37,9 @@ _GROUPS = {
     "Gyro": ("D_F_", "D_R_", "S_", "T_", "G_"),
     "Axis X": ("DX_", "k_"),
     "Axis Y": ("DY_", "kY_"),
+    "Platform gyros": ("kg0_", "ds_", "do_", "kg1_"),
+    "Platform accelerometers": ("eta_", "ka0_", "ka1_"),
+    "Encoders": ("beta_",),
 }
 
 #: ending of a coefficient of a temperature model -> what it is of its term
@@ -68,6 +72,7 @@ _LABELS = {
 _UNITS = {
     "_m_s2": "m/s²",
     "_rad_s": "rad/s",
+    "_deg_s": "°/s",
     "_rad": "rad",
     "_degC": "°C",
     "_deg": "°",
@@ -77,7 +82,7 @@ _UNITS = {
 }
 
 
-def render(estimate: Estimate, pictures: Sequence[Picture], title: str) -> str:
+def render(estimate: Estimate, pictures: Sequence[Picture], title: str, tables: Sequence[Table] = ()) -> str:
     """The report of an estimate.
 
     Parameters
@@ -88,6 +93,8 @@ def render(estimate: Estimate, pictures: Sequence[Picture], title: str) -> str:
         In the order they are to be shown.
     title : str
         Heading of the page.
+    tables : sequence of Table
+        What else there is to tell, ahead of the pictures.
 
     Returns
     -------
@@ -107,6 +114,7 @@ def render(estimate: Estimate, pictures: Sequence[Picture], title: str) -> str:
             for keys, text in _leaves(plain_objects(estimate.conditions))
             if keys != ("date",)
         ],
+        given_tables=tables,
         pictures=pictures,
         sources=estimate.budget,
         tables=[_table(key, value) for key, value in result.items() if _is_table(value)],

@@ -192,7 +192,7 @@ def one_run(
 
 
 def _joint(found: Filtered, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
-    """Errors of attitude and coefficients together, and their covariance; the coefficients alone without an attitude."""
+    """Errors of attitude and coefficients together, and their covariance; coefficients alone without an attitude."""
     if found.state is None or len(found.state.attitude) != 4:
         return error, slope @ found.covariance @ slope.T
     q, P = found.attitude, found.state.covariance

@@ -74,18 +74,21 @@ _ETA = np.arange(ETA.start, ETA.stop)
 _SCALE = KA1.start + np.array([2, 1, 2])
 
 
+def scale(c: Array) -> Array:
+    """What coefficients (*batch, p) of the product form are multiplied by to give the linear form: 1 + ka1, or 1."""
+    by = np.ones_like(c)
+    by[..., _ETA] += c[..., _SCALE]
+    return by
+
+
 def to_linear(product: Array) -> Array:
     """Coefficients (*batch, p) from the product form to the linear form."""
-    linear = np.array(product, dtype=float)
-    linear[..., _ETA] *= 1.0 + linear[..., _SCALE]
-    return linear
+    return product * scale(product)
 
 
 def to_product(linear: Array) -> Array:
     """Coefficients (*batch, p) from the linear form to the product form; the inverse of `to_linear`."""
-    product = np.array(linear, dtype=float)
-    product[..., _ETA] /= 1.0 + product[..., _SCALE]
-    return product
+    return linear / scale(linear)
 
 
 def product_slope(linear: Array) -> Array:

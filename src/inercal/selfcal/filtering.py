@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.geometry.rotations import multiply
 from inercal.selfcal.filtered import Filtered, History, Problem, Start, State, Trace
 from inercal.selfcal.kinematics import attitude
 from inercal.selfcal.recording import Recording
@@ -76,12 +77,7 @@ def estimate(
     load_kernels(kind, problem)
     began = time.perf_counter()
     state: State = module.initial(problem, recording.th[0], start)
-    first = History(
-        _attitude_of(state, problem)[None],
-        np.sqrt(np.diag(state.covariance)[:3])[None],
-        state.coefficients[None].copy(),
-        problem.prior[None].copy(),
-    )
+    first = known_in(state, problem)
     state, trace = module.advance(
         state, problem, recording.dt, recording.rate, recording.acc[1:], recording.th[1:], history
     )
@@ -112,6 +108,22 @@ def load_kernels(kind: FilterKind, problem: Problem) -> None:
     if module is not None:
         none = np.empty((0, 3))
         module.advance(module.initial(problem, np.zeros(3)), problem, np.empty(0), none, none, none)
+
+
+def known_in(state: State, problem: Problem) -> History:
+    """What a state knows, as the one row of a history."""
+    u = np.sqrt(np.diag(state.covariance))
+    q = _attitude_of(state, problem)
+    of_attitude = u[:3]
+    if len(u) - len(problem.prior) == 4:  # of a quaternion: 2 |q (0, e_i)| along each axis
+        across = multiply(q, np.eye(4)[1:])
+        of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
+    return History(
+        q[None],
+        of_attitude[None],
+        state.coefficients[None].copy(),
+        u[-len(problem.prior) :][None],
+    )
 
 
 def _attitude_of(state: State, problem: Problem) -> Array:

@@ -10,7 +10,6 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.selfcal.kinematics import commanded_rates
 from inercal.selfcal.rig import JOINTS, World
 
 Array = NDArray[np.float64]
@@ -109,6 +108,8 @@ class Motion:
 
 def motion(plan: Plan, world: World) -> Motion:
     """The commanded motion of a plan: ``w_c = J(th) th' + C_pb w_Ib^b`` at the middle of each step."""
+    from inercal.selfcal.kinematics import commanded_rates  # here, so that reading a study loads no compiler
+
     angles = plan.angles()
     rate = np.empty((len(angles) - 1, 3))
     commanded_rates(angles, plan.step, world.earth, world.axes, world.signs, rate)

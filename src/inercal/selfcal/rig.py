@@ -79,15 +79,16 @@ class Base:
         From north to east [rad]: the base turned clockwise as seen from above.
     tilt : (float, float)
         Then, about north and about east, right-handed [rad].
-    heading_u, tilt_u : float
-        Standard uncertainties [rad] of the heading and of each tilt.
+    heading_u : float
+    tilt_u : (float, float)
+        Standard uncertainties [rad].
     """
 
     frame: Frame = "nue"
     heading: float = 0.0
     tilt: tuple[float, float] = (0.0, 0.0)
     heading_u: float = 0.0
-    tilt_u: float = 0.0
+    tilt_u: tuple[float, float] = (0.0, 0.0)
 
     def from_geographic(self) -> Array:
         """(3, 3): components in b of a vector given as north, west, up."""

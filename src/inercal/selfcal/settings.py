@@ -108,6 +108,8 @@ class SelfcalSettings:
         Latitude and gravity with their uncertainties.
     gimbals, base
         The rig.
+    heading_unknown : bool
+        The heading of the base is to be found from the record; beta corrects it.
     limits : mapping
         Allowed range (low, high) [rad] of a gimbal angle by its name ``th_x``.
     plan : Plan or None
@@ -129,6 +131,7 @@ class SelfcalSettings:
     prior: Array
     gimbals: Gimbals = field(default_factory=Gimbals)
     base: Base = field(default_factory=Base)
+    heading_unknown: bool = False
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     plan: Plan | None = None
     truth: Array | None = None

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inercal.convert.correct import ImuModel, correction
+from inercal.convert.correct import Model
 from inercal.records.write.text import quoted
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output
@@ -21,23 +21,25 @@ class Apply:
     ----------
     lines : Lines
         The columns to correct.
-    model : ImuModel
+    model : Model
     invert : bool
         From true values to outputs of the instrument.
 
     Raises
     ------
     InputError
-        As `inercal.convert.correct.correction` does.
+        As the ``correction`` of the model does.
     """
 
     kind = "apply"
 
-    def __init__(self, lines: Lines, model: ImuModel, invert: bool = False) -> None:
-        self._correct = correction(lines.record, model, invert)
+    def __init__(self, lines: Lines, model: Model, invert: bool = False) -> None:
+        self._correct = model.correction(lines.record, invert)
         self._labelled = lines.labelled
         names = list(lines.record.columns)
-        self._places = [[names.index(f"{sensor}_{axis}") for axis in "xyz"] for sensor in self._correct.units]
+        self._places = {
+            sensor: [names.index(f"{sensor}_{axis}") for axis in "xyz"] for sensor in self._correct.units
+        }
         titles = ["t [s]"]
         for column in lines.record.columns.values():
             inside = column.axis != "" and column.sensor in self._correct.units
@@ -48,9 +50,7 @@ class Apply:
     @property
     def settings(self) -> Mapping[str, object]:
         """The coefficients and their direction."""
-        model = self._correct.model
-        triads = {"acc": model.accelerometer, **({} if model.gyro is None else {"gyro": model.gyro})}
-        return {**triads, "g": model.g_sensitivity, "units": model.units, "invert": self._correct.invert}
+        return self._correct.settings
 
     def initial(self) -> State:
         """Nothing: a sample knows nothing of those before."""
@@ -59,10 +59,8 @@ class Apply:
     def step(self, state: State, sample: Sample) -> tuple[State, Output]:
         """The corrected sample."""
         values = sample.values.copy()
-        triads = [np.array([values[i] for i in places]) for places in self._places]
-        acc, gyro = self._correct(triads[0], triads[1] if len(triads) > 1 else None)
-        for places, new in zip(self._places, (acc, gyro), strict=False):
-            if new is not None:
-                for i, value in zip(places, new.tolist(), strict=True):
-                    values[i] = value
+        triads = {sensor: np.array([values[i] for i in places]) for sensor, places in self._places.items()}
+        for sensor, found in self._correct(triads).items():
+            for i, value in zip(self._places[sensor], found.tolist(), strict=True):
+                values[i] = value
         return state, [sample.t, *values, *([quoted(sample.label)] if self._labelled else [])]

@@ -21,7 +21,7 @@ from inercal.noise.running import Octaves, Window, cascade, empty_octaves, empty
 from inercal.records.dwells import window_samples
 from inercal.records.record import Column
 from inercal.stream.lines import Lines, Sample
-from inercal.stream.run import Output
+from inercal.stream.run import Output, Slots
 
 Array = NDArray[np.float64]
 
@@ -52,8 +52,7 @@ class MonitorState(NamedTuple):
     extremes: Array
     still: float
     t: float
-    first: float
-    slot: int
+    slots: Slots
 
 
 class Monitor:
@@ -108,24 +107,17 @@ class Monitor:
         return MonitorState(
             stamps=np.empty(0), interval=0.0, window=empty_window(0, channels), octaves=empty_octaves(channels),
             started=False, quiet=np.zeros(groups), start=np.zeros((3, channels)), begun=math.nan,
-            extremes=_no_extremes(groups), still=math.nan, t=math.nan, first=math.nan, slot=-1,
+            extremes=_no_extremes(groups), still=math.nan, t=math.nan, slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: MonitorState, sample: Sample) -> tuple[MonitorState, Output | None]:
         """The state after a sample, and a line where one is due."""
         timed = state.interval > 0.0
         state = self._watched(state, sample) if timed else self._timed(state, sample.t)
-        if self._every > 0.0:
-            first = sample.t if math.isnan(state.first) else state.first
-            slots = (sample.t - first) / self._every
-            if math.isnan(slots):
-                return state, None
-            # a stamp written in decimals may fall short of its slot by its rounding
-            slot = math.floor(slots + 1e-12 * abs(slots) + 1e-9)
-            if slot == state.slot:
-                return state, None
-            state = state._replace(first=first, slot=slot)
-        return state, self._line(state, sample.t)
+        slots = state.slots.at(sample.t, self._every)
+        if slots is None:
+            return state, None
+        return state._replace(slots=slots), self._line(state, sample.t)
 
     def _timed(self, state: MonitorState, t: float) -> MonitorState:
         """Find the sample interval from the first stamps; the window then has its length."""

@@ -44,6 +44,26 @@ Output = Sequence[float | str]
 _HEAD = 64
 
 
+class Slots(NamedTuple):
+    """Intervals of which each has one output line: the time [s] from which they are counted, NaN before the first
+    line, and the number of that of the last line."""
+
+    first: float = math.nan
+    number: int = -1
+
+    def at(self, t: float, every: float) -> Slots | None:
+        """The slot of a line that is due at a stamp, None where none is; all are due with ``every`` [s] 0."""
+        if every == 0.0:
+            return self
+        first = t if math.isnan(self.first) else self.first
+        slots = (t - first) / every
+        if math.isnan(slots):
+            return None
+        # a stamp written in decimals may fall short of its slot by its rounding
+        number = math.floor(slots + 1e-12 * abs(slots) + 1e-9)
+        return None if number == self.number else Slots(first, number)
+
+
 class Recursive(Protocol[S]):
     """An estimator that goes from sample to sample.
 

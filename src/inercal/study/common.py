@@ -102,6 +102,22 @@ def site_of(table: SiteTable, where: object) -> Site:
     return Site(float(gravity(latitude, height)), inputs, latitude, latitude_u)
 
 
+def site_on_earth(table: SiteTable, where: object, what: str) -> Site:
+    """The site of ``what`` turns with the earth, in words, and so must have a latitude.
+
+    Raises
+    ------
+    StudyError
+        No latitude is given.
+    """
+    if table.latitude is None:
+        raise StudyError(
+            where,
+            f'site.latitude: missing, expected the latitude of the {what} for earth rate, such as "39.1 deg"',
+        )
+    return site_of(table, where)
+
+
 def _uncertain(*inputs: GravityInput) -> tuple[GravityInput, ...]:
     """Those with an uncertainty."""
     return tuple(each for each in inputs if each.u > 0.0)

@@ -81,6 +81,64 @@ class QuantityText:
         }
 
 
+@dataclass(frozen=True)
+class Several:
+    """Quantities of one kind, and the text or the list of texts that was typed."""
+
+    quantities: tuple[Quantity, ...]
+    typed: object
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """In SI."""
+        return tuple(quantity.value for quantity in self.quantities)
+
+
+@dataclass(frozen=True)
+class SeveralTexts:
+    """Makes a pydantic field read a list of quantities: ``Annotated[Several, SeveralTexts(each, "x, y, z")]``.
+
+    Parameters
+    ----------
+    each : QuantityText
+    of : str
+        What they belong to, in order, parted by commas: as many are expected.
+    one : bool
+        Whether a single text may stand for all.
+    """
+
+    each: QuantityText
+    of: str
+    one: bool = False
+
+    def parse(self, typed: object) -> Several:
+        """Read them all; the first thing wrong goes to pydantic, which knows the key."""
+        count = len(self.of.split(","))
+        if isinstance(typed, list):
+            if len(typed) == count:
+                return Several(tuple(self.each.parse(text) for text in typed), typed)
+        elif self.one and not isinstance(typed, dict):
+            return Several((self.each.parse(typed),) * count, typed)
+        words = f"a list of {count}, for {self.of}{', or one for all' if self.one else ''}"
+        raise refusal(f"found {shown(typed)}, expected {words}")
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Any], handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Validate by `parse`; write back what was typed."""
+        as_typed = core_schema.plain_serializer_function_ser_schema(lambda several: several.typed)
+        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """An array of so many, or one."""
+        each = self.each.__get_pydantic_json_schema__(schema, handler)
+        count = len(self.of.split(","))
+        several = {"type": "array", "items": each, "minItems": count, "maxItems": count}
+        return {"anyOf": [each, several]} if self.one else several
+
+
 def refusal(message: str) -> PydanticCustomError:
     """An error that `inercal._toml.check` reports in just these words, after the dotted key."""
     return PydanticCustomError("refused", "refused", {"error": InputError("key", message)})

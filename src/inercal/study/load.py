@@ -11,9 +11,12 @@ from typing import Any
 from inercal._toml import read_toml
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
+from inercal.selfcal.settings import SelfcalSettings
 from inercal.study.imu import imu_study
 from inercal.study.positions import WAYS
 from inercal.study.rig import DISTRIBUTIONS
+from inercal.study.selfcal import selfcal_study
+from inercal.study.turns import PLAN_WAYS
 from inercal.study.turntable import turntable_study
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import shown
@@ -26,8 +29,10 @@ _COMMANDS = {
     "sting": "aoa",
 }
 
+_EXPECTED = {"calibrate turntable": "one of a turntable", "selfcal": "one for `inercal selfcal`"}
+
 #: tables (a regular expression) that hold one of these keys: setting one takes the place of the others
-_ONE_OF = ((r"positions", WAYS), (r"rig\.errors\.\w+", DISTRIBUTIONS))
+_ONE_OF = ((r"positions", WAYS), (r"plan", PLAN_WAYS), (r"rig\.errors\.\w+", DISTRIBUTIONS))
 
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
@@ -68,6 +73,24 @@ def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> Tur
     return turntable_study(_read(path, overrides, "calibrate turntable"), path)
 
 
+def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> SelfcalSettings:
+    """Read the study of a self-calibration: of its simulation, path design and estimation.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file.
+    overrides : iterable of str
+        As for `load_imu_study`.
+
+    Raises
+    ------
+    StudyError
+        One sentence: file and key, what was found, what was expected.
+    """
+    return selfcal_study(_read(path, overrides, "selfcal"), path)
+
+
 def files_of(path: Path, given: Mapping[str, Any]) -> tuple[Path, ...]:
     """The study of a turntable, and the files that it names; ``given`` as in its settings."""
     name = given.get("positions", {}).get("file")
@@ -88,7 +111,8 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
         )
     if rig is None and "imu" in data and command != "calibrate imu":
         raise StudyError(
-            path, "found a study for `inercal calibrate imu`, expected one of a turntable, with a table [rig]"
+            path,
+            f"found a study for `inercal calibrate imu`, expected {_EXPECTED[command]}, with a table [rig]",
         )
     for override in overrides:
         _put(data, override)

@@ -9,10 +9,11 @@ from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.study.imu import ImuStudyFile
+from inercal.study.selfcal import SelfcalStudyFile
 from inercal.study.turntable import TurntableStudyFile
 
 #: a study is one of these
-STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile)
+STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile, SelfcalStudyFile)
 
 
 class _TomlSchema(GenerateJsonSchema):

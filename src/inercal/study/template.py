@@ -10,6 +10,7 @@ from pathlib import Path
 from inercal.rigs.plans import NAMED
 from inercal.rigs.tables import Slot, slots
 from inercal.study.template_instrument import instrument_lines
+from inercal.study.template_selfcal import SELFCAL
 from inercal.units import Unit
 
 _HEAD = """\
@@ -165,6 +166,21 @@ def turntable_template(
     if "rate" in (channels or {}):
         body = re.sub(r"# \[rate_test\] .*", f"{'[rate_test]':35s} # the table turns at rates", body)
     return _HEAD.format(what="of a turntable", next=following) + body + _COMMON
+
+
+def selfcal_template(
+    record_paths: Sequence[str | Path] = (),
+    study_path: str | Path = "STUDY.toml",
+    map_path: str | Path | None = None,
+) -> str:
+    """A study of a self-calibration with every key in it, each explained; arguments as for `imu_template`.
+
+    It loads as it is: the paper's path and platform, at a latitude that stands for anywhere on Earth.
+    """
+    following = f"simulate selfcal {_words([study_path])} --out simulated.csv"
+    if record_paths:
+        following = f"selfcal {_files(record_paths, study_path, map_path)}"
+    return _HEAD.format(what="of a self-calibration", next=following) + SELFCAL + _COMMON
 
 
 def _error_line(slot: Slot) -> str:

@@ -11,9 +11,8 @@ from pydantic import Field, StrictBool, StrictInt
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
-from inercal.geometry.site import Site
 from inercal.rigs.chain import Chain
-from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_of
+from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_on_earth
 from inercal.study.fields import QuantityText, RelativeUncertainty, positive
 from inercal.study.instrument import InstrumentTable, instrument_of
 from inercal.study.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
@@ -149,7 +148,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         The first thing wrong: file, key, what was found, what was expected.
     """
     file = check(TurntableStudyFile, data, path, StudyError)
-    site = _site(file.site, path)
+    site = site_on_earth(file.site, path, "table")
     chain = chain_of(file.rig, path)
     limits = limits_of(file.rig, chain, path)
     return TurntableSettings(
@@ -166,16 +165,6 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         temperature=file.conditions.temperature,
         given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
     )
-
-
-def _site(table: SiteTable, where: object) -> Site:
-    """The site, whose latitude a table cannot do without: earth rate turns with it."""
-    if table.latitude is None:
-        raise StudyError(
-            where,
-            'site.latitude: missing, expected the latitude of the table for earth rate, such as "39.1 deg"',
-        )
-    return site_of(table, where)
 
 
 def _analysis(table: AnalysisTable, where: object) -> Analysis:

@@ -168,7 +168,8 @@ def _column(channel: Channel, file: FileTable, t: Array, rate: float | None) -> 
     for factor in factors:
         if factor != 1.0:
             values = values * factor
-    return Column(channel.name, channel.sensor, channel.axis, unit, values, t, file.source)
+    gained = channel.increment
+    return Column(channel.name, channel.sensor, channel.axis, unit, values, t, file.source, increment=gained)
 
 
 def _interval(t: Array, path: Path) -> float:

@@ -1,0 +1,43 @@
+"""Draws the pictures of self-calibration in docs/published: into this folder, or into the one given."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from inercal.geometry.earth import gravity
+from inercal.geometry.site import Site
+from inercal.report.selfcal import attitude_errors
+from inercal.selfcal.figures import relative_errors
+from inercal.selfcal.filtered import problem
+from inercal.selfcal.filtering import estimate
+from inercal.selfcal.plan import path
+from inercal.selfcal.settings import Noise, SelfcalSettings
+from inercal.selfcal.simulate import experiment, simulate
+from inercal.units import parse_unit
+
+DEG_H, ARCSEC, UG = (parse_unit(unit).factor for unit in ("deg/h", "arcsec", "ug"))
+SIZES = np.repeat([DEG_H, ARCSEC, ARCSEC, ARCSEC, UG, 1e-6, 1e-6, ARCSEC], 3)
+TRUTH = SIZES * [
+    *(0.08, -0.06, 0.10, 60, -90, 120, 60, -45, 90, -75, 50, -100),
+    *(100, -150, 200, 500, -300, 800, 0, 0, 0, 0, 0, 0),
+]
+PRIOR = SIZES * np.repeat([0.3, 300, 300, 300, 500, 1500, 100, 60], 3)
+NOMINAL = Noise(5e-4 * parse_unit("deg/sqrt(h)").factor, 10 * UG, 2 * ARCSEC)
+
+folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
+latitude = np.radians(40.0)
+for name, figure in (("paper", 2), ("paper two turns", 4)):
+    site = Site(float(gravity(latitude)), latitude=latitude)
+    study = SelfcalSettings(site, NOMINAL, PRIOR, plan=path(name), truth=TRUTH)
+    made = simulate(experiment(study), np.random.default_rng(1))
+    quaternion, gimbal = (
+        estimate(made.recording, problem(study), kind).history for kind in ("svd-qukf", "gimbal-ukf")
+    )
+    t = made.recording.t
+    models = {"quaternion model": quaternion.attitude, "gimbal-angle model": gimbal.attitude}
+    drawn = {f"self-calibration-figure-{figure}.svg": attitude_errors(t, made.attitude, models)}
+    if figure == 2:
+        drawn["self-calibration-figure-3.svg"] = relative_errors(t, quaternion, TRUTH)
+    for file, picture in drawn.items():
+        (folder / file).write_text(picture.svg, encoding="utf-8")

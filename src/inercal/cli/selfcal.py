@@ -1,0 +1,124 @@
+"""``inercal selfcal``."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from inercal.cli import process_age
+from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_record, working
+from inercal.cli.outcome import hand_over, printed
+from inercal.cli.streaming import Every, StreamOptions, interval_of, run_stream
+from inercal.errors import InputError, StudyError, UsageError
+
+if TYPE_CHECKING:
+    from inercal.records.findings import Finding
+
+Kind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
+
+
+def selfcal(
+    files: Annotated[
+        list[Path] | None, Parameter(help="Recordings; several files with distinct channels are one record.")
+    ] = None,
+    /,
+    *,
+    study: StudyFile,
+    kind: Annotated[
+        Kind | None, Parameter(name="--filter", help="Estimator, in the place of that of the study.")
+    ] = None,
+    compare: Annotated[bool, Parameter(help="Run all estimators, and set them side by side.")] = False,
+    stream: Annotated[
+        bool, Parameter(help="Lines in, from standard input or one FILE, and coefficients out, live.")
+    ] = False,
+    every: Every = None,
+    map_file: MapFile = None,
+    overrides: Overrides = None,
+    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Calibrate a gimbaled platform while it turns."""
+    paths = files or []
+    keys = [*(overrides or ()), *([f"filter.kind={kind}"] if kind is not None else [])]
+    if stream:
+        if compare:
+            raise InputError("--compare", "found with a stream, expected one estimator")
+        _live(paths, study, map_file, keys, interval_of(every), streaming, output)
+        return 0
+    if not paths:
+        raise UsageError("selfcal: FILES is missing, expected recordings, or --stream")
+    for option, given in (("--checkpoint", streaming != StreamOptions()), ("--every", every is not None)):
+        if given:
+            raise InputError(option, "found without --stream, expected them together")
+
+    from inercal._jit import compiling
+    from inercal.records.read import source_of
+    from inercal.records.write import SUFFIXES
+    from inercal.selfcal.display import compared, displayed
+    from inercal.selfcal.task import calibrate, load_kernels
+    from inercal.study.load import load_selfcal_study
+
+    output.check((".json", ".toml", *SUFFIXES), (*paths, map_file, study))
+    settings = load_selfcal_study(study, keys)
+    clock = time.perf_counter()
+    record = read_record(paths, map_file, output)
+    read_s = time.perf_counter() - clock
+    of_all = " all" if compare else f" {settings.filter.kind}"
+    with of_study(study), compiling(f"selfcal{of_all}", output.say):
+        load_kernels(settings, compare)
+    with of_study(study), working(output) as progress:
+        found = calibrate(record, settings, compare, progress)
+    timing = {"read": read_s, "solve": found.estimate.timing["solve"], "total": process_age()}
+    inputs = (*found.estimate.inputs, source_of(study))
+    found = replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs))
+
+    def page() -> str:
+        from inercal.selfcal.figures import calibration_page
+
+        return calibration_page(found, settings)
+
+    def histories(path: Path) -> None:
+        from inercal.records.write import write_record
+        from inercal.selfcal.history import history_record
+
+        write_record(history_record(found.filtered, found.recording, found.problem.world), path)
+
+    tables = [printed(displayed(found.estimate)), *(f"{t.title}\n{t.text()}" for t in compared(found))]
+    return hand_over(found.estimate, tables, page, output, "calibration", histories)
+
+
+def _live(
+    paths: list[Path],
+    study: Path,
+    map_file: Path | None,
+    keys: list[str],
+    interval: float,
+    streaming: StreamOptions,
+    output: ReportOutput,
+) -> None:
+    """Calibrate row by row."""
+    from inercal._jit import compiling
+    from inercal.selfcal.filtered import problem
+    from inercal.stream.selfcal import Selfcal, load
+    from inercal.study.load import load_selfcal_study
+
+    if len(paths) > 1:
+        raise InputError("--stream", f"found {len(paths)} files, expected one or standard input")
+    file = paths[0] if paths else None
+    streaming.check(output, (file, map_file, study))
+    settings = load_selfcal_study(study, keys)
+    if settings.heading_unknown:
+        raise StudyError(study, "rig.heading: found it unknown, expected a known one for a stream")
+    told = problem(settings)
+
+    def say(finding: Finding) -> None:
+        output.say_findings([finding])
+
+    with of_study(study):
+        with compiling(f"selfcal stream {told.filter.kind}", output.say):
+            load(told)
+        run_stream(lambda lines: Selfcal(lines, told, interval, say), file, map_file, output, streaming)

@@ -1,0 +1,131 @@
+"""The result of a self-calibration in use: corrected commands of the platform, corrected gyros and accelerometers.
+
+The platform turns at ``w_p = (1 + M) w + kg0`` where ``w`` is commanded (`inercal.selfcal.coefficients`). For it to
+turn at a wanted rate the command is
+
+    w = (1 + M)^-1 (w_p - kg0),
+
+of which the familiar ``w_p - M w_p - kg0`` is the first order: that leaves M (M w_p + kg0), at 1 deg/s and
+misalignments of 100 arcsec 0.001 deg/h, as much as a good calibration still sees, so the inverse is taken. Gyros that
+took the place of the commands are corrected the other way: ``w_p`` of the rate ``w`` they measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.convert.correct import Correction, Samples
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate
+from inercal.instruments.triad import TriadModel
+from inercal.records.findings import Finding
+from inercal.records.record import Record
+from inercal.selfcal.coefficients import NAMES
+
+Array = NDArray[np.float64]
+
+COMMAND = "selfcal"
+"""Command whose estimates are of a platform."""
+
+_WORST = 1e6
+"""Condition number beyond which a gain is not inverted; a platform has one near 1."""
+
+#: sensor -> dimension of its channels
+_SENSORS = {"wc": "rate", "gyro": "rate", "acc": "acceleration"}
+
+
+@dataclass(frozen=True)
+class PlatformModel:
+    """The platform that a self-calibration describes, in SI.
+
+    ``platform`` takes commanded rates to those at which it turns, ``accelerometer`` specific force to outputs.
+    """
+
+    platform: TriadModel
+    accelerometer: TriadModel
+
+    def correction(self, record: Record, invert: bool = False) -> Correction:
+        """The correction of a record, whose columns may be without samples yet; all keep their units.
+
+        Of wanted rates ``wc`` it makes commands, of measured rates ``gyro`` those of the platform, of outputs ``acc``
+        specific force; with ``invert`` the other way round.
+
+        Raises
+        ------
+        InputError
+            None of these channels, an axis is missing, or they are not in physical units.
+        """
+        triads = [record.triad(sensor) for sensor in _SENSORS if f"{sensor}_x" in record]
+        if not triads:
+            where = ", ".join(source.path for source in record.sources) or "record"
+            found = ", ".join(record.columns) or "no column"
+            raise InputError(where, f"found {found}, expected wc_x to z, gyro_x to z or acc_x to z")
+        for triad in triads:
+            dimension = _SENSORS[triad.sensor]
+            if triad.unit.dimension != dimension:
+                raise InputError(
+                    triad.source.path,
+                    f"{triad.sensor} is in {triad.unit.symbol}, expected a unit of {dimension}",
+                )
+        forward, back = self.platform.indicate, self.platform.correct
+        acc = self.accelerometer
+        works = {
+            "wc": forward if invert else back,
+            "gyro": back if invert else forward,
+            "acc": acc.indicate if invert else acc.correct,
+        }
+        units = {triad.sensor: triad.unit for triad in triads}
+        factors = {sensor: unit.factor for sensor, unit in units.items()}
+
+        def work(samples: Samples) -> Samples:
+            return {sensor: works[sensor](x) / factors[sensor] for sensor, x in samples.items()}
+
+        settings = {"platform": self.platform, "acc": self.accelerometer, "invert": invert}
+        return Correction(work, units, factors, settings)
+
+
+def platform_model(estimate: Estimate, where: object = "calibration") -> PlatformModel:
+    """The platform of an estimate of `inercal selfcal`.
+
+    Raises
+    ------
+    InputError
+        Another estimate, or values that are not finite or cannot be inverted; named by ``where``.
+    """
+    values = {name: p.value for name, p in estimate.parameters.items()}
+    if not values.keys() >= set(NAMES) or not np.all(np.isfinite(estimate.values)):
+        found = ", ".join(estimate.names) or "no coefficients"
+        raise InputError(where, f"found {found}, expected the coefficients of a platform")
+
+    def triple(group: str) -> tuple[float, float, float]:
+        x, y, z = (values.get(f"{group}_{axis}", 0.0) for axis in "xyz")
+        return x, y, z
+
+    ds, do = triple("ds"), triple("do")
+    scale = 1.0 + np.array(triple("kg1"))
+    M = np.array([[0.0, ds[0], -do[0]], [-do[1], 0.0, ds[1]], [ds[2], -do[2], 0.0]])
+    acc_scale = 1.0 + np.array(triple("ka1"))
+    pz, oy, oz = (values[f"eta_{end}"] for end in ("pz", "oy", "oz"))
+    with np.errstate(all="ignore"):
+        platform = TriadModel(scale, np.eye(3) + M / scale[:, None], np.array(triple("kg0")))
+        accelerometer = TriadModel(
+            acc_scale,
+            np.array([[1.0, 0.0, 0.0], [-oy, 1.0, 0.0], [pz, -oz, 1.0]]),
+            np.array(triple("ka0")),
+        )
+        gains = (platform.gain, accelerometer.gain)
+        sound = all(np.isfinite(gain).all() and np.linalg.cond(gain) < _WORST for gain in gains)
+    if not sound:
+        raise InputError(where, "the coefficients of the platform cannot be inverted, expected small errors")
+    return PlatformModel(platform, accelerometer)
+
+
+def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
+    """``not_held``: the coefficients that `platform_model` leaves out."""
+    if "beta_x" not in estimate.names:
+        return ()
+    said = "the zero of the encoders beta is not applied: gimbal angles stay as they are"
+    return (Finding("not_held", said, str(where)),)

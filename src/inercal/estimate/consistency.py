@@ -1,0 +1,106 @@
+"""Does a filter agree with its measurements? Judged on one recording, from innovations alone.
+
+Innovations of a filter whose model and noise hold are white, of zero mean and of the covariance that it states
+(Kailath, IEEE Trans. Automatic Control 13 (1968) 646). Three questions follow: is the normalised innovation squared
+(NIS) of the expected size, is that of single rows, and are innovations uncorrelated from row to row? Limits follow
+from the number of rows and an accepted risk of a false alarm (Bar-Shalom, Li and Kirubarajan, Estimation with
+Applications to Tracking and Navigation, Wiley 2001, section 5.4.2). What truth is needed for is in
+`inercal.estimate.coverage`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Nis:
+    """Mean NIS of the rows that have measurements.
+
+    ``mean`` over ``rows`` and its ``expected`` value, the mean number of scalars; ``standard_error`` of the mean where
+    the model holds, ``sqrt(2 expected / rows)``.
+    """
+
+    mean: float
+    expected: float
+    standard_error: float
+    rows: int
+
+    def limit(self, sigmas: float = 5.0) -> float:
+        """Mean NIS above which measurements contradict the model by so many standard errors."""
+        return self.expected + sigmas * self.standard_error
+
+    @property
+    def excess(self) -> float:
+        """How far the mean is off, in standard errors; inf where it is not a number."""
+        if not math.isfinite(self.mean):
+            return math.inf
+        return (self.mean - self.expected) / self.standard_error
+
+
+def nis(values: ArrayLike, dims: ArrayLike) -> Nis:
+    """Judge NIS ``values`` (n,), each of ``dims`` (n,) scalars; rows of 0 scalars are left out.
+
+    Raises ValueError where no row has measurements.
+    """
+    count = np.asarray(dims, dtype=float)
+    used = count > 0.0
+    if not used.any():
+        raise ValueError("found no row with measurements, expected one at least")
+    expected, rows = float(count[used].mean()), int(used.sum())
+    mean = float(np.asarray(values, dtype=float)[used].mean())
+    return Nis(mean, expected, math.sqrt(2.0 * expected / rows), rows)
+
+
+def surprising(values: ArrayLike, dims: ArrayLike, risk: float = 1e-3) -> NDArray[np.int64]:
+    """Rows whose NIS, of ``dims`` (n,) scalars, is too large, or not a number.
+
+    Where the model holds the probability that any is found is ``risk`` (chi-square, Bonferroni).
+    """
+    from scipy.special import chdtri
+
+    x, count = np.asarray(values, dtype=float), np.asarray(dims, dtype=float)
+    used = np.flatnonzero(count > 0.0)
+    fine = x[used] <= chdtri(count[used], risk / max(len(used), 1))
+    return np.asarray(used[~fine], dtype=np.int64)
+
+
+def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (10, 40, 160)) -> float:
+    """Probability by chance of correlations from row to row as strong as those of innovations (n, m), NaN left out.
+
+    Two tests of each column, and Bonferroni's inequality over all. Of each lag the sum of products x_k x_(k+lag) over
+    the root of the sum of their squares is about standard normal, whatever the variances of the rows; their squares are
+    summed over the ``lags``. Sums over blocks of some rows show what is correlated over longer times: their squares
+    over the mean square, summed, are about chi-square, and can be too large or too small.
+    """
+    from scipy.special import chdtr, chdtrc
+
+    x = np.asarray(innovations, dtype=float)
+    total = np.zeros(x.shape[1])
+    for lag in range(1, lags + 1):
+        products = np.nan_to_num(x[lag:] * x[:-lag])
+        total += _ratio(np.square(products.sum(axis=0)), np.square(products).sum(axis=0))
+    chances = [chdtrc(lags, total)]
+    for size in blocks:
+        count = len(x) // size
+        if count >= 5:
+            parts = np.nan_to_num(x[: count * size]).reshape(count, size, -1)
+            squares = np.square(parts).sum(axis=(0, 1))
+            sums = count * _ratio(np.square(parts.sum(axis=1)).sum(axis=0), squares)
+            chances.append(2.0 * np.minimum(chdtr(count, sums), chdtrc(count, sums)))
+    known = np.isfinite(x).any(axis=0)
+    if not known.any():
+        return 1.0
+    return float(min(1.0, np.min(np.array(chances)[:, known]) * known.sum() * len(chances)))
+
+
+def _ratio(a: Array, b: Array) -> Array:
+    """a / b, 0 where b is."""
+    return np.divide(a, b, out=np.zeros_like(b), where=b > 0.0)

@@ -1,0 +1,291 @@
+"""Pictures of what a filter knows from row to row: coefficients with bands, errors, and the path of the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import rounded
+from inercal.report.cells import Cell, band, canvas, frame, line
+from inercal.report.html import Picture
+from inercal.report.style import (
+    ALARM,
+    COLOURS,
+    INK,
+    QUIET,
+    WIDTH,
+    envelope,
+    figure,
+    plain_unit,
+    svg,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_PIECES = 150
+"""Pieces of a line in a small panel; it has at most twice as many points."""
+
+_BAND = 200
+"""Points of a band."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A coefficient over time: ``values`` (n,) and their ``u`` (n,) in ``unit``; ``prior`` standard deviation at the
+    start, ``truth`` where known, ``bound`` the smallest u at the end that the path allows, where known."""
+
+    name: str
+    unit: str
+    values: Array
+    u: Array
+    prior: float
+    truth: float | None = None
+    bound: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line (n,) of a panel, and half the width (n,) of a band about zero that belongs to it."""
+
+    label: str
+    values: Array
+    band: Array | None = None
+
+
+def few(count: int, most: int) -> NDArray[np.int64]:
+    """At most so many of ``count`` rows, evenly spread, with the first and the last."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
+def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Picture:
+    """Coefficients over ``t`` (n,) [s], three a row, with bands of two standard uncertainties.
+
+    Each panel spans what is left in the last 45 % of the time; the prior is a bar at the start.
+    """
+    shown = few(len(t), _BAND)
+    with grid(t, -(-len(courses) // 3), 3, 0.85) as (page, axes, places):
+        for k, course in enumerate(courses):
+            values, u = (np.where(np.abs(x) < 1e100, x, np.nan) for x in (course.values, course.u))
+            cell = replace(places[k], y=_span(course, values, u))
+            value, last, *_ = rounded(float(values[-1]), float(u[-1]))
+            frame(
+                axes,
+                cell,
+                f"{course.name}: {value} ± {last} {plain_unit(course.unit)}",
+                times=k >= len(courses) - 3,
+            )
+            low, high = (values - 2.0 * u)[shown], (values + 2.0 * u)[shown]
+            band(axes, cell, t[shown], low, high, color=COLOURS[0], alpha=0.2)
+            line(axes, cell, *envelope(t, values, _PIECES), color=COLOURS[0], lw=0.9)
+            bar = 2.0 * course.prior * np.array([-1.0, 1.0])
+            line(axes, cell, np.full(2, t[0] + 0.012 * (t[-1] - t[0])), bar, color=INK, lw=1.6)
+            if course.truth is not None:
+                line(axes, cell, t[[0, -1]], np.full(2, course.truth), color=ALARM, lw=0.9, ls=":")
+        drawn = svg(page)
+    return Picture(title, caption, drawn)
+
+
+def _span(course: Course, values: Array, u: Array) -> tuple[float, float]:
+    """Limits of the y axis: the band of the last 45 % of the time about the last value, truth included."""
+    late = slice(11 * len(values) // 20, None)
+    middle = float(values[-1]) if np.isfinite(values[-1]) else 0.0
+    apart = np.abs(values[late] - middle) + 2.0 * u[late]
+    if course.truth is not None:
+        apart = np.append(apart, abs(course.truth - middle))
+    widest = float(np.nanmax(apart)) if np.isfinite(apart).any() else 0.0
+    half = 1.15 * min(widest, 4.0 * course.prior + abs(middle)) or 1.0
+    return middle - half, middle + half
+
+
+def falling(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Picture:
+    """Standard uncertainties over their priors along ``t`` (n,) [s], on a logarithmic scale, three lines a panel.
+
+    A dash at the end is the bound.
+    """
+    groups = [courses[k : k + 3] for k in range(0, len(courses), 3)]
+    shown = few(len(t), _BAND)
+    left = [np.where(course.u > 0.0, course.u, np.nan) / course.prior for course in courses]
+    last = [x[np.isfinite(x)].min() for x in left if np.isfinite(x).any()]
+    lowest = 10.0 ** np.floor(np.log10(max(min(last, default=0.1), 1e-12)))
+    with grid(t, -(-len(groups) // 3), 3, 1.45) as (page, axes, places):
+        for k, group in enumerate(groups):
+            cell = replace(places[k], y=(float(lowest), 2.0), scale="log")
+            frame(axes, cell, times=k >= len(groups) - 3, label="u / prior" if k % 3 == 0 else "")
+            for j, course in enumerate(group):
+                line(axes, cell, t[shown], left[3 * k + j][shown], color=COLOURS[j], lw=1.0)
+                axes.text(
+                    cell.left + (j + 0.5) * cell.width / 3.0,
+                    cell.bottom + cell.height + 0.03,
+                    course.name,
+                    color=COLOURS[j],
+                    fontsize=7.0,
+                    fontweight="bold",
+                    ha="center",
+                )
+                if course.bound is not None and 0.0 < course.bound < np.inf:
+                    axes.plot(
+                        cell.across(t[-1:]),
+                        cell.up(np.array([course.bound / course.prior])),
+                        "_",
+                        color=COLOURS[j],
+                        ms=8,
+                        mew=1.6,
+                    )
+        drawn = svg(page)
+    return Picture(title, caption, drawn)
+
+
+@contextmanager
+def grid(
+    t: Array, rows: int, columns: int, height: float, head: float = 0.28
+) -> Iterator[tuple[Figure, Axes, list[Cell]]]:
+    """A drawing with rows of panels of that ``height`` [inch] over ``t`` (n,) [s], from left to right and downwards."""
+    gap, margin, foot = 0.62, 0.62, 0.42
+    wide = (WIDTH - 0.12 - margin * columns) / columns
+    total = foot + rows * (height + head)
+    with canvas(WIDTH, total) as (page, axes):
+        span = float(t[0]), float(t[-1])
+        cells = [
+            Cell(
+                gap + column * (wide + margin),
+                total - (row + 1) * (height + head),
+                wide,
+                height,
+                span,
+                (0.0, 1.0),
+            )
+            for row in range(rows)
+            for column in range(columns)
+        ]
+        for cell in cells[-columns:]:
+            axes.text(cell.left + 0.5 * cell.width, 0.06, "time [s]", fontsize=7.5, ha="center", va="bottom")
+        yield page, axes, cells
+
+
+def panels_of_lines(title: str, caption: str, t: Array, panels: Mapping[str, Sequence[Line]]) -> Picture:
+    """Lines over ``t`` (n,) [s], a panel for each label of an axis, all with the same legend.
+
+    The second line and those after it are dashes in turn on top of the first, so that lines that agree are all seen.
+    """
+    shown = few(len(t), _BAND)
+    with grid(t, len(panels), 1, 0.95, 0.2) as (page, axes, places):
+        for number, (place, (label, lines)) in enumerate(zip(places, panels.items(), strict=True)):
+            thinned = [envelope(t, each.values, _PIECES if len(lines) > 1 else 2 * _PIECES) for each in lines]
+            cell = replace(place, y=_limits(thinned))
+            frame(axes, cell, times=number == len(panels) - 1, label=label)
+            line(axes, cell, t[[0, -1]], np.zeros(2), color=QUIET, lw=0.6)
+            for k, (each, points) in enumerate(zip(lines, thinned, strict=True)):
+                if each.band is not None:
+                    half = np.where(np.isfinite(each.band), each.band, np.nan)[shown]
+                    band(axes, cell, t[shown], -half, half, color=COLOURS[k], alpha=0.25)
+                line(
+                    axes,
+                    cell,
+                    *points,
+                    color=COLOURS[k],
+                    lw=1.4 if k == 0 and len(lines) > 1 else 0.8,
+                    ls="-" if k == 0 else (4.0 * k, (4.0, 4.0 * (len(lines) - 1) - 2.0)),
+                    label=each.label if number == 0 else "",
+                )
+        handles, labels = axes.get_legend_handles_labels()
+        if len(labels) > 1:
+            axes.legend(handles, labels, loc="upper right", ncols=6, borderaxespad=0.1)
+        drawn = svg(page)
+    return Picture(title, caption, drawn)
+
+
+def _limits(lines: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
+    """Limits that hold all lines, and zero, with a margin."""
+    values = np.concatenate([np.zeros(1), *(y[np.isfinite(y)] for _, y in lines)])
+    low, high = float(values.min()), float(values.max())
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def lines_by_group(
+    title: str, caption: str, t: Array, panels: Mapping[str, Sequence[Line]], symlog: float
+) -> Picture:
+    """Lines over ``t`` (n,) [s], a panel with its own legend for each label of an axis, on a scale linear up to
+    ``symlog`` and logarithmic beyond."""
+    shown = few(len(t), 3 * _PIECES)
+    with figure(WIDTH, 0.4 + 2.0 * len(panels)) as page:
+        rows = page.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (label, lines) in zip(rows, panels.items(), strict=True):
+            axes.axhline(0.0, color=QUIET, lw=0.6)
+            for k, each in enumerate(lines):
+                values = np.where(np.isfinite(each.values), each.values, np.nan)
+                axes.plot(t[shown], values[shown], color=COLOURS[k], lw=0.9, label=each.label)
+            _symlog(axes, symlog)
+            axes.set_ylabel(label)
+            axes.margins(x=0.005)
+            axes.grid(axis="y")
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        rows[-1].set_xlabel("time [s]")
+        drawn = svg(page)
+    return Picture(title, caption, drawn)
+
+
+def _symlog(axes: Axes, linear: float) -> None:
+    """A scale linear up to that value and logarithmic beyond, with a tick at each power of ten."""
+    low, high = axes.get_ylim()
+    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
+    far = min(max(abs(low), abs(high), 3.0 * linear), 1e9 * linear)
+    powers = linear * 10.0 ** np.arange(0, int(np.log10(far / linear)) + 1)
+    every = powers[:: max(1, -(-len(powers) // 4))]
+    ticks = [*(-every[::-1]), 0.0, *every]
+    axes.set_yticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks])
+    axes.set_yticks([], minor=True)
+    axes.set_ylim(
+        max(low, -far) * 1.3 if low < 0.0 else -linear, min(high, far) * 1.3 if high > 0.0 else linear
+    )
+
+
+def path(t: Array, angles: Array, joints: Sequence[str], title: str, caption: str) -> Picture:
+    """Angles (n, k) [rad] of joints over ``t`` (n,) [s]; the background has the colour of the joint that turns."""
+    from matplotlib.ticker import MaxNLocator
+
+    shown = few(len(t), 400)
+    with figure(WIDTH, 2.3) as page:
+        axes = page.subplots()
+        for k, (joint, turned) in enumerate(zip(joints, np.degrees(angles).T, strict=True)):
+            for first, last in turning(t, np.radians(turned)):
+                axes.axvspan(first, last, color=COLOURS[k], alpha=0.13, lw=0)
+            known = shown[np.isfinite(turned[shown])]
+            axes.plot(t[known], turned[known], color=COLOURS[k], lw=1.4, label=joint)
+        axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 1.5, 3, 4.5, 9, 10]))
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("angle [°]")
+        axes.margins(x=0.005)
+        axes.grid(axis="y")
+        axes.axhline(0.0, color=INK, lw=0.4)
+        page.legend(loc="outside upper right", ncols=len(joints))
+        drawn = svg(page)
+    return Picture(title, caption, drawn)
+
+
+def turning(
+    t: Array, angle: Array, slowest: float = np.radians(0.05), window: float = 2.0
+) -> list[tuple[float, float]]:
+    """Times (from, to) [s] between which a joint with ``angle`` (n,) [rad] turned faster than ``slowest`` [rad/s].
+
+    The rate is that over a ``window`` [s]; rows that are NaN are left out.
+    """
+    known = np.isfinite(angle)
+    t, angle = t[known], angle[known]
+    if len(t) < 2:
+        return []
+    ends = t[0] + window * np.arange(int((t[-1] - t[0]) / window) + 1)
+    ends = np.append(ends, t[-1]) if ends[-1] < t[-1] else ends
+    at = np.interp(ends, t, angle)
+    moved = np.abs(np.diff(at)) > slowest * np.diff(ends)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moved, [False]]).astype(np.int64)))
+    return [(float(ends[a]), float(ends[b])) for a, b in edges.reshape(-1, 2)]

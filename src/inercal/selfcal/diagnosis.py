@@ -1,0 +1,252 @@
+"""What is wrong with a recording that contradicts the model: named, with its place.
+
+First the gross faults (`inercal.selfcal.faults`), each judged by what the error-state filter makes of the recording
+without it; single rows far off come last of these. Of what then is left, small constant errors that the model leaves
+out (`inercal.selfcal.unmodelled`), and last the size and the whiteness of the innovations. Every limit keeps a
+risk of a false finding of about 1e-3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.consistency import nis, surprising, whiteness
+from inercal.geometry.earth import EARTH_RATE
+from inercal.records.findings import Finding
+from inercal.records.places import counted, places
+from inercal.selfcal.display import shown_unit
+from inercal.selfcal.faults import RISK, Proposal, proposals
+from inercal.selfcal.filtered import Filtered, Problem
+from inercal.selfcal.recording import Recording
+from inercal.selfcal.unmodelled import Case, Found, directions, filtered, regular, search
+
+Array = NDArray[np.float64]
+
+SENSORS = ("accelerometers", "encoders")
+
+MOST_OUTLIERS = 60
+"""Rows that are left out one after the other before they no longer count as single."""
+
+WORTH = 1.1
+"""Ratio of scatter to stated noise, or its reciprocal, from which it is worth a word: 10 % in every u."""
+
+SAID = ("unit_suspect", "channel_swap", "sign_suspect")
+"""Findings of the reading of a recording before which nothing else can be told of it."""
+
+_FAULTS = 4
+
+
+def diagnose(recording: Recording, problem: Problem, found: Filtered) -> list[Finding]:
+    """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
+
+    Parameters
+    ----------
+    recording : Recording
+    problem : Problem
+    found : Filtered
+        What the estimator of the study made of it; the error-state filter judges the recording itself.
+    """
+    if any(finding.code in SAID for finding in recording.findings):
+        return []
+    repaired, findings = _without_faults(recording, problem)
+    now = filtered((repaired, problem))
+    if not findings or not _sound(now):
+        errors, case = search(repaired, problem)
+        findings += [_in_words(each, case) for each in errors]
+        findings += _scatter(case, filtered(case) if errors else now)
+    if not findings and not _sound(found):
+        text = (
+            f"the error-state filter finds no contradiction in this recording: the {found.kind} fails on it"
+        )
+        findings.append(Finding("filter_fails", text))
+    return findings
+
+
+def _sound(found: Filtered) -> bool:
+    """Whether a filter agrees with its recording, as a whole and in each row."""
+    if not found.converged:
+        return False
+    mean = nis(found.nis, found.dims)
+    return mean.excess <= 5.0 and not len(surprising(found.nis, found.dims, RISK))
+
+
+def _without_faults(recording: Recording, problem: Problem) -> tuple[Recording, list[Finding]]:
+    """The recording without its gross faults, and these."""
+    findings = list[Finding]()
+    now = filtered((recording, problem))
+    while len(findings) < _FAULTS and not _sound(now):
+        best, then = _best(proposals(recording, problem), now, problem)
+        if not _sound(then) and not _misfit(then) < 0.1 * _misfit(now):
+            single, after = _best(_outliers(recording, problem, now), now, problem)
+            if single is not None and _sound(after):
+                best, then = single, after
+            elif _sound(filtered(search(recording, problem)[1])):
+                break
+        # what explains less than half is not what happened
+        if best is None or not _misfit(then) < 0.5 * _misfit(now):
+            break
+        recording, now = best.recording, then
+        findings.append(best.finding)
+    return recording, findings
+
+
+def _best(tried: Iterable[Proposal], now: Filtered, problem: Problem) -> tuple[Proposal | None, Filtered]:
+    """The proposal that explains most beyond what chance does, and what the filter then makes of the recording."""
+    best, then, least = None, now, _misfit(now)
+    for each in tried:
+        found = filtered((each.recording, problem))
+        if (misfit := _misfit(found) + each.cost) < least:
+            best, then, least = each, found, misfit
+    return best, then
+
+
+def _misfit(found: Filtered) -> float:
+    """Sum of the normalised innovations squared; infinite where the filter diverged."""
+    total = float(found.nis[found.dims > 0].sum())
+    return total if found.converged and math.isfinite(total) else math.inf
+
+
+def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Proposal]:
+    """Single readings far from what the filter expects, left out one row after the other: an early one spoils what
+    follows."""
+    rows = np.zeros(0, dtype=np.int64)
+    left_out = 0
+    names = set[str]()
+    acc, th = recording.acc.copy(), recording.th.copy()
+    while now.converged and len(off := surprising(now.nis, now.dims, RISK)):
+        row = int(off[0])
+        wrong = np.abs(now.innovations[row]) > 4.0
+        if len(rows) == MOST_OUTLIERS or not wrong.any():
+            return []
+        if wrong[3:].any():
+            th[row + 1] = np.nan
+            names.add("th")
+        else:
+            acc[row + 1, wrong[:3]] = np.nan
+            names |= {f"acc_{axis}" for axis, each in zip("xyz", wrong[:3], strict=True) if each}
+        rows = np.append(rows, row)
+        left_out += 3 if wrong[3:].any() else int(wrong[:3].sum())
+        now = filtered((replace(recording, acc=acc.copy(), th=th.copy()), problem))
+    rows = np.unique(rows)
+    if not len(rows) or (len(rows) > 3 and np.ptp(rows) < 2 * len(rows)):
+        return []  # a change, not single readings
+    text = f"{counted(len(rows), 'reading')} far from what the filter expects, of {', '.join(sorted(names))}"
+    cost = left_out + 2.0 * len(rows) * math.log(2.0 * len(recording.t) / RISK)
+    finding = Finding("outlier", text, places("row", rows + 2))
+    return [Proposal(finding, replace(recording, acc=acc, th=th), cost)]
+
+
+def _in_words(error: Found, case: Case) -> Finding:
+    """A small constant error as a finding."""
+    cause, values, u = error.cause, error.values, error.u
+    if cause.kind == "latitude":
+        return _latitude(error, case)
+    if cause.kind == "delay":
+        rows, dt = float(values[0]), float(np.median(case[0].dt))
+        how = "later" if rows > 0.0 else "earlier"
+        text = f"the platform acts {1e3 * abs(rows) * dt:.3g} ms {how} than its commands are logged"
+        return Finding("command_shift", text)
+    if cause.kind in ("base", "scale"):
+        unit, size = shown_unit("rad" if cause.kind == "base" else "1")
+        seen = [
+            f"{name} = {value / size:.3g} +- {each / size:.1g} {unit}"
+            for name, value, each in zip(cause.names, values, u, strict=True)
+            if abs(value) > 3.0 * each
+        ] or [f"{', '.join(cause.names)} together"]
+        what = (
+            "the base or the zero of the encoders is turned"
+            if cause.kind == "base"
+            else "the gyros have scale errors"
+        )
+        advice = "set extended = true under [filter]"
+        if cause.kind == "base":
+            advice += ", or correct heading and tilt under [rig]"
+        return Finding("unmodelled", f"{what}, which the model leaves out: {', '.join(seen)}; {advice}")
+    amplitude = math.degrees(float(np.hypot(*values))) * 3600.0
+    _, order, _, joint = cause.kind.split()
+    text = f"{joint} errs periodically with its angle: {amplitude:.2g} arcsec, {counted(int(order), 'period')} a turn"
+    return Finding("unmodelled", text)
+
+
+def _latitude(error: Found, case: Case) -> Finding:
+    """Earth rate that is not that of the stated latitude; the case is corrected already."""
+    world = case[1].world
+    north, up = directions(world)
+    seen = math.atan2(float(world.earth @ up), float(world.earth @ north))
+    stated_earth = world.earth - error.values[0] * north - error.values[1] * up
+    stated = math.atan2(float(stated_earth @ up), float(stated_earth @ north))
+    u = float(np.hypot(error.u[0] * math.sin(seen), error.u[1] * math.cos(seen))) / EARTH_RATE
+    text = (
+        f"the earth rate seen is that of latitude {math.degrees(seen):.2f} +- {math.degrees(u):.1g} deg, stated is "
+        f"{math.degrees(stated):.2f} deg: check latitude and heading"
+    )
+    return Finding("site_suspect", text)
+
+
+def _scatter(case: Case, now: Filtered) -> list[Finding]:
+    """Innovations larger or smaller than the stated noise has them, or correlated in time."""
+    if not now.converged:
+        return [Finding("contradiction", f"the error-state filter fails on this recording: {now.message}")]
+    z = regular(case[0], now)
+    findings, wide = [], False
+    for sensor, columns in zip(SENSORS, (z[:, :3], z[:, 3:]), strict=True):
+        known = columns[np.isfinite(columns)]
+        if len(known) < 100:
+            continue
+        mean, error = float(np.mean(np.square(known))), math.sqrt(2.0 / len(known))
+        factor = math.sqrt(mean)
+        if mean > 1.0 + 5.0 * error:
+            wide = True
+            if _even(columns, mean) and whiteness(columns) > RISK:
+                text = f"{sensor}: noise is {factor:.3g} times what is stated, evenly over the recording"
+                findings.append(Finding("excess_scatter", text))
+        elif mean < 1.0 - 5.0 * error and factor * WORTH < 1.0:
+            text = f"{sensor}: noise is only {factor:.2g} of what is stated; the uncertainties are too large"
+            findings.append(Finding("low_scatter", text))
+    if findings:
+        return findings
+    if not wide and whiteness(z) > RISK:
+        return []
+    return [_restless(case) or _unexplained(z)]
+
+
+def _even(columns: Array, mean: float) -> bool:
+    """Whether the mean square is the same over ten parts of the recording (Bonferroni over the parts)."""
+    from scipy.special import ndtri
+
+    limit = -float(ndtri(0.5 * RISK / 10.0))
+    for part in np.array_split(columns, 10):
+        known = part[np.isfinite(part)]
+        if len(known) and abs(np.mean(np.square(known)) / mean - 1.0) > limit * math.sqrt(2.0 / len(known)):
+            return False
+    return True
+
+
+def _restless(case: Case) -> Finding | None:
+    """Gyro noise other than stated, where that explains the innovations."""
+    recording, problem = case
+    for factor in 2.0 ** np.array([*np.arange(0.5, 6.1, 0.5), -0.5, -1.0, -1.5, -2.0, -3.0]):
+        noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
+        now = filtered((recording, replace(problem, noise=noise)))
+        if _sound(now) and whiteness(regular(recording, now)) > RISK:
+            text = f"the gyros' angle random walk looks about {factor:.2g} times what is stated"
+            return Finding("excess_scatter" if factor > 1.0 else "low_scatter", text)
+    return None
+
+
+def _unexplained(z: Array) -> Finding:
+    """Innovations that no known fault explains, with the part of the recording where they are largest."""
+    parts = np.array_split(np.arange(len(z)), 20)
+    squares = np.square(z)
+    size = [float(np.nanmean(squares[part])) if np.isfinite(squares[part]).any() else 0.0 for part in parts]
+    worst = parts[int(np.argmax(size))]
+    text = (
+        f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1, or correlated in time), "
+        "and no fault that is looked for explains them"
+    )
+    return Finding("contradiction", text, places("row", worst + 2))

@@ -1,0 +1,206 @@
+"""A record as a recording of a platform: SI, one clock that increases, continuous angles, a rate for every step.
+
+What is missing is dealt with in one way: a rate is held until the next one is known, as the platform does that is
+commanded. So it is in a gap between rows, and where a rate is no number. That is right within a turn or a rest; where
+the command changed meanwhile the attitude is wrong from there on, which the filters show as inconsistent innovations.
+Angles and accelerometers that are missing are left out of the updates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import RecordError
+from inercal.records.findings import Finding
+from inercal.records.places import counted, places
+from inercal.records.record import Column, Record
+from inercal.selfcal.kinematics import TWO_PI
+from inercal.selfcal.plausibility import implausible, off_the_path
+from inercal.selfcal.recording import Recording
+from inercal.selfcal.settings import SelfcalSettings
+
+Array = NDArray[np.float64]
+
+FEWEST = 10
+"""Rows below which there is nothing to find out."""
+
+_EXPECTED = "expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z"
+
+
+def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
+    """The recording in a record, and what is suspicious about it in the light of the study.
+
+    Parameters
+    ----------
+    record : Record
+        ``th_x..z``, ``acc_x..z`` and the rate of the platform, commanded (``wc_x..z``) or measured (``gyro_x..z``,
+        where there is no ``wc``), on one clock. A rate belongs to the interval from its row to the next, one that was
+        recorded as an increment to the interval before; the last row's rate (or the first increment) is not used.
+    settings : SelfcalSettings
+        Rig, site and noise, against which rates, angles and accelerometers are compared; and the plan.
+
+    Returns
+    -------
+    Recording
+        From the first row of which angles and rate are complete.
+
+    Raises
+    ------
+    RecordError
+        Columns that are missing or on different clocks, time that does not increase, fewer than ten rows, no
+        accelerometers, or units of rates and angles that contradict each other.
+    """
+    where = record.sources[0].path if record.sources else "record"
+    sensor = _rate_sensor(record, where)
+    columns = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
+    for column in columns[1:]:
+        if column.t is not columns[0].t:
+            raise RecordError(
+                where,
+                f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time",
+            )
+    rate, th, acc = (np.stack([each.si() for each in columns[k : k + 3]], axis=-1) for k in (0, 3, 6))
+    rate = _from_row_to_row(rate, columns[:3])
+    if not np.isfinite(acc).any():
+        raise RecordError(where, "acc_x, acc_y, acc_z hold no number, expected specific force in m/s^2 or g")
+    time = columns[0].t
+    rows, findings = _used_rows(time, th, rate, where)
+    t, rate, th, acc = time[rows], rate[rows[:-1]], th[rows], acc[rows]
+    _increasing(t, rows, where)
+    findings += _held(rate, rows, sensor)
+    findings += _gaps(t, record)
+    th, turned = _continuous(th)
+    if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
+        findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
+    said = (*_worth_saying(record, columns), *findings)
+    recording = Recording(t, _hold(rate), th, acc, sensor == "gyro", said, record.sources)
+    findings = implausible(recording, settings, where)
+    if settings.plan is not None:
+        began = float(time[np.argmax(np.isfinite(time))])
+        findings += off_the_path(recording, settings.plan, began, rows)
+    return replace(recording, findings=(*said, *findings))
+
+
+def _rate_sensor(record: Record, where: str) -> str:
+    """``wc`` or ``gyro``, whichever is there whole; refuses a record without all columns."""
+    there = [
+        sensor
+        for sensor in ("wc", "gyro")
+        if all(f"{sensor}_{axis}" in record and _any(record[f"{sensor}_{axis}"]) for axis in "xyz")
+    ]
+    missing = [f"{name}_{axis}" for name in ("th", "acc") for axis in "xyz" if f"{name}_{axis}" not in record]
+    if not there or missing:
+        lacking = f"no {', '.join(missing)}" if missing else "no whole rate wc_x, wc_y, wc_z"
+        raise RecordError(
+            where, f"found {lacking} among {', '.join(record.columns) or 'no columns'}, {_EXPECTED}"
+        )
+    return there[0]
+
+
+def _worth_saying(record: Record, columns: list[Column]) -> list[Finding]:
+    """Findings of the record but for numbers that nobody needs: the last row's rate, the first row's accelerometers."""
+    needless = {
+        column.name: 0 if column.name.startswith("acc") else len(column.values) - 1 for column in columns
+    }
+    empty = {
+        f"{column.name}: 1 missing value"
+        for column in columns
+        if np.flatnonzero(np.isnan(column.values)).tolist() == [needless[column.name]]
+        and not column.name.startswith("th")
+    }
+    return [each for each in record.findings if each.code != "nan" or each.message not in empty]
+
+
+def _any(column: Column) -> bool:
+    """True for a column with a number in it."""
+    return bool(np.isfinite(column.values).any())
+
+
+def _from_row_to_row(rate: Array, columns: list[Column]) -> Array:
+    """Rates (n, 3) as held from each row to the next: increments were gained since the row before."""
+    gained = [column.increment for column in columns]
+    later = np.vstack([rate[1:], np.full((1, 3), np.nan)])
+    return np.where(gained, later, rate)
+
+
+def _used_rows(t: Array, th: Array, rate: Array, where: str) -> tuple[NDArray[np.int64], list[Finding]]:
+    """Rows (from 0) with a time, from the first that is complete on."""
+    timed = np.flatnonzero(np.isfinite(t))
+    whole = np.isfinite(th[timed]).all(axis=1) & np.isfinite(rate[timed]).all(axis=1)
+    rows = timed[int(np.argmax(whole)) :] if whole.any() else timed[:0]
+    if len(rows) < FEWEST:
+        raise RecordError(
+            where,
+            f"found {counted(len(rows), 'row')} from the first with a time, all angles and a rate on, "
+            f"expected {FEWEST} or more",
+        )
+    findings = []
+    untimed = np.setdiff1d(np.arange(rows[0], len(t)), rows)
+    if untimed.size:
+        text = f"t: {counted(untimed.size, 'row')} without a time left out, the rate before held"
+        findings.append(Finding("nan", text, places("row", untimed + 1)))
+    if rows[0] > 0:
+        text = f"{counted(int(rows[0]), 'row')} before the first with a time, all angles and a rate left out"
+        findings.append(Finding("nan", text, places("row", np.arange(1, rows[0] + 1))))
+    return rows, findings
+
+
+def _increasing(t: Array, rows: NDArray[np.int64], where: str) -> None:
+    """Refuse time that stands still or runs backward."""
+    wrong = np.flatnonzero(np.diff(t) <= 0.0)
+    if wrong.size:
+        k = int(wrong[0])
+        more = f" and {wrong.size - 1} more" if wrong.size > 1 else ""
+        raise RecordError(
+            where,
+            f"t: row {rows[k + 1] + 1} is at {t[k + 1]:.10g} s after {t[k]:.10g} s{more}, expected time to increase "
+            '(a map with ignore = true and rate = "5 Hz" under [time] does without stamps)',
+        )
+
+
+def _held(rate: Array, rows: NDArray[np.int64], sensor: str) -> list[Finding]:
+    """``nan``: rows between which the rate before is held."""
+    lacking = np.flatnonzero(~np.isfinite(rate).all(axis=1))
+    if not lacking.size:
+        return []
+    text = (
+        f"{sensor}: no rate in {counted(lacking.size, 'row')}, the one before is held; where it changed meanwhile "
+        "the attitude is wrong from there on"
+    )
+    return [Finding("nan", text, places("row", rows[lacking] + 1))]
+
+
+def _hold(rate: Array) -> Array:
+    """Rates (m, 3) with each missing number replaced by the last known; the first row is complete."""
+    row = np.where(np.isfinite(rate), np.arange(len(rate))[:, None], 0)
+    return np.asarray(np.take_along_axis(rate, np.maximum.accumulate(row, axis=0), axis=0))
+
+
+def _gaps(t: Array, record: Record) -> list[Finding]:
+    """What a ``gap`` of the record means here."""
+    if all(finding.code != "gap" for finding in record.findings):
+        return []
+    step = np.diff(t)
+    long = step > 1.5 * np.median(step)
+    text = (
+        f"the rate before is held through {step[long].sum():.4g} s without rows; where it changed meanwhile the "
+        "attitude is wrong from there on"
+    )
+    return [Finding("gap", text)] if long.any() else []
+
+
+def _continuous(th: Array) -> tuple[Array, list[str]]:
+    """Angles (n, 3) [rad] without jumps by full turns, missing ones aside; names of those that had some."""
+    th, turned = th.copy(), []
+    for k, axis in enumerate("xyz"):
+        known = np.flatnonzero(np.isfinite(th[:, k]))
+        turns = np.round((th[known, k] - np.unwrap(th[known, k])) / TWO_PI)
+        if turns.any():
+            turned.append(f"th_{axis}")
+        th[known, k] -= (
+            TWO_PI * turns
+        )  # to the digits of `nearest_turn`, so that a stream gives what a file gives
+    return th, turned

@@ -1,0 +1,130 @@
+"""What the commands run on a study of self-calibration: a calibration of a record, by one estimator or by all."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import Estimate
+from inercal.records.record import Record
+from inercal.selfcal import filtering
+from inercal.selfcal.bounds import Bounds, recorded_bounds
+from inercal.selfcal.diagnosis import diagnose
+from inercal.selfcal.filtered import Filtered, Problem, problem
+from inercal.selfcal.heading import with_heading
+from inercal.selfcal.outcome import assemble
+from inercal.selfcal.reading import recording_of
+from inercal.selfcal.recording import Recording
+from inercal.selfcal.settings import KINDS, SelfcalSettings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """An ``estimate``, and the evidence behind it for pictures and tests.
+
+    ``compared`` holds what the other estimators found, by kind, where a comparison was asked for; ``truth`` (p,) are
+    the coefficients in the product form where the study states them.
+    """
+
+    estimate: Estimate
+    problem: Problem
+    recording: Recording
+    filtered: Filtered
+    bounds: Bounds
+    compared: Mapping[str, Filtered] = field(default_factory=dict)
+    truth: Array | None = None
+
+
+def load_kernels(settings: SelfcalSettings, compare: bool = False) -> None:
+    """Load, or compile, all kernels that `calibrate` uses, so that they do not count in its time."""
+    of = problem(settings)
+    kinds = {"error-state", of.filter.kind} | (set(KINDS) if compare else set())
+    for kind in KINDS:
+        if kind in kinds:
+            filtering.load_kernels(kind, of)
+    none = np.empty((0, 3))
+    empty = Recording(np.empty(0), none, none, none)
+    recorded_bounds(empty, of, np.empty((0, 4)), np.zeros(len(of.prior)), contributions=True)
+
+
+def calibrate(
+    record: Record,
+    settings: SelfcalSettings,
+    compare: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Calibration:
+    """Calibrate a platform from what it recorded while it turned.
+
+    Parameters
+    ----------
+    record : Record
+        ``t``, ``wc_x..`` or ``gyro_x..``, ``th_x..``, ``acc_x..``.
+    settings : SelfcalSettings
+        Site, rig, noise, prior, estimator.
+    compare : bool
+        Run all other estimators too.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    Calibration
+        Its estimate's status says whether the values can be used; nothing is raised for a poor one.
+
+    Raises
+    ------
+    InputError
+        The record has not the channels of a platform, or the study does not fit it.
+    """
+    clock = time.perf_counter()
+    recording = recording_of(record, settings)
+    if settings.heading_unknown:
+        progress("looking for the heading")
+        settings = with_heading(recording, settings)
+    of = problem(settings)
+    progress(f"filtering ({of.filter.kind})")
+    found = filtering.estimate(recording, of)
+    assert found.history is not None
+    bounds = recorded_bounds(recording, of, found.history.attitude, found.coefficients, contributions=True)
+    progress("looking for faults")
+    faults = diagnose(recording, of, found)
+    compared: dict[str, Filtered] = {}
+    for kind in KINDS if compare else ():
+        if kind != found.kind:
+            progress(f"filtering ({kind})")
+            compared[kind] = filtering.estimate(recording, of, kind)
+    progress("assembling")
+    estimate = assemble(recording, settings, found, bounds, faults)
+    told = dict(estimate.result)
+    if settings.heading_unknown and estimate.names:
+        told["heading"] = _heading(settings, estimate)
+    for name, other in compared.items():
+        told["compare"] |= {name: _beside(other, assemble(recording, settings, other, bounds, faults))}
+    timed = replace(estimate, result=told, timing={"solve": time.perf_counter() - clock})
+    truth = None if settings.truth is None else settings.truth[: len(of.prior)]
+    return Calibration(timed, of, recording, found, bounds, compared, truth)
+
+
+def _beside(found: Filtered, estimate: Estimate) -> dict[str, Any]:
+    """What a comparison tells of an estimator."""
+    return {
+        "parameters": {p.name: {"value": p.value, "u": p.u} for p in estimate.parameters.values()},
+        "status": estimate.status.value,
+        "step_us": found.step_us,
+    }
+
+
+def _heading(settings: SelfcalSettings, estimate: Estimate) -> dict[str, float]:
+    """The heading that was found [rad], from north to east: beta about the upward axis corrects the one taken."""
+    up = int(np.argmax(np.abs(settings.world.up)))
+    beta = estimate[f"beta_{'xyz'[up]}"]
+    found = settings.base.heading + float(np.sign(settings.world.up[up])) * beta.value
+    return {"value": math.remainder(found, 2.0 * math.pi), "u": beta.u}

@@ -1,0 +1,321 @@
+"""``inercal selfcal`` and ``inercal design selfcal``: from a simulated file to coefficients, histories and a page."""
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+from paper_study import TRUTH
+
+from inercal.cli import run
+from inercal.cli.selfcal import Kind
+from inercal.estimate.exchange import load
+from inercal.selfcal.coefficients import NAMES
+from inercal.selfcal.settings import KINDS
+from inercal.study.load import load_selfcal_study
+
+POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
+RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")
+SELFCAL = ["selfcal", "platform.csv", "--study", "selfcal.toml"]
+#: what the paper's path at the nominal noise tells least of
+UNSEEN = ("ds_z", "do_y")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The study of the paper at the best path, its simulated recording, and a piece of it."""
+    path = tmp_path_factory.mktemp("selfcal")
+    study, out = path / "selfcal.toml", path / "platform.csv"
+    assert run(["new", "selfcal", "--out", str(study), "--quiet"]) == 0
+    text = study.read_text().replace('"45(26) deg"', '"40 deg"').replace('"0(300) m"', '"0 m"')
+    turns = next(line for line in text.splitlines() if line.startswith("turns = [["))
+    study.write_text(text.replace(turns, 'path = "best"'))
+    assert run(["simulate", "selfcal", str(study), "--seed", "8", "--out", str(out), "--quiet"]) == 0
+    rows = out.read_text().splitlines(keepends=True)
+    (path / "short.csv").write_text("".join(rows[:400]))
+    return path
+
+
+@pytest.fixture(autouse=True)
+def here(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def told(capsys, *arguments):
+    """The JSON object of a command that is done, and its exit code."""
+    capsys.readouterr()
+    code = run([*arguments, "--json", "--quiet"])
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return code, json.loads(captured.out, parse_constant=lambda text: pytest.fail(f"{text} is not JSON"))
+
+
+def values_and_u(data):
+    """Values (p,) and u (p,) of a JSON object."""
+    return np.array([[p["value"], p["u"]] for p in data["parameters"]]).T
+
+
+def piped(monkeypatch, capsys, *arguments, log="platform.csv"):
+    """Exit code, standard output and error of a command with the recording as its standard input."""
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(Path(log).read_bytes())))
+    capsys.readouterr()
+    code = run(list(arguments))
+    return code, *capsys.readouterr()
+
+
+def said_once(captured, *words):
+    """Standard output is empty, standard error one line of the right form that holds the words."""
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1, captured.err
+    assert captured.err.startswith("inercal: error: ")
+    for word in words:
+        assert word in captured.err
+
+
+# One recording.
+
+
+def test_json_is_the_contract_and_holds_the_truth(capsys):
+    code, data = told(capsys, *SELFCAL)
+    assert (code, data["command"], data["status"]["code"]) == (0, "selfcal", "ok")
+    assert [p["name"] for p in data["parameters"]] == list(NAMES) == data["covariance"]["names"]
+    values, u = values_and_u(data)
+    assert np.abs((values - TRUTH[:18]) / u).max() < 4.5
+    assert {p["unit"] for p in data["parameters"]} == {"rad/s", "rad", "m/s^2", "1"}
+    result = data["result"]
+    assert result["filter"] == "error-state"
+    assert list(result["bounds"]) == list(NAMES)
+    assert result["at_prior"] == []
+    # what is uncertain beside the recording may only add to the bound
+    assert (u > 0.97 * np.array(list(result["bounds"].values()))).all()
+    assert 0.0 < result["step_us"] < 1e4
+    assert set(data["timing_s"]) == {"read", "solve", "total"}
+    assert data["timing_s"]["solve"] < data["timing_s"]["total"]
+    assert sorted(Path(each["path"]).name for each in data["inputs"]) == ["platform.csv", "selfcal.toml"]
+    assert abs(data["statistics"]["nis_mean"] - 6.0) < 5.0 * np.sqrt(12.0 / 2700.0)
+
+
+def test_people_see_units_of_the_field_and_get_their_files(capsys):
+    assert run([*SELFCAL, "--out", "cal.toml", "--report", "cal.html"]) == 0
+    captured = capsys.readouterr()
+    row = next(line.split() for line in captured.out.splitlines() if line.startswith("kg0_z"))
+    assert row[-1] == "deg/h"
+    assert abs(float(row[1]) - 0.10) < 4.5 * float(row[2])
+    for unit in ("arcsec", "ug", "ppm"):
+        assert unit in captured.out
+    assert "ok: " in captured.out
+    assert "cal.html" in captured.err
+    assert Path("cal.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
+    values, u = load("cal.toml").values, load("cal.toml").u
+    assert np.abs((values - TRUTH[:18]) / u).max() < 4.5
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".h5", ".parquet", ".nc"])
+def test_histories_end_with_the_estimate(suffix, capsys):
+    """Each row is what was known then: the first the prior, the last what the command says."""
+    code, data = told(capsys, *SELFCAL, "--out", f"history{suffix}")
+    assert code == 0
+    if suffix != ".csv":
+        assert Path(f"history{suffix}").stat().st_size > 2701 * 40
+        return
+    found = np.genfromtxt("history.csv", delimiter=",", names=None, skip_header=1)
+    titles = Path("history.csv").read_text().split("\n", 1)[0].split(",")
+    assert titles[:4] == ["t [s]", "th_x [rad]", "th_y [rad]", "th_z [rad]"]
+    last = dict(zip(titles, found[-1].tolist(), strict=True))
+    for p in data["parameters"]:
+        assert last[f"{p['name']} [{p['unit']}]"] == pytest.approx(p["value"], rel=1e-14)
+    first = dict(zip(titles, found[0].tolist(), strict=True))
+    assert first["u_ka1_y [1]"] == pytest.approx(1500e-6)
+    assert np.isnan(first["nis_mean [1]"])
+    # the attitude is that of the encoders, to their noise
+    platform = np.genfromtxt("platform.csv", delimiter=",", skip_header=1)
+    assert np.abs(found[:, 1:4] - np.radians(platform[:, 4:7])).max() < np.radians(10.0 / 3600.0)
+
+
+def test_any_estimator_can_be_chosen_and_they_agree(capsys):
+    """Recursive filters and the batch within 0.02 u of each other on one recording."""
+    assert get_args(Kind) == KINDS
+    _, data = told(capsys, *SELFCAL)
+    values, u = values_and_u(data)
+    for kind in ("mukf", "svd-qukf", "gimbal-ukf", "map"):
+        code, other = told(capsys, *SELFCAL, "--filter", kind)
+        assert (code, other["result"]["filter"]) == (0, kind)
+        assert np.abs((values_and_u(other)[0] - values) / u).max() < 0.02
+
+
+def test_compare_sets_all_estimators_side_by_side(capsys):
+    assert run([*SELFCAL, "--compare", "--out", "compared.json"]) == 0
+    printed = capsys.readouterr().out
+    for words in ("Filters side by side", "Errors in percent of the truth", "time of a row [µs]", *KINDS):
+        assert words in printed
+    compare = load("compared.json").result["compare"]
+    assert set(compare) >= set(KINDS) - {"error-state"}
+    for kind in ("mukf", "map"):
+        assert compare[kind]["status"] == "ok"
+        assert compare[kind]["step_us"] > 0.0
+        assert list(compare[kind]["parameters"]) == list(NAMES)
+
+
+def test_a_bad_verdict_is_exit_code_one_and_still_the_whole_object(capsys):
+    code, data = told(capsys, *SELFCAL, "--set", "noise.accelerometer=1 ug")
+    assert (code, data["status"]["code"]) == (1, "inconsistent")
+    assert len(data["parameters"]) == 18
+    code, data = told(capsys, "selfcal", "short.csv", *SELFCAL[2:])
+    assert (code, data["status"]["code"]) == (1, "unobservable")
+    assert {"do_y", "ka1_z"} <= set(data["result"]["at_prior"])
+
+
+def test_a_calibration_is_applied_to_its_recording(capsys):
+    assert run([*SELFCAL, "--out", "cal.json", "--quiet"]) == 0
+    assert run(["apply", "cal.json", "platform.csv", "--out", "corrected.csv", "--quiet"]) == 0
+    columns = np.genfromtxt("corrected.csv", delimiter=",", skip_header=2)
+    size = np.linalg.norm(columns[:, 7:10], axis=1)
+    settings = load_selfcal_study("selfcal.toml")
+    # 10 ug of noise and what is left of the coefficients, but no longer 500 ppm
+    assert np.abs(size / settings.site.gravity - 1.0).max() < 60e-6
+
+
+# Live.
+
+
+@pytest.mark.parametrize("kind", RECURSIVE)
+def test_a_stream_gives_the_bytes_of_the_history(kind, capsys, monkeypatch):
+    name = f"{kind}.csv"
+    assert run([*SELFCAL, "--filter", kind, "--out", name, "--quiet"]) == 0
+    stream = ["selfcal", "--stream", *SELFCAL[2:], "--filter", kind, "--quiet"]
+    code, out, err = piped(monkeypatch, capsys, *stream)
+    assert (code, err) == (0, "")
+    assert out == Path(name).read_text()
+
+
+def test_a_stream_from_a_file_a_line_a_minute(capsys):
+    assert run([*SELFCAL, "--stream", "--every", "1 min", "--quiet"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [float(line.split(",")[0]) for line in lines[1:]] == pytest.approx(60.0 * np.arange(10))
+
+
+def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
+    stream = ["selfcal", "--stream", *SELFCAL[2:], "--set", "noise.accelerometer=1 ug"]
+    code, out, err = piped(monkeypatch, capsys, *stream, log="short.csv")
+    assert (code, out.count("\n")) == (0, 400)
+    assert err.count("excess_scatter: NIS is ") == 1
+
+
+@POSIX
+@pytest.mark.parametrize("kind", RECURSIVE[:3])
+def test_killed_at_any_moment_and_restarted(kind, capsys, tmp_path):
+    """Killed without warning, while it works: each row is answered, and always with the same digits."""
+    command = ["selfcal", "--stream", *SELFCAL[2:], "--filter", kind, "--quiet"]
+    assert run([*command[:1], "short.csv", *command[1:]]) == 0
+    whole = capsys.readouterr().out.encode().splitlines(keepends=True)
+    saving = ["--checkpoint", str(tmp_path / "state"), "--checkpoint-every", "17"]
+    given = []
+    for lines in (*np.random.default_rng(KINDS.index(kind)).integers(20, 200, 2), None):
+        with open("short.csv", "rb") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "inercal", *command, *saving], stdin=log, stdout=subprocess.PIPE
+            )
+        if lines is not None:
+            given += [process.stdout.readline() for _ in range(lines)]
+            process.send_signal(signal.SIGKILL)
+        given += process.stdout.readlines()
+        process.stdout.close()
+        assert process.wait(60) == (0 if lines is None else -signal.SIGKILL)
+        if not given[-1].endswith(b"\n"):
+            given.pop()  # killed in the middle of a line
+    assert set(given) == set(whole)
+    assert list(dict.fromkeys(given)) == whole
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["selfcal", "none.csv", *SELFCAL[2:]], ["none.csv"]),
+        (["selfcal", "platform.csv"], ["--study"]),
+        (["selfcal", *SELFCAL[2:]], ["FILES is missing", "--stream"]),
+        ([*SELFCAL, "--filter", "kalman"], ["kalman", "error-state"]),
+        ([*SELFCAL, "--out", "cal.txt"], ["cal.txt", "'.txt'", ".json"]),
+        ([*SELFCAL, "--out", "platform.csv"], ["is an input"]),
+        ([*SELFCAL, "--report", "cal.pdf"], [".html"]),
+        ([*SELFCAL, "--every", "1 s"], ["--every", "--stream"]),
+        ([*SELFCAL, "--checkpoint", "c"], ["--checkpoint", "--stream"]),
+        ([*SELFCAL, "--stream", "--json"], ["--json", "stream"]),
+        ([*SELFCAL, "--stream", "--out", "x.csv"], ["--out", "stream"]),
+        ([*SELFCAL, "--stream", "--report", "x.html"], ["--report", "stream"]),
+        ([*SELFCAL, "--stream", "--compare"], ["--compare", "stream"]),
+        ([*SELFCAL, "--stream", "--every", "0 s"], ["--every", "above 0"]),
+        ([*SELFCAL, "--stream", "--filter", "map"], ["filter.kind", "map", "error-state"]),
+        ([*SELFCAL, "--stream", "--set", "rig.heading=unknown"], ["rig.heading", "stream"]),
+        ([*SELFCAL, "--stream", "--checkpoint", "platform.csv"], ["is an input"]),
+        (["selfcal", "platform.csv", "short.csv", *SELFCAL[2:], "--stream"], ["--stream", "2 files"]),
+        ([*SELFCAL, "--set", "noise.encoder=0 arcsec"], ["noise.encoder", "0 arcsec"]),
+        ([*SELFCAL, "--set", "filter.kid=mukf"], ["filter.kid", "kind"]),
+        (["selfcal", "no_wc.csv", *SELFCAL[2:]], ["no_wc.csv", "wc_x"]),
+        (["selfcal", "radians.csv", *SELFCAL[2:]], ["radians.csv", "degrees and radians"]),
+        (["selfcal", "three.csv", *SELFCAL[2:]], ["three.csv", "rows"]),
+        (["design", "selfcal", "selfcal.toml", "--out", "plan.csv"], ["plan.csv", ".toml"]),
+        (["design", "selfcal", "none.toml"], ["none.toml"]),
+    ],
+)
+def test_bad_input_is_one_sentence_and_nothing_is_written(arguments, words, capsys, folder):
+    text = Path("short.csv").read_text()
+    lines = text.splitlines()
+    Path("no_wc.csv").write_text(
+        "\n".join(",".join(f.split(",")[:1] + f.split(",")[4:]) for f in lines) + "\n"
+    )
+    Path("radians.csv").write_text(
+        text.replace("th_x [deg],th_y [deg],th_z [deg]", "th_x [rad],th_y [rad],th_z [rad]")
+    )
+    Path("three.csv").write_text("\n".join(lines[:4]) + "\n")
+    before = sorted(path.name for path in folder.iterdir())
+    for more in ([], ["--json"] if "--stream" not in arguments else []):
+        capsys.readouterr()
+        assert run([*arguments, *more]) == 2
+        said_once(capsys.readouterr(), *words)
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
+# Path design.
+
+QUICK = ["--set", "design.turns=3", "--set", "design.angle=90 deg"]
+
+
+def test_a_designed_path_goes_into_a_study_and_keeps_what_it_promised(capsys):
+    """The written [plan], in the place of the study's, gives the bounds that the design predicts."""
+    code, data = told(capsys, "design", "selfcal", "selfcal.toml", *QUICK, "--out", "plan.toml")
+    assert (code, data["command"]) == (0, "design selfcal")
+    result = data["result"]
+    assert set(result) >= {"turns", "rank", "condition", "d_efficiency", "predicted", "compare"}
+    assert list(result["predicted"]) == list(NAMES)
+    plan = tomllib.loads(Path("plan.toml").read_text())["plan"]
+    assert plan["turns"] == result["turns"]
+    text = Path("selfcal.toml").read_text()
+    begin, end = text.index("[plan]"), text.index("[truth]")
+    Path("designed.toml").write_text(text[:begin] + Path("plan.toml").read_text() + "\n" + text[end:])
+    assert run(["simulate", "selfcal", "designed.toml", "--out", "designed.csv", "--quiet"]) == 0
+    code, found = told(capsys, "selfcal", "designed.csv", "--study", "designed.toml")
+    assert code == 0
+    predicted = np.array(list(result["predicted"].values()))
+    np.testing.assert_allclose(list(found["result"]["bounds"].values()), predicted, rtol=0.03)
+
+
+def test_a_design_is_printed_and_drawn(capsys):
+    assert (
+        run(["design", "selfcal", "selfcal.toml", *QUICK, "--report", "design.html", "--out", "design.json"])
+        == 0
+    )
+    captured = capsys.readouterr()
+    assert "up to 3 turns of multiples of 90 deg in 540 s" in captured.out
+    assert "design.html" in captured.err
+    assert Path("design.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
+    assert json.loads(Path("design.json").read_text())["result"]["compare"][0]["name"] == "found"

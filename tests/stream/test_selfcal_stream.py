@@ -1,0 +1,251 @@
+"""A platform calibrated row by row: to the digits of the whole file, whatever the rows are like, killed or not."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from paper_study import TRUTH, study
+
+from inercal.errors import InputError, RecordError, StudyError
+from inercal.records.read import read
+from inercal.records.write import write_record
+from inercal.selfcal.filtered import problem
+from inercal.selfcal.filtering import estimate
+from inercal.selfcal.history import history_record
+from inercal.selfcal.plan import Plan, Rest, Turn
+from inercal.selfcal.reading import recording_of
+from inercal.selfcal.settings import Disturbances, Filter, Gating
+from inercal.selfcal.simulate import experiment, simulate, to_record
+from inercal.stream.lines import Lines
+from inercal.stream.run import Saving, run
+from inercal.stream.selfcal import Selfcal
+
+DEG = np.pi / 180.0
+RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")
+
+#: through more than half a turn, so that encoders wrap, and away from gimbal lock
+SHORT = Plan((Turn("z", 210 * DEG), Turn("y", 20 * DEG), Rest(4.0), Turn("x", -30 * DEG)), rate=5.0 * DEG)
+
+
+def recorded(tmp_path, seed=1, plan=SHORT, change=lambda rows: rows, **disturbances):
+    """Header and rows of a simulated file, fields as text."""
+    settings = study(plan=plan, disturbances=Disturbances(**disturbances))
+    record = to_record(simulate(experiment(settings), np.random.default_rng(seed)).recording)
+    write_record(record, tmp_path / "log.csv")
+    header, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    fields = change([dict(zip(header.split(","), row.split(","), strict=True)) for row in rows])
+    return "\n".join([header, *(",".join(row.values()) for row in fields)]) + "\n"
+
+
+def live(text, settings, every=0.0, saving=None, kill=None, said=None):
+    """Lines out for such a file."""
+    lines = Lines(io.BytesIO(text.encode()), "log", None, lambda finding: None)
+    estimator = Selfcal(lines, problem(settings), every, lambda f: None if said is None else said.append(f))
+    if kill is not None:
+        whole = estimator.step
+
+        def step(state, sample):
+            if sample.row == kill:
+                raise RuntimeError
+            return whole(state, sample)
+
+        estimator.step = step
+    out = []
+    try:
+        run(estimator, lines, out.append, saving)
+    except RuntimeError:
+        assert kill is not None
+    return out
+
+
+def of_file(text, settings, tmp_path):
+    """The history that a whole file gives, as lines."""
+    (tmp_path / "whole.csv").write_text(text)
+    recording = recording_of(read(tmp_path / "whole.csv"), settings)
+    told = problem(settings)
+    write_record(history_record(estimate(recording, told), recording, told.world), tmp_path / "history.csv")
+    return (tmp_path / "history.csv").read_text().splitlines()
+
+
+def flawed(rows):
+    """Rows that wait for their angles, lose some, lack rates, have no time, wrap, and are not there."""
+    for row in rows:
+        row["th_z [deg]"] = repr((float(row["th_z [deg]"] or "nan") + 180.0) % 360.0 - 180.0).replace(
+            "nan", ""
+        )
+    rows[0]["th_y [deg]"] = ""
+    rows[1]["wc_x [deg/h]"] = ""
+    rows[60]["wc_z [deg/h]"] = ""
+    rows[80]["t [s]"] = ""
+    rows[90]["acc_y [m/s^2]"] = ""
+    rows[95]["th_x [deg]"] = ""
+    return rows[:150] + rows[158:]
+
+
+@pytest.mark.parametrize("kind", RECURSIVE)
+def test_lines_are_the_history_of_the_whole_file_to_the_last_digit(kind, tmp_path):
+    settings = study(plan=None, filter=Filter(kind))
+    text = recorded(tmp_path, dropouts=0.05, change=flawed)
+    assert live(text, settings) == of_file(text, settings, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "filter_", [Filter(extended=True), Filter(gating=Gating("channel")), Filter("mukf", factor="svd")]
+)
+def test_so_they_are_with_other_states_gating_and_factors(filter_, tmp_path):
+    settings = study(plan=None, filter=filter_)
+    text = recorded(tmp_path, 2)
+    assert live(text, settings) == of_file(text, settings, tmp_path)
+
+
+def test_measured_rates_in_the_place_of_commanded_ones(tmp_path):
+    settings = study(plan=None)
+    text = recorded(tmp_path, 3).replace("wc_", "gyro_")
+    assert live(text, settings) == of_file(text, settings, tmp_path)
+
+
+@pytest.mark.parametrize("kind", RECURSIVE)
+def test_killed_anywhere_and_resumed(kind, tmp_path):
+    """Before the start, at its first row, in the midst and near the end: every line is one of the whole run."""
+    settings = study(plan=None, filter=Filter(kind))
+    text = recorded(tmp_path, 4, change=flawed)
+    whole = live(text, settings)
+    saving = Saving(tmp_path / "state", 7)
+    given = []
+    for kill in (1, 3, 20, 100, 155, None):
+        given += live(text, settings, saving=saving, kill=kill)
+    assert set(given) == set(whole)
+    assert list(dict.fromkeys(given)) == whole
+
+
+def test_a_state_of_another_study_is_not_gone_on_with(tmp_path):
+    text = recorded(tmp_path)
+    saving = Saving(tmp_path / "state", 50)
+    live(text, study(plan=None), saving=saving)
+    with pytest.raises(InputError, match="other settings"):
+        live(text, study("paper", "low", plan=None), saving=saving)
+
+
+def test_coefficients_come_to_the_truth_and_their_uncertainty_holds_it(tmp_path):
+    """At the end of the paper's path the last line is within 4.5 u of the truth, u far below the prior."""
+    settings = study()
+    out = live(recorded(tmp_path, 5, plan=settings.plan), settings, every=60.0)
+    last = dict(zip(out[0].split(","), map(float, out[-1].split(",")), strict=True))
+    names = [title for title in last if f"u_{title}" in last]
+    assert len(names) == 18
+    values = np.array([last[name] for name in names])
+    u = np.array([last[f"u_{name}"] for name in names])
+    assert np.abs((values - TRUTH[:18]) / u).max() < 4.5
+    # dsz and doy are what this path cannot tell
+    told = [k for k, name in enumerate(names) if name.split(" ")[0] not in ("ds_z", "do_y")]
+    assert (u / settings.prior[:18])[told].max() < 0.05
+    assert abs(last["nis_mean [1]"] - 6.0) < 5.0 * np.sqrt(12.0 / 2700.0)
+    # a line a minute: 0 to 540 s
+    assert [float(line.split(",")[0]) for line in out[1:]] == pytest.approx(60.0 * np.arange(10))
+
+
+def test_it_waits_for_the_first_whole_row(tmp_path):
+    text = recorded(tmp_path, change=flawed)
+    out = live(text, study(plan=None))
+    assert float(out[1].split(",")[0]) == pytest.approx(0.4)
+    first = dict(zip(out[0].split(","), out[1].split(","), strict=True))
+    assert first["nis [1]"] == first["nis_mean [1]"] == ""
+    assert float(first["kg0_x [rad/s]"]) == 0.0
+    assert float(first["u_ka1_z [1]"]) == pytest.approx(1500e-6, rel=1e-12)
+    for axis in "xyz":
+        assert float(first[f"u_attitude_{axis} [rad]"]) == pytest.approx(2.0 / 3600.0 * DEG, rel=1e-3)
+
+
+def test_a_row_that_is_not_later_is_left_out_and_time_that_stays_behind_refused(tmp_path):
+    settings = study(plan=None)
+    clean = recorded(tmp_path)
+    rows = clean.splitlines(keepends=True)
+    twice = "".join([*rows[:100], rows[99], *rows[100:]])
+    assert live(twice, settings) == live(clean, settings)
+    with pytest.raises(
+        RecordError, match=r"10 rows in a row are not later than 19\.6 s, .* expected time to increase"
+    ):
+        live("".join([*rows[:100], *rows[1:]]), settings)
+
+
+def test_gaps_are_said_the_first_five_of_them(tmp_path):
+    def gaps(rows):
+        return [row for k, row in enumerate(rows) if k % 20 or k == 0]
+
+    said = []
+    live(recorded(tmp_path, change=gaps), study(plan=None), said=said)
+    assert [finding.code for finding in said] == ["gap"] * 5
+    assert said[0].message.startswith("0.4 s without rows")
+    assert said[-1].message.endswith("further gaps are not said")
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_innovations_that_contradict_the_model_are_said_once(killed, tmp_path):
+    """A platform that acts a row later than its log says: also after a restart it is said no second time."""
+    said = []
+    settings, saving = study(plan=None), Saving(tmp_path / "state", 10)
+    text = recorded(tmp_path, command_delay=0.2)
+    if killed:
+        live(text, settings, saving=saving, kill=250, said=said)
+    live(text, settings, saving=saving, said=said)
+    assert [finding.code for finding in said] == ["excess_scatter"]
+    assert "expected 6" in said[0].message
+
+
+def test_sound_innovations_are_not_said(tmp_path):
+    """Ten runs of other noise, judged after each of their rows: none is 5 sigma above, not even for a moment."""
+    said = []
+    for seed in range(100, 110):
+        live(recorded(tmp_path, seed), study(plan=None), every=10.0, said=said)
+    assert said == []
+
+
+def test_gimbal_lock_is_said_where_the_model_does_not_hold(tmp_path):
+    plan = Plan((Turn("y", 95 * DEG),), rate=5.0 * DEG)
+    said = {}
+    for kind in ("gimbal-ukf", "error-state"):
+        said[kind] = []
+        live(recorded(tmp_path, plan=plan), study(plan=None, filter=Filter(kind)), said=said[kind])
+    assert "gimbal_lock" in [finding.code for finding in said["gimbal-ukf"]]
+    assert said["error-state"] == []
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("t [s],th_x [deg],th_y [deg],th_z [deg]", "no column wc_x"),
+        ("t [s],wc_x [deg/h],wc_y [deg/h],wc_z [deg/h],th_x [deg],th_y [deg],th_z [deg]", "no column acc_x"),
+        (
+            "t [s],wc_x [deg/h],wc_y [deg/h],wc_z [deg/h],th_x [deg],th_y [deg],th_z [deg],acc_x [count],"
+            "acc_y [count],acc_z [count]",
+            "acc_x is in count, expected physical units",
+        ),
+    ],
+)
+def test_columns_that_do_not_do_are_one_sentence(header, words):
+    row = ",".join("0" * len(header.split(",")))
+    with pytest.raises(RecordError, match=words):
+        live(f"{header}\n{row}\n{row}\n", study(plan=None))
+
+
+def test_an_estimator_of_whole_recordings_is_refused(tmp_path):
+    with pytest.raises(StudyError, match=r"filter\.kind: found map, which works on whole recordings"):
+        live(recorded(tmp_path), study(filter=Filter("map")))
+
+
+def test_settings_that_decide_the_digits_are_in_the_fingerprint(tmp_path):
+    """Each of them changed changes what is compared with a saved state."""
+    lines = Lines(io.BytesIO(recorded(tmp_path).encode()), "log", None, lambda finding: None)
+    base = study(plan=None)
+    others = [
+        study("paper", "high", plan=None),
+        replace(base, prior=2.0 * base.prior),
+        replace(base, filter=Filter("mukf")),
+        replace(base, filter=Filter(gating=Gating("two"))),
+        replace(base, base=replace(base.base, heading=0.1)),
+    ]
+    from inercal.estimate.checkpoint import fingerprint
+
+    marks = {fingerprint(Selfcal(lines, problem(each)).settings) for each in (base, *others)}
+    assert len(marks) == 1 + len(others)

@@ -1,0 +1,380 @@
+"""The study of a self-calibration: what its keys mean, what is taken where they are absent, what is refused."""
+
+import copy
+import json
+import math
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+from numpy.testing import assert_allclose
+from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
+
+from inercal.errors import StudyError
+from inercal.instruments.terms import TERMS
+from inercal.selfcal.coefficients import BETA, EXTENDED, NAMES, units
+from inercal.selfcal.plan import PATHS, Rest, Turn, path
+from inercal.selfcal.settings import KINDS, Gating, SelfcalSettings
+from inercal.study.load import load_imu_study, load_selfcal_study, load_turntable_study
+from inercal.study.schema import json_schema
+from inercal.study.selfcal import selfcal_study
+from inercal.study.template import selfcal_template
+
+# The study of the interface description, to the letter.
+CONTRACT = """
+# selfcal
+[site]
+latitude = "40 deg"
+[rig]
+kind = "three_axis_gimbals"
+heading = "0 deg"
+[plan]
+turns = [["z", "180 deg"], ["x", "90 deg"], ["z", "-180 deg"], ["x", "90 deg"]]    # also ["rest", "60 s"]; a third entry overrides the rate
+rate = "1 deg/s"
+step = "0.2 s"
+[truth]                          # for simulate
+kg0 = ["0.08 deg/h", "-0.06 deg/h", "0.10 deg/h"]    # x, y, z; eta is pz, oy, oz
+[noise]
+angle_random_walk = "5e-4 deg/sqrt(h)"
+accelerometer = "10 ug"          # per sample
+encoder = "2 arcsec"
+[prior]                          # standard deviations, mean 0
+kg0 = "0.3 deg/h"
+eta = "300 arcsec"
+ds = "300 arcsec"
+do = "300 arcsec"
+ka0 = "500 ug"
+ka1 = "1500 ppm"
+[goal]                           # optional: wanted u per coefficient
+kg0 = "0.002 deg/h"
+[filter]
+kind = "error-state"
+extended = false
+gating = "off"
+"""  # noqa: E501
+SCHEMA = json_schema()
+VALIDATOR = Draft202012Validator(SCHEMA)
+KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
+TEMPLATE = selfcal_template()
+
+
+def study(**tables):
+    """The study of the contract with these tables in place of its own; None leaves one out."""
+    data = tomllib.loads(CONTRACT) | tables
+    return selfcal_study({key: table for key, table in data.items() if table is not None}, "s.toml")
+
+
+def rig(**keys):
+    return study(rig={"kind": "three_axis_gimbals"} | keys)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        file = tmp_path / "study.toml"
+        file.write_text(text, encoding="utf-8")
+        return file
+
+    return write
+
+
+def test_the_study_of_the_contract(write):
+    found = load_selfcal_study(write(CONTRACT))
+    assert found.site.latitude == pytest.approx(40.0 * DEG)
+    assert found.plan == path("paper")
+    assert found.plan.duration == pytest.approx(540.0)
+    assert (found.gimbals.axes, found.gimbals.signs) == (("z", "x", "y"), (1, 1, 1))
+    assert_allclose(found.truth, [*TRUTH[:3], *np.zeros(21)], rtol=1e-12)
+    assert_allclose(found.prior, PRIOR, rtol=1e-12)
+    nominal = NOISE["nominal"]
+    assert found.noise.angle_random_walk == pytest.approx(nominal.angle_random_walk)
+    assert found.noise.accelerometer == pytest.approx(nominal.accelerometer)
+    assert found.noise.encoder == pytest.approx(nominal.encoder)
+    assert found.goal == pytest.approx(dict.fromkeys(NAMES[:3], 0.002 * PER_HOUR))
+    assert (found.filter.kind, found.filter.gating, found.size) == ("error-state", None, 18)
+    assert found.disturbances.dropouts == 0.0
+    assert json.loads(json.dumps(found.given)) == tomllib.loads(CONTRACT)
+    VALIDATOR.validate(tomllib.loads(CONTRACT))
+
+
+def test_what_is_absent_is_as_in_the_paper():
+    found = study(plan=None, truth=None, prior=None, goal=None, filter=None)
+    assert (found.plan, found.truth, dict(found.goal)) == (None, None, {})
+    assert_allclose(found.prior, PRIOR, rtol=1e-12)
+    assert found.filter.kind == KINDS[0]
+
+
+def test_all_truths_in_their_order():
+    texts = {
+        "kg0": ["0.08 deg/h", "-0.06 deg/h", "0.10 deg/h"],
+        "eta": ["60 arcsec", "-90 arcsec", "120 arcsec"],
+        "ds": ["60 arcsec", "-45 arcsec", "90 arcsec"],
+        "do": ["-75 arcsec", "50 arcsec", "-100 arcsec"],
+        "ka0": ["100 ug", "-150 ug", "200 ug"],
+        "ka1": ["500 ppm", -300e-6, "0.0008"],
+        "kg1": ["10 ppm", "20 ppm", "0 ppm"],
+        "beta": ["5 arcsec", "0 rad", "1 arcmin"],
+    }
+    expected = [*TRUTH[:18], 10 * PPM, 20 * PPM, 0.0, 5 * ARCSEC, 0.0, 60 * ARCSEC]
+    assert_allclose(study(truth=texts).truth, expected, rtol=1e-12)
+    assert_allclose(study(truth={}).truth, np.zeros(24))
+
+
+def test_one_deviation_for_a_group_or_three():
+    found = study(
+        prior={"ka0": ["1 ug", "2 ug", "3 ug"], "kg1": "5 ppm"}, goal={"do": ["1 rad", "2 rad", "3 rad"]}
+    )
+    by_name = dict(zip(EXTENDED, found.prior, strict=True))
+    assert [by_name[f"ka0_{i}"] / MICRO_G for i in "xyz"] == pytest.approx([1.0, 2.0, 3.0])
+    assert [by_name[f"kg1_{i}"] / PPM for i in "xyz"] == pytest.approx([5.0] * 3)
+    assert found.goal == pytest.approx({"do_x": 1.0, "do_y": 2.0, "do_z": 3.0})
+
+
+def test_the_uncertainty_of_the_base_widens_the_prior_of_the_encoders_zero():
+    """b is north, up, east: tilt about north and east, heading about up; squares add."""
+    level = rig(heading="10(3) arcmin", tilt=["0 ± 1 arcmin", "0 ± 2 arcmin"])
+    assert level.base.heading_u == pytest.approx(3 * 60 * ARCSEC)
+    assert_allclose(level.prior[BETA], np.sqrt([1 + 1, 1 + 9, 1 + 4]) * 60 * ARCSEC, rtol=1e-4)
+    # at a heading of 90 deg X_b looks east, Z_b south: the tilts change places
+    east = rig(heading="90 deg", tilt=["0 ± 1 arcmin", "0 ± 2 arcmin"])
+    assert_allclose(east.prior[BETA], np.sqrt([1 + 4, 1, 1 + 1]) * 60 * ARCSEC, rtol=1e-9)
+    # east-north-up: up is z
+    enu = rig(heading="0.0(1) deg", frame="enu")
+    assert_allclose(enu.prior[BETA], [60 * ARCSEC, 60 * ARCSEC, math.hypot(360, 60) * ARCSEC], rtol=1e-9)
+
+
+def test_the_rig():
+    found = rig(
+        heading="30 deg",
+        tilt=["1 deg", "-2 deg"],
+        frame="ned",
+        gimbals=["x", "y", "z"],
+        signs=[1, -1, 1],
+        limits={"x": ["-200 deg", "200 deg"], "y": ["-80 deg", "1 rad"]},
+    )
+    assert found.base.frame == "ned"
+    assert_allclose([found.base.heading, *found.base.tilt], [30 * DEG, DEG, -2 * DEG])
+    assert (found.gimbals.axes, found.gimbals.signs) == (("x", "y", "z"), (1, -1, 1))
+    assert set(found.limits) == {"th_x", "th_y"}
+    assert_allclose(found.limits["th_y"], [-80 * DEG, 1.0])
+
+
+def test_turns_rests_rates_and_the_start():
+    plan = study(
+        plan={
+            "turns": [["z", "180 deg"], ["rest", "1 min"], ["x", "-90 deg", "2 deg/s"]],
+            "rate": "0.5 deg/s",
+            "step": "100 ms",
+            "start": ["10 deg", "0 deg", "-1 rad"],
+        }
+    ).plan
+    assert plan.moves == (Turn("z", math.pi), Rest(60.0), Turn("x", -math.pi / 2, 2 * DEG))
+    assert plan.duration == pytest.approx(360.0 + 60.0 + 45.0)
+    assert_allclose(plan.start, [10 * DEG, 0.0, -1.0])
+    assert plan.step == 0.1
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_paths_by_their_name_at_the_rate_of_the_plan(name):
+    plan = study(plan={"path": name, "rate": "2 deg/s", "step": "0.1 s"}).plan
+    assert plan.moves == path(name).moves
+    assert plan.duration == pytest.approx(0.5 * path(name).duration)
+
+
+def test_set_of_a_path_takes_the_place_of_the_turns(write):
+    assert load_selfcal_study(write(CONTRACT), ["plan.path=best"]).plan == path("best")
+    found = load_selfcal_study(write(CONTRACT), ['plan.turns=[["z", "90 deg"]]', "filter.kind=map"])
+    assert found.plan.moves == (Turn("z", math.pi / 2),)
+    assert found.filter.kind == "map"
+
+
+def test_filter_disturbances_and_design():
+    found = study(
+        filter={
+            "kind": "gimbal-ukf", "extended": True, "gating": "two", "gating_stops": "step", "factor": "svd",
+            "integration": "euler",
+        },
+        disturbances={
+            "dropouts": "1 %", "command_delay": "0.2 s",
+            "harmonics": [{"axis": "z", "order": 2, "amplitude": "5 arcsec", "phase": "90 deg"},
+                          {"axis": "x", "order": 1, "amplitude": "1 arcsec"}],
+        },
+        design={"turns": 4, "angle": "45 deg", "time": "10 min", "criterion": "mean", "seed": 7},
+    )  # fmt: skip
+    assert (found.filter.kind, found.filter.factor, found.filter.integration) == (
+        "gimbal-ukf",
+        "svd",
+        "euler",
+    )
+    assert found.filter.gating == Gating("two", "step")
+    assert found.size == 24
+    harmonics = [(2, 2, 5 * ARCSEC, math.pi / 2), (0, 1, ARCSEC, 0.0)]
+    assert_allclose(found.disturbances.harmonics, harmonics)
+    assert (found.disturbances.dropouts, found.disturbances.command_delay) == (0.01, 0.2)
+    assert (found.search.turns, found.search.time, found.search.criterion, found.search.seed) == (
+        4,
+        600.0,
+        "mean",
+        7,
+    )
+    assert found.search.angle == pytest.approx(math.pi / 4)
+
+
+REFUSED = {
+    "noise.encoder=0 arcsec": "noise.encoder: found '0 arcsec', that is 0 rad, expected a standard deviation",
+    "noise.accelerometer=-1 ug": "noise.accelerometer: found '-1 ug'.*above zero",
+    "noise.angle_random_walk=0 deg/sqrt(h)": "noise.angle_random_walk: .*above zero",
+    "noise.encoder=2": "noise.encoder: found '2' without a unit, expected",
+    "prior.kg0=0 deg/h": "prior.kg0: .*a standard deviation above zero",
+    'prior.eta=["1 arcsec"]': "prior.eta: .*expected a list of 3, for pz, oy, oz, or one for all",
+    "goal.ka1=-1 ppm": "goal.ka1: .*a standard uncertainty above zero",
+    'truth.kg0=["1 deg/h", "2 deg/h"]': "truth.kg0: .*expected a list of 3, for x, y, z",
+    "truth.kg0=1 deg/h": "truth.kg0: found '1 deg/h', expected a list of 3",
+    'truth.eta=["60 deg", "0 deg", "0 deg"]': "truth.eta: found '60 deg'.*within 10 deg",
+    'truth.ka1=["500", "0", "0"]': "truth.ka1: found '500'.*within 0.5",
+    'rig.gimbals=["x", "x", "y"]': 'rig.gimbals: .*"x", "y" and "z" once each',
+    "rig.signs=[1, 1, 0]": "rig.signs: .*three of 1 and -1",
+    "rig.signs=[1, 1, true]": "rig.signs: .*three of 1 and -1",
+    'rig.tilt=["1 deg"]': "rig.tilt: .*about north",
+    'rig.limits.x=["0 deg", "-1 deg"]': "rig.limits.x: .*the lower end first",
+    'rig.limits.z=["-10 deg", "10 deg"]': "plan: found turns that take th_z beyond rig.limits, .*-10 deg to 10 deg",
+    'rig.limits.th_x=["0 deg", "1 deg"]': "rig.limits.th_x: unknown key",
+    "rig.heading=north": "rig.heading: found 'north', expected a quantity",
+    "rig.frame=NED": "rig.frame: found 'NED', expected 'nue', 'enu' or 'ned'",
+    "site.latitude=": "site.latitude: found ''",
+    'plan.turns=[["w", "9 deg"]]': "plan.turns.0: found .*expected a turn such as",
+    'plan.turns=[["x", 9]]': "plan.turns.0: ",
+    'plan.turns=[["x", "0 deg"]]': "plan.turns.0: .*an angle other than 0",
+    'plan.turns=[["rest", "-1 s"]]': "plan.turns.0: .*a time above zero",
+    'plan.turns=[["x", "9 deg", "0 deg/s"]]': "plan.turns.0: .*a rate above zero",
+    'plan.turns=[["x", "1 deg"]]': "plan: found 5 steps of 0.2 s, expected 10",
+    'plan.turns=[["x", "1e9 deg"]]': "plan: found 5e[+]09 steps",
+    "plan.turns=[]": "plan.turns: found .*expected 1 or more",
+    "plan.path=worst": "plan.path: found 'worst', expected 'paper'",
+    "plan.step=0 s": "plan.step: .*a time above zero",
+    "plan.rate=-1 deg/s": "plan.rate: .*a rate above zero",
+    "filter.kind=ukf": "filter.kind: found 'ukf', expected 'svd-qukf'",
+    "filter.gating=on": "filter.gating: found 'on', expected 'off'",
+    "filter.knd=map": "filter.knd: unknown key, did you mean kind?",
+    "disturbances.dropouts=1.0": "disturbances.dropouts: .*below 1",
+    'disturbances.harmonics=[{axis = "z", order = 0, amplitude = "1 deg"}]': "disturbances.harmonics.0.order: ",
+    "design.turns=0": "design.turns: ",
+    "nois.encoder=1 arcsec": "nois: unknown key, did you mean noise?",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("override", "words"), REFUSED.items())
+def test_one_sentence_for_what_is_wrong(write, override, words):
+    with pytest.raises(StudyError, match=words) as error:
+        load_selfcal_study(write(CONTRACT), [override])
+    assert "\n" not in str(error.value)
+    assert str(error.value).startswith(str(error.value.where))
+
+
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ({"noise": None}, "noise: missing, expected a value"),
+        ({"noise": {"encoder": "1 arcsec", "accelerometer": "1 ug"}}, "noise.angle_random_walk: missing"),
+        ({"rig": None}, "rig: missing"),
+        (
+            {"site": {"gravity": "9.8 m/s^2"}},
+            "site.latitude: missing, expected the latitude of the rig for earth rate",
+        ),
+        ({"plan": {}}, "plan: found neither turns nor path"),
+        ({"plan": {"path": "best", "turns": [["x", "90 deg"]]}}, "plan: found both turns and path"),
+        ({"plan": {"turns": "best"}}, "plan.turns: found 'best', expected a list"),
+    ],
+)
+def test_what_is_missing_or_too_much(tables, words):
+    with pytest.raises(StudyError, match=words):
+        study(**tables)
+
+
+def test_studies_of_other_commands_are_told_apart(write):
+    for load in (load_imu_study, load_turntable_study):
+        with pytest.raises(StudyError, match="a study for `inercal selfcal`"):
+            load(write(CONTRACT))
+    with pytest.raises(
+        StudyError, match="found a study for `inercal calibrate imu`, expected one for `inercal selfcal`"
+    ):
+        load_selfcal_study(write('[site]\nlatitude = "1 deg"\n[imu]\n'))
+
+
+def test_the_template_loads_as_written_and_is_the_paper():
+    data = tomllib.loads(TEMPLATE)
+    found = selfcal_study(data, "t.toml")
+    VALIDATOR.validate(data)
+    assert found.plan == path("paper")
+    assert_allclose(found.truth, TRUTH, rtol=1e-12)
+    assert_allclose(found.prior, PRIOR, rtol=1e-12)
+    assert found.site.latitude_u == pytest.approx(26 * DEG)
+
+
+def test_every_key_and_table_of_the_template_has_its_comment():
+    lines = TEMPLATE[TEMPLATE.index("schema = 1") :].splitlines()
+    for line in lines:
+        assert len(line) <= 120
+        if re.match(r"(# )?\w+ = ", line):
+            assert KEY.fullmatch(line), line
+        elif line.startswith(("[", "# [")):
+            assert re.fullmatch(r"(# )?\[[\w.]+\]  +# \S.*", line), line
+
+
+def test_every_key_is_in_the_template():
+    text = re.sub(r"(?m)^# ((\w+) = |\[)", r"\1", TEMPLATE)
+    whole = tomllib.loads(re.sub("(?m)^path = .*", "", text))
+    assert set(whole) == set(SCHEMA["$defs"]["SelfcalStudyFile"]["properties"])
+    tables = {"rig": "GimbalsTable", "design": "SearchTable"}
+    for name, given_keys in whole.items():
+        if name != "schema":
+            keys = set(SCHEMA["$defs"][tables.get(name, f"{name.title()}Table")]["properties"])
+            assert set(given_keys) | ({"path"} if name == "plan" else set()) == keys
+    VALIDATOR.validate(whole)
+    assert isinstance(selfcal_study(whole, "t.toml"), SelfcalSettings)
+
+
+@pytest.mark.parametrize("line", [line for line in TEMPLATE.splitlines() if re.match(r"# \w+ = ", line)])
+def test_every_commented_key_loads_alone(line):
+    text = TEMPLATE.replace(line, line.removeprefix("# "))
+    if line.startswith("# path"):
+        text = re.sub("(?m)^turns = \\[.*", "", text)
+    data = tomllib.loads(text)
+    VALIDATOR.validate(data)
+    assert selfcal_study(data, "t.toml").given != selfcal_study(tomllib.loads(TEMPLATE), "t.toml").given
+
+
+def test_the_next_command_of_the_template():
+    assert "# Next: inercal simulate selfcal s.toml --out simulated.csv\n" in selfcal_template((), "s.toml")
+    assert "# Next: inercal selfcal a.csv --study s.toml\n" in selfcal_template(["a.csv"], "s.toml")
+
+
+SCALARS = st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=8), st.just("1 deg"))
+JUNK = st.recursive(
+    SCALARS, lambda x: st.lists(x, max_size=4) | st.dictionaries(st.text(max_size=4), x, max_size=2)
+)
+PLACES = [(table, key) for table, keys in tomllib.loads(CONTRACT).items() for key in keys]
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=150)
+@given(place=st.sampled_from(PLACES), value=JUNK)
+def test_whatever_a_key_holds_it_is_a_study_or_one_sentence(place, value):
+    """And what the reader takes, the schema takes too."""
+    data = copy.deepcopy(tomllib.loads(CONTRACT))
+    data[place[0]][place[1]] = value
+    try:
+        selfcal_study(data, "s.toml")
+    except StudyError as error:
+        said = str(error)
+    else:
+        said = ""
+        assert VALIDATOR.is_valid(data)
+    assert "\n" not in said
+
+
+def test_the_table_of_terms_knows_every_coefficient_with_its_unit():
+    assert [(name, TERMS[name].unit) for name in EXTENDED] == list(zip(EXTENDED, units(24), strict=True))
