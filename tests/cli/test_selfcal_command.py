@@ -73,10 +73,10 @@ def piped(monkeypatch, capsys, *arguments, log="platform.csv"):
 def said_once(captured, *words):
     """Standard output is empty, standard error one line of the right form that holds the words."""
     assert captured.out == ""
-    assert captured.err.count("\n") == 1, captured.err
-    assert captured.err.startswith("inercal: error: ")
+    (line,) = captured.err.replace("compiling kernels, once\n", "").splitlines()
+    assert line.startswith("inercal: error: ")
     for word in words:
-        assert word in captured.err
+        assert word in line
 
 
 # One recording.
@@ -209,15 +209,14 @@ def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
 
 
 @POSIX
-@pytest.mark.parametrize("kind", RECURSIVE[:3])
-def test_killed_at_any_moment_and_restarted(kind, capsys, tmp_path):
+def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
     """Killed without warning, while it works: each row is answered, and always with the same digits."""
-    command = ["selfcal", "--stream", *SELFCAL[2:], "--filter", kind, "--quiet"]
+    command = ["selfcal", "--stream", *SELFCAL[2:], "--quiet"]
     assert run([*command[:1], "short.csv", *command[1:]]) == 0
     whole = capsys.readouterr().out.encode().splitlines(keepends=True)
     saving = ["--checkpoint", str(tmp_path / "state"), "--checkpoint-every", "17"]
     given = []
-    for lines in (*np.random.default_rng(KINDS.index(kind)).integers(20, 200, 2), None):
+    for lines in (*np.random.default_rng(11).integers(20, 200, 2), None):
         with open("short.csv", "rb") as log:
             process = subprocess.Popen(
                 [sys.executable, "-m", "inercal", *command, *saving], stdin=log, stdout=subprocess.PIPE

@@ -103,7 +103,7 @@ def _live(
     """Calibrate row by row."""
     from inercal._jit import compiling
     from inercal.selfcal.filtered import problem
-    from inercal.stream.selfcal import Selfcal, load
+    from inercal.stream.selfcal import Selfcal, filter_of, load
     from inercal.study.load import load_selfcal_study
 
     if len(paths) > 1:
@@ -119,6 +119,7 @@ def _live(
         output.say_findings([finding])
 
     with of_study(study):
+        filter_of(told)
         with compiling(f"selfcal stream {told.filter.kind}", output.say):
             load(told)
         run_stream(lambda lines: Selfcal(lines, told, interval, say), file, map_file, output, streaming)

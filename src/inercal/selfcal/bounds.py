@@ -151,7 +151,7 @@ def _along(
     P[0] = np.diag(start[0] + start[1])
     if contributions:
         P[3], P[4] = np.diag(start[0]), np.diag(start[1])
-    sigmas = np.array([noise.angle_random_walk, noise.accelerometer, noise.encoder])
+    sigmas = noise.levels
     gate = gate_of(problem.filter.gating)
     riccati(P, q, th, dt, rate, seen, c, world.earth, world.up, world.axes, world.signs, sigmas, gate, u)
     slope = product_slope(c)

@@ -54,17 +54,29 @@ def diagnose(recording: Recording, problem: Problem, found: Filtered) -> list[Fi
     if any(finding.code in SAID for finding in recording.findings):
         return []
     repaired, findings = _without_faults(recording, problem)
-    now = filtered((repaired, problem))
-    if not findings or not _sound(now):
-        errors, case = search(repaired, problem)
-        findings += [_in_words(each, case) for each in errors]
-        findings += _scatter(case, filtered(case) if errors else now)
+    if not findings or not _sound(filtered((repaired, problem))):
+        findings += _small_errors((repaired, problem))
     if not findings and not _sound(found):
         text = (
             f"the error-state filter finds no contradiction in this recording: the {found.kind} fails on it"
         )
         findings.append(Finding("filter_fails", text))
     return findings
+
+
+def _small_errors(case: Case) -> list[Finding]:
+    """What the model leaves out, and noise that is not what is stated."""
+    errors, corrected = search(*case)
+    now = filtered(corrected)
+    # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
+    if errors and not _white(corrected, now) and (walk := _restless(case)) is not None:
+        return [walk]
+    return [*(_in_words(each, corrected) for each in errors), *_scatter(corrected, now)]
+
+
+def _white(case: Case, found: Filtered) -> bool:
+    """Whether innovations are of the size that is stated and uncorrelated."""
+    return _sound(found) and whiteness(regular(case[0], found)) > RISK
 
 
 def _sound(found: Filtered) -> bool:
@@ -230,10 +242,11 @@ def _even(columns: Array, mean: float) -> bool:
 def _restless(case: Case) -> Finding | None:
     """Gyro noise other than stated, where that explains the innovations."""
     recording, problem = case
-    for factor in 2.0 ** np.array([*np.arange(0.5, 6.1, 0.5), -0.5, -1.0, -1.5, -2.0, -3.0]):
+    for octaves in (*np.arange(0.5, 10.1, 0.5), -0.5, -1.0, -1.5, -2.0, -3.0):
+        factor = 2.0**octaves
         noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
-        now = filtered((recording, replace(problem, noise=noise)))
-        if _sound(now) and whiteness(regular(recording, now)) > RISK:
+        tried = (recording, replace(problem, noise=noise))
+        if _white(tried, filtered(tried)):
             text = f"the gyros' angle random walk looks about {factor:.2g} times what is stated"
             return Finding("excess_scatter" if factor > 1.0 else "low_scatter", text)
     return None

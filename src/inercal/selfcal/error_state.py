@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from inercal._jit import kernel
 from inercal.estimate.kalman import innovation_variance, scalar_update
 from inercal.geometry.kernels import exp, log, multiply, normalize
-from inercal.selfcal.filtered import Problem, Start, State, Trace
+from inercal.selfcal.filtered import Problem, Start, State, Trace, empty_trace
 from inercal.selfcal.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.kinematics import Axes, attitude, nearest_turn
 from inercal.selfcal.linearised import accelerometer_row, encoder_roots, propagate_covariance
@@ -54,17 +54,10 @@ def advance(
     history : bool
         Whether the trace holds more than the normalised innovations squared.
     """
-    world, noise = problem.world, problem.noise
-    m, p = len(dt), len(problem.prior)
-    rows = m if history else 0
-    trace = Trace(
-        np.empty((rows, 4)), np.empty((rows, 3)), np.empty((rows, p)), np.empty((rows, p)), np.empty((rows, 6)),
-        np.empty(m), np.empty(m, dtype=np.int64), math.nan, 0, 1.0,
-    )  # fmt: skip
-    levels = np.array([noise.angle_random_walk, noise.accelerometer, noise.encoder])
+    world, trace = problem.world, empty_trace(len(dt), len(problem.prior), history)
     cosine = _advance(
         state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
-        world.earth, world.up, world.axes, world.signs, levels, gate_of(problem.filter.gating),
+        world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
         trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
     )  # fmt: skip
     return state, trace._replace(gimbal_cosine=cosine)

@@ -73,6 +73,23 @@ class Trace(NamedTuple):
     gimbal_cosine: float
 
 
+def empty_trace(m: int, p: int, history: bool) -> Trace:
+    """A trace to be filled, of ``m`` rows and ``p`` coefficients."""
+    rows = m if history else 0
+    return Trace(
+        attitude=np.empty((rows, 4)),
+        attitude_u=np.empty((rows, 3)),
+        coefficients=np.empty((rows, p)),
+        u=np.empty((rows, p)),
+        innovations=np.empty((rows, 6)),
+        nis=np.empty(m),
+        dims=np.empty(m, dtype=np.int64),
+        lowest_eigenvalue=float("nan"),
+        fallbacks=0,
+        gimbal_cosine=1.0,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """From row to row, the first row the start.

@@ -146,7 +146,8 @@ def _history(first: History, trace: Trace) -> History:
 def _fault(found: Filtered) -> str:
     """Why the numbers of a filter must not be used; empty if they may."""
     variances = np.diag(found.covariance)
-    if not (np.isfinite(found.coefficients).all() and np.isfinite(found.covariance).all()):
+    numbers = (found.coefficients, found.covariance, found.attitude)
+    if not all(np.isfinite(each).all() for each in numbers):
         at = " where the gimbals lock" if found.gimbal_cosine < LOCK else ""
         return f"the filter diverged{at}: coefficients or covariance are not finite"
     if not (variances > 0.0).all() or found.lowest_eigenvalue < LOST:

@@ -25,7 +25,7 @@ from inercal._jit import kernel
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import draw, moments, update, weights
 from inercal.geometry.kernels import Vector
-from inercal.selfcal.filtered import Problem, Start, State, Trace
+from inercal.selfcal.filtered import Problem, Start, State, Trace, empty_trace
 from inercal.selfcal.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.kinematics import Axes, angles, attitude, nearest_turn, parity
 from inercal.selfcal.model import accelerometers, on_the_base, platform_rate, specific_force
@@ -50,17 +50,10 @@ def advance(
     state: State, problem: Problem, dt: Array, rate: Array, acc: Array, th: Array, history: bool = True
 ) -> tuple[State, Trace]:
     """Take the filter through m steps; arguments as of `inercal.selfcal.error_state.advance`."""
-    world, noise = problem.world, problem.noise
-    m, p = len(dt), len(problem.prior)
-    rows = m if history else 0
-    trace = Trace(
-        np.empty((rows, 4)), np.empty((rows, 3)), np.empty((rows, p)), np.empty((rows, p)), np.empty((rows, 6)),
-        np.empty(m), np.empty(m, dtype=np.int64), math.nan, 0, 1.0,
-    )  # fmt: skip
-    levels = np.array([noise.angle_random_walk, noise.accelerometer, noise.encoder])
+    world, trace = problem.world, empty_trace(len(dt), len(problem.prior), history)
     lowest, fallbacks, cosine = _advance(
         state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
-        world.earth, world.up, world.axes, world.signs, levels, gate_of(problem.filter.gating),
+        world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
         FACTORS[problem.filter.factor or "cholesky"], problem.filter.integration == "euler",
         trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
     )  # fmt: skip

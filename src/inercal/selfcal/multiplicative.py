@@ -24,7 +24,7 @@ from inercal.estimate.kalman import scalar_update
 from inercal.estimate.sigma_point import draw, moments, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize, rotate
 from inercal.selfcal.error_state import initial as initial
-from inercal.selfcal.filtered import Problem, State, Trace
+from inercal.selfcal.filtered import Problem, State, Trace, empty_trace
 from inercal.selfcal.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.kinematics import Axes, attitude, nearest_turn
 from inercal.selfcal.linearised import encoder_roots
@@ -44,17 +44,10 @@ def advance(
 
     Innovations of the accelerometers are those that are left once the encoders are known.
     """
-    world, noise = problem.world, problem.noise
-    m, p = len(dt), len(problem.prior)
-    rows = m if history else 0
-    trace = Trace(
-        np.empty((rows, 4)), np.empty((rows, 3)), np.empty((rows, p)), np.empty((rows, p)), np.empty((rows, 6)),
-        np.empty(m), np.empty(m, dtype=np.int64), math.nan, 0, 1.0,
-    )  # fmt: skip
-    levels = np.array([noise.angle_random_walk, noise.accelerometer, noise.encoder])
+    world, trace = problem.world, empty_trace(len(dt), len(problem.prior), history)
     lowest, fallbacks, cosine = _advance(
         state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
-        world.earth, world.up, world.axes, world.signs, levels, gate_of(problem.filter.gating),
+        world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
         FACTORS[problem.filter.factor or "cholesky"],
         trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
     )  # fmt: skip

@@ -33,6 +33,11 @@ class Noise:
     accelerometer: float
     encoder: float
 
+    @property
+    def levels(self) -> Array:
+        """(3,) the same in this order, for kernels."""
+        return np.array([self.angle_random_walk, self.accelerometer, self.encoder])
+
 
 @dataclass(frozen=True)
 class Gating:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -95,14 +96,7 @@ class Selfcal:
         every: float = 0.0,
         say: Callable[[Finding], None] = lambda _: None,
     ) -> None:
-        module = recursive(problem.filter.kind)
-        if module is None:
-            raise StudyError(
-                "filter.kind",
-                f"found {problem.filter.kind}, which works on whole recordings, expected error-state, mukf, svd-qukf "
-                "or gimbal-ukf for a stream",
-            )
-        self._module, self._problem, self._every, self._say = module, problem, every, say
+        self._module, self._problem, self._every, self._say = filter_of(problem), problem, every, say
         self._where, record = lines.where, lines.record
         sensor = "gyro" if "gyro_x" in record and "wc_x" not in record else "wc"
         found = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
@@ -229,6 +223,18 @@ class Selfcal:
             return state, None
         mean = state.nis / state.rows if state.rows else math.nan
         return state._replace(slots=slots), [state.t, *row.tolist(), nis, mean]
+
+
+def filter_of(problem: Problem) -> ModuleType:
+    """The module of the filter of a problem; raises `StudyError` for one that works on whole recordings only."""
+    module = recursive(problem.filter.kind)
+    if module is None:
+        raise StudyError(
+            "filter.kind",
+            f"found {problem.filter.kind}, which works on whole recordings, expected error-state, mukf, svd-qukf or "
+            "gimbal-ukf for a stream",
+        )
+    return module
 
 
 def load(problem: Problem) -> None:
