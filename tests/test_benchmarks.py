@@ -18,6 +18,8 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
         (["imu_coverage.py", "--runs", "2", "--method", "ferraris", "--by-scatter"], "all together"),
         (["imu_coverage.py", "--runs", "2", "--method", "aided"], "all together"),
         (["noise_coverage.py", "--runs", "2"], "weak K"),
+        (["selfcal_coverage.py", "--runs", "4"], "runs/s"),
+        (["selfcal_filters.py", "--smoke"], "svd-qukf, eigen"),
         (["sensitivity.py", "--smoke"], "inercal, exact"),
         (["streaming.py", "--smoke"], "lines a second"),
         (["turntable_coverage.py", "--runs", "2"], "all together"),
