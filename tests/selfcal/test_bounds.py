@@ -293,7 +293,7 @@ def test_what_a_path_cannot_see_is_said():
     assert judged.rank == 16
     assert judged.unmet == ("kg0_x", "kg0_y")
     said = {finding.message.split(":")[0]: finding.code for finding in judged.findings()}
-    assert said == {"kg0_x": "at_prior", "ka1_z": "at_prior", "kg0_y": "weak_term"}
+    assert said == {"kg0_x": "at_prior", "ka1_z": "at_prior", "kg0_y": "goal_missed"}
     assert judged.worst(1)[0].startswith("ka1_z")
     assert len(judged.table().splitlines()) == 19
     assert not seen(along(study("best")), {}).findings()

@@ -194,8 +194,8 @@ def test_gyros_that_are_much_noisier_than_stated():
 def test_what_no_fault_explains_is_said_with_its_place():
     made = recording()
     made.acc[1000:1300, 1] += 2e-3 * np.sin(np.arange(300) / 7.0)
-    found = [finding for finding in named(made) if finding.code == "contradiction"]
-    first, last = (int(row) for row in found[0].where.split()[1].split("-"))
+    found = only(named(made), "contradiction")
+    first, last = (int(row) for row in found.where.split()[1].split("-"))
     assert first < 1302
     assert last > 1001
 

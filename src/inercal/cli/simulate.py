@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+import os
+import time
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, Overrides, Study, envelope, of_study, reading
+from inercal.cli import EXIT_BAD_VERDICT
+from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, envelope, of_study, reading
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,14 +48,22 @@ def simulate_selfcal(
     /,
     *,
     seed: Seed = 1,
+    runs: Annotated[
+        int | None,
+        Parameter(help="Simulate and calibrate so often instead, and judge the stated uncertainties."),
+    ] = None,
     overrides: Overrides = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
-) -> None:
-    """Simulate a platform that turns through the plan of a study."""
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Simulate a platform that turns through the plan of a study, once or many times."""
     from inercal.selfcal.simulate import experiment, to_record
     from inercal.selfcal.simulate import simulate as simulate_run
     from inercal.study.load import load_selfcal_study
 
+    if runs is not None:
+        return _campaign(study, runs, seed, overrides or (), output)
+    if output.report is not None:
+        raise InputError("--report", "found without --runs, expected them together")
     _check(study, seed, output)
     settings = load_selfcal_study(study, overrides or ())
 
@@ -59,6 +71,46 @@ def simulate_selfcal(
         return to_record(simulate_run(experiment(settings), rng).recording)
 
     _write("selfcal", simulate, study, (study,), seed, output)
+    return 0
+
+
+def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
+    """Many simulated calibrations; exit code 1 where the stated uncertainties are not true."""
+    from inercal._files import write_text
+    from inercal._jit import compiling
+    from inercal.records.read import source_of
+    from inercal.selfcal.campaign import campaign
+    from inercal.selfcal.filtered import problem
+    from inercal.selfcal.filtering import load_kernels
+    from inercal.study.load import load_selfcal_study
+
+    if runs < 2:
+        raise InputError("--runs", f"found {runs}, expected 2 or more")
+    _not_negative(seed)
+    output.check((".json",), (study,))
+    settings = load_selfcal_study(study, overrides)
+    with of_study(study):
+        with compiling(f"campaign {settings.filter.kind}", output.say_now):
+            load_kernels(settings.filter.kind, problem(settings))
+        clock = time.perf_counter()
+        with reading(output, "simulating") as progress:
+            found = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
+    timing = {"solve": time.perf_counter() - clock}
+    verdict = "the stated uncertainties are true" if found.passed else "the stated uncertainties are not true"
+    message = f"{verdict}: {found.attempted} runs, {found.runs} of them converged"
+    data = envelope("simulate selfcal", message, found.result, [source_of(study)], timing=timing)
+    if not found.passed:
+        data["status"]["code"] = "inconsistent"
+    if output.out is not None:
+        write_text(output.out, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
+        output.say(f"campaign: {output.out}")
+    if output.report is not None:
+        from inercal.selfcal.figures import campaign_page
+
+        write_text(output.report, campaign_page(found, settings))
+        output.say(f"report: {output.report}")
+    output.emit(data, f"{found.table()}\n\n{message}")
+    return 0 if found.passed else EXIT_BAD_VERDICT
 
 
 def _check(study: Path, seed: int, output: FileOutput) -> None:
@@ -67,9 +119,14 @@ def _check(study: Path, seed: int, output: FileOutput) -> None:
 
     if output.out is None:
         raise InputError("--out", "missing, expected the file to write, such as simulated.csv")
+    _not_negative(seed)
+    output.check(SUFFIXES, (study,))
+
+
+def _not_negative(seed: int) -> None:
+    """Refuse a seed below 0."""
     if seed < 0:
         raise InputError("--seed", f"found {seed}, expected 0 or more")
-    output.check(SUFFIXES, (study,))
 
 
 def _write(

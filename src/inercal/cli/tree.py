@@ -105,9 +105,11 @@ COMMANDS = {
     ),
     ("simulate", "selfcal"): (
         "inercal.cli.simulate:simulate_selfcal",
-        "Simulate a platform in gimbals that turns through the plan of a study.\n\nThe study states the true "
-        "coefficients under [truth], and under [disturbances] what real rigs add. The recording goes to --out (.csv, "
-        ".npz, .h5, .parquet or .nc): commanded rates, gimbal angles, accelerometers.",
+        "Simulate a platform in gimbals that turns through the plan of a study, once or many times.\n\nThe study "
+        "states the true coefficients under [truth], and under [disturbances] what real rigs add. The recording goes "
+        "to --out (.csv, .npz, .h5, .parquet or .nc): commanded rates, gimbal angles, accelerometers. With --runs N it "
+        "is simulated and calibrated N times, and errors are judged by the stated uncertainties and the bound; --out "
+        "then writes the figures (.json), --report a page. Exit code 1: the uncertainties are not true.",
         "inercal simulate selfcal selfcal.toml --seed 1 --out platform.csv",
     ),
     ("temperature", ""): (

@@ -91,9 +91,12 @@ def figure(width: float, height: float) -> Iterator[Figure]:
 
 def svg(figure: Figure) -> str:
     """The figure as an ``<svg>`` element; the same figure gives the same text."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     buffer = io.StringIO()
-    with _style():
-        figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    nobody = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with _style():  # not savefig, which draws twice, to the same text
+        FigureCanvasSVG(figure).print_svg(buffer, metadata=nobody)  # type: ignore[no-untyped-call]
     text = buffer.getvalue()
     return text[text.index("<svg") :]
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.errors import InputError
 from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.bounds import bounds
 from inercal.selfcal.coefficients import names, product_slope, to_product
 from inercal.selfcal.filtered import Filtered, Problem, problem
 from inercal.selfcal.filtering import estimate, load_kernels
+from inercal.selfcal.linearised import FLOOR
 from inercal.selfcal.settings import FilterKind, SelfcalSettings
 from inercal.selfcal.simulate import Experiment, Simulated, experiment, simulate
 
@@ -45,10 +48,10 @@ class Campaign:
     bound : (p,)
         Cramer-Rao bound of the standard uncertainties.
     nis : (runs,)
-        Mean normalised innovation squared of each run over rows away from gimbal lock; ``rows`` how many, and ``dims``
-        its expectation.
-    converged : (runs,)
-        1 where the estimator said that its numbers can be used.
+        Mean normalised innovation squared of each run over rows away from gimbal lock; ``rows`` how many, and
+        ``nis_expected`` its expectation (`expected_nis`).
+    attempted : int
+        Number of runs; the arrays hold those whose estimator said that its numbers can be used.
     """
 
     kind: FilterKind
@@ -60,13 +63,39 @@ class Campaign:
     bound: Array
     nis: Array
     rows: float
-    dims: float
-    converged: Array
+    nis_expected: float
+    attempted: int
 
     @property
     def runs(self) -> int:
-        """Number of runs."""
+        """Number of runs that converged."""
         return len(self.error)
+
+    @property
+    def passed(self) -> bool:
+        """Whether all runs converged, and coverage, NEES and NIS lie within their limits."""
+        low, high = self.nis_limits
+        sound = self.runs == self.attempted and low <= float(self.nis.mean()) <= high
+        return sound and self.coverage.passed and self.nees.passed
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The figures as plain objects."""
+        coverage, nees = self.coverage, self.nees
+        each = zip(self.names, self.rms_over_bound, coverage.fraction, self.bound, strict=True)
+        return {
+            "filter": self.kind,
+            "runs": self.attempted,
+            "converged": self.runs,
+            "passed": self.passed,
+            "parameters": [
+                {"name": name, "rms_over_bound": ratio, "covered": covered, "bound": bound}
+                for name, ratio, covered, bound in each
+            ],
+            "coverage": {"level": coverage.level, "limits": coverage.limits, "pooled": coverage.pooled},
+            "nees": {"mean": nees.mean, "expected": nees.expected, "limits": nees.limits},
+            "nis": {"mean": float(self.nis.mean()), "expected": self.nis_expected, "limits": self.nis_limits},
+        }
 
     @property
     def rms_over_bound(self) -> Array:
@@ -90,8 +119,8 @@ class Campaign:
     @property
     def nis_limits(self) -> tuple[float, float]:
         """Where the mean of ``nis`` lies in 99 of 100 campaigns of a consistent filter."""
-        half = 2.576 * np.sqrt(2.0 * self.dims / (self.rows * self.runs))
-        return self.dims - half, self.dims + half
+        half = 2.576 * math.sqrt(2.0 * self.nis_expected / (self.rows * self.runs))
+        return self.nis_expected - half, self.nis_expected + half
 
     def table(self) -> str:
         """The figures as lines of text."""
@@ -101,7 +130,7 @@ class Campaign:
         low, high = self.nis_limits
         return "\n".join(
             [
-                f"{self.kind}: {self.runs} runs, {int(self.converged.sum())} of them converged",
+                f"{self.kind}: {self.attempted} runs, {self.runs} of them converged",
                 self.coverage.table(self.names),
                 self.nees.table(),
                 f"NIS {self.nis.mean():.4f}, expected {low:.4f} to {high:.4f}",
@@ -137,6 +166,8 @@ def campaign(
     ------
     StudyError
         The study has no plan or no truth.
+    InputError
+        Fewer than two runs converged.
     """
     of_study, made = problem(settings), experiment(settings)
     kind = of_study.filter.kind if kind is None else kind
@@ -149,22 +180,42 @@ def campaign(
         folder=folder,
         progress=progress,
     )
-    truth = settings.truth
+    truth, size = settings.truth, settings.size
     assert truth is not None
-    size = settings.size
+    sound = sample["converged"] > 0.0
+    if sound.sum() < 2:
+        raise InputError(kind, f"{int(sound.sum())} of {runs} runs converged, expected two or more")
     return Campaign(
         kind=kind,
         names=names(size),
-        error=sample["error"],
-        u=sample["u"],
-        joint_error=sample["joint_error"],
-        joint_covariance=sample["joint_covariance"],
+        error=sample["error"][sound],
+        u=sample["u"][sound],
+        joint_error=sample["joint_error"][sound],
+        joint_covariance=sample["joint_covariance"][sound],
         bound=bounds(made.motion, of_study, truth).u,
-        nis=sample["nis"],
-        rows=float(sample["rows"].mean()),
-        dims=float(sample["dims"].mean()),
-        converged=sample["converged"],
+        nis=sample["nis"][sound],
+        rows=float(sample["rows"][sound].mean()),
+        nis_expected=expected_nis(made, of_study, float(sample["dims"][sound].mean())),
+        attempted=runs,
     )
+
+
+def expected_nis(experiment: Experiment, problem: Problem, dims: float) -> float:
+    """Expectation of the mean NIS of a filter whose rows have ``dims`` scalars, which is a little less than that.
+
+    The truth is the same in all runs, and not drawn from the prior: the sum over a run is smaller by the number of
+    coefficients less the square of the truth over the prior. And the encoders are said to be noisier than they are:
+    of the covariance ``J J^T + f^2 I``, in units of their noise, ``J J^T`` has the eigenvalues 1 and 1 +- sin thy.
+    """
+    angles = experiment.motion.angles[1:, 1]
+    angles = angles[np.abs(np.cos(angles)) > AWAY]
+    if not len(angles):
+        return dims
+    sine = np.abs(np.sin(angles))
+    floor = sum(FLOOR**2 / (each + FLOOR**2) for each in (np.ones_like(sine), 1.0 + sine, 1.0 - sine))
+    p = len(problem.prior)
+    learned = p - float(np.square(experiment.truth[:p] / problem.prior).sum())
+    return float(dims - np.mean(floor) - learned / len(angles))
 
 
 def one_run(

@@ -71,7 +71,10 @@ def _small_errors(case: Case) -> list[Finding]:
     # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
     if errors and not _white(corrected, now) and (walk := _restless(case)) is not None:
         return [walk]
-    return [*(_in_words(each, corrected) for each in errors), *_scatter(corrected, now)]
+    rest = _scatter(corrected, now)
+    if errors and any(finding.code == "contradiction" for finding in rest):
+        return _scatter(case, filtered(case))  # errors that leave a contradiction are none
+    return [*(_in_words(each, corrected) for each in errors), *rest]
 
 
 def _white(case: Case, found: Filtered) -> bool:

@@ -36,11 +36,12 @@ _OF_FIELD = {
     "rad": ("arcsec", np.radians(1.0 / 3600.0)),
     "m/s^2": ("ug", 1e-6 * STANDARD_GRAVITY),
     "1": ("ppm", 1e-6),
+    "rad/sqrt(s)": ("deg/sqrt(h)", np.radians(1.0 / 60.0)),
 }
 
 
 def shown_unit(si: str) -> tuple[str, float]:
-    """A unit for people, and how many of the old it is: deg/h, arcsec, ug, ppm; others stay."""
+    """A unit for people, and how many of the old it is: deg/h, arcsec, ug, ppm, deg/sqrt(h); others stay."""
     return _OF_FIELD.get(si, (si, 1.0))
 
 

@@ -236,7 +236,7 @@ def campaign_page(campaign: Campaign, settings: SelfcalSettings) -> str:
             f"such a mean. Mean {np.nanmean(campaign.nis):.4f}, expected {campaign.nis_limits[0]:.4f} to "
             f"{campaign.nis_limits[1]:.4f}.",
             campaign.nis,
-            campaign.dims * campaign.rows,
+            campaign.nis_expected * campaign.rows,
             campaign.rows,
             "mean NIS of a run",
         ),
@@ -244,8 +244,8 @@ def campaign_page(campaign: Campaign, settings: SelfcalSettings) -> str:
     return page(
         "selfcal.html",
         title="Self-calibration simulated many times",
-        message=f"{campaign.runs} runs of the {FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind}), "
-        f"{int(campaign.converged.sum())} of them converged",
+        message=f"{campaign.attempted} runs of the {FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind}), "
+        f"{campaign.runs} of them converged",
         facts=_facts(settings),
         findings=None,
         tables=[campaign_table(campaign)],

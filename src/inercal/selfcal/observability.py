@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.identifiability import Learned, learned
+from inercal.estimate.result import rounded
 from inercal.records.findings import Finding
 from inercal.selfcal.bounds import Bounds, bounds
-from inercal.selfcal.coefficients import units
+from inercal.selfcal.display import of_field
 from inercal.selfcal.filtered import Problem
 from inercal.selfcal.plan import Motion
 from inercal.selfcal.settings import Gating
@@ -54,20 +55,19 @@ class Seen:
 
     def findings(self) -> tuple[Finding, ...]:
         """What the path cannot see: one for each coefficient at its prior, or wider than wanted."""
-        u = dict(zip(self.bounds.names, self.bounds.u, strict=True))
         ratio = dict(zip(self.bounds.names, self.learned.ratio, strict=True))
-        unit = dict(zip(self.bounds.names, units(len(u)), strict=True))
+        u = {name: f"{size} {unit}" for name, size, unit in self._shown()}
         left = [
             Finding(
                 "at_prior",
-                f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]:.2g} {unit[name]}",
+                f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]}",
             )
             for name in self.at_prior
         ]
         wide = [
             Finding(
-                "weak_term",
-                f"{name}: the path leaves u = {u[name]:.2g} {unit[name]}, {self.to_goal[name]:.3g} times the goal",
+                "goal_missed",
+                f"{name}: the path leaves u = {u[name]}, {self.to_goal[name]:.3g} times the goal",
             )
             for name in self.unmet
             if name not in self.at_prior
@@ -84,13 +84,16 @@ class Seen:
     def table(self) -> str:
         """Bounds, what is left of the prior, and what the goal asks, as aligned text."""
         lines = [f"{'':<7}  {'bound u':>9}  {'unit':<7} {'of prior':>9}  {'of goal':>8}"]
-        rows = zip(
-            self.bounds.names, self.bounds.u, units(len(self.bounds.names)), self.learned.ratio, strict=True
-        )
-        for name, u, unit, ratio in rows:
+        for (name, u, unit), ratio in zip(self._shown(), self.learned.ratio, strict=True):
             goal = f"{self.to_goal[name]:8.3g}" if name in self.to_goal else "       –"
-            lines.append(f"{name:<7}  {u:9.2g}  {unit:<7} {100 * ratio:7.3g} %  {goal}")
+            lines.append(f"{name:<7}  {u:>9}  {unit:<7} {100 * ratio:7.3g} %  {goal}")
         return "\n".join(lines)
+
+    def _shown(self) -> list[tuple[str, str, str]]:
+        """Name, u and unit of each coefficient for people."""
+        unit, size = of_field(len(self.bounds.names))
+        texts = (rounded(u, u)[1] for u in self.bounds.u / size)
+        return list(zip(self.bounds.names, texts, unit, strict=True))
 
 
 def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:

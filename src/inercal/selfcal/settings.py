@@ -93,13 +93,13 @@ class Disturbances:
 @dataclass(frozen=True)
 class Search:
     """A search for a path: ``turns`` most in number, of multiples of ``angle`` [rad], within ``time`` [s] at the
-    rates of the plan; ``criterion`` ``worst`` (largest u over goal or prior) or ``mean`` (of log u); ``seed``.
+    rates of the plan; ``criterion`` ``mean`` (of log u) or ``worst`` (largest u over goal or prior); ``seed``.
     ``time`` None: as long as the plan of the study."""
 
     turns: int = 5
     angle: float = float(np.radians(30.0))
     time: float | None = None
-    criterion: Literal["worst", "mean"] = "worst"
+    criterion: Literal["worst", "mean"] = "mean"
     seed: int = 1
 
 

@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.status import Status
 from inercal.records.record import Record
 from inercal.selfcal import filtering
 from inercal.selfcal.bounds import Bounds, recorded_bounds
+from inercal.selfcal.coefficients import names
 from inercal.selfcal.diagnosis import diagnose
+from inercal.selfcal.display import found as found_by
 from inercal.selfcal.filtered import Filtered, Problem, problem
 from inercal.selfcal.heading import with_heading
-from inercal.selfcal.outcome import assemble
+from inercal.selfcal.outcome import assemble, verdict
 from inercal.selfcal.reading import recording_of
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.settings import KINDS, SelfcalSettings
@@ -104,21 +107,26 @@ def calibrate(
     progress("assembling")
     estimate = assemble(recording, settings, found, bounds, faults)
     told = dict(estimate.result)
+    message = estimate.message
     if settings.heading_unknown and estimate.names:
         told["heading"] = _heading(settings, estimate)
+        degrees = (math.degrees(told["heading"][key]) for key in ("value", "u"))
+        message += "; heading {} deg, u {} deg".format(*rounded(*degrees))
     for name, other in compared.items():
-        told["compare"] |= {name: _beside(other, assemble(recording, settings, other, bounds, faults))}
-    timed = replace(estimate, result=told, timing={"solve": time.perf_counter() - clock})
+        told["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
+    timed = replace(estimate, result=told, message=message, timing={"solve": time.perf_counter() - clock})
     truth = None if settings.truth is None else settings.truth[: len(of.prior)]
     return Calibration(timed, of, recording, found, bounds, compared, truth)
 
 
-def _beside(found: Filtered, estimate: Estimate) -> dict[str, Any]:
+def _beside(other: Filtered, status: Status) -> dict[str, Any]:
     """What a comparison tells of an estimator."""
+    values, u = found_by(other)
+    each = zip(names(len(values)), values, u, strict=True)
     return {
-        "parameters": {p.name: {"value": p.value, "u": p.u} for p in estimate.parameters.values()},
-        "status": estimate.status.value,
-        "step_us": found.step_us,
+        "parameters": {name: {"value": value, "u": own} for name, value, own in each},
+        "status": status.value,
+        "step_us": other.step_us,
     }
 
 

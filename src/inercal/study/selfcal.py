@@ -208,8 +208,8 @@ class SearchTable(Strict):
         default=None, description="most that the path may take; that of the plan if absent"
     )
     criterion: Literal["worst", "mean"] = Field(
-        default="worst",
-        description="the largest uncertainty over goal or prior, or the mean of all on a log scale",
+        default="mean",
+        description="the mean of all uncertainties on a log scale, or the largest over goal or prior (worst)",
     )
     seed: Annotated[StrictInt, Field(ge=0)] = Field(default=1, description="of the random starts")
 

@@ -84,7 +84,7 @@ kind = "error-state"                # or "mukf", "svd-qukf", "gimbal-ukf", "map"
 turns = 5                           # how many at most
 # angle = "30 deg"                  # turns are multiples of it [deg]
 # time = "540 s"                    # most that the path may take [s]; that of the plan if absent
-# criterion = "worst"               # the largest u over goal or prior; or "mean" of all on a log scale
+# criterion = "mean"                # of all u on a log scale; or "worst", the largest u over goal or prior
 # seed = 1                          # of the random starts
 """
 """All but the head and the tables that studies have in common; loads as it is, on a rig anywhere on Earth."""
