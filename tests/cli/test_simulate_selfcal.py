@@ -12,6 +12,7 @@ from paper_study import TRUTH
 from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.records.read import read
+from inercal.selfcal.coefficients import NAMES
 from inercal.selfcal.plan import path
 from inercal.selfcal.reading import recording_of
 from inercal.selfcal.simulate import experiment, simulate
@@ -168,3 +169,41 @@ def test_the_example_is_copied_with_its_study(tmp_path, capsys):
     assert run(["examples", "selfcal", "--out", str(tmp_path / "here")]) == 0
     assert sorted(each.name for each in (tmp_path / "here").iterdir()) == ["selfcal.csv.gz", "selfcal.toml"]
     assert "inercal selfcal " in capsys.readouterr().out
+
+
+def test_many_runs_are_judged(folder, capsys):
+    """With --runs the study is simulated and calibrated so often; the file, the page and standard output agree."""
+    assert simulated("--runs", "40", "--json", "--out", "mc.json", "--report", "mc.html") == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["status"]["code"] == "ok"
+    assert data["result"]["runs"] == data["result"]["converged"] == 40
+    assert data["result"]["passed"] is True
+    assert [each["name"] for each in data["result"]["parameters"]] == list(NAMES)
+    low, high = data["result"]["nees"]["limits"]
+    assert low <= data["result"]["nees"]["mean"] <= high
+    assert json.loads(Path("mc.json").read_text())["result"] == data["result"]
+    assert "simulated many times" in Path("mc.html").read_text()
+
+
+def test_many_runs_with_noise_stated_too_small_fail(folder, capsys):
+    """Encoder errors that the study does not state: exit code 1, and the object all the same."""
+    harmonics = 'disturbances.harmonics=[{axis="x", order=1, amplitude="30 arcsec", phase="0 deg"}]'
+    assert simulated("--runs", "20", "--json", "--set", harmonics) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert data["status"]["code"] == "inconsistent"
+    assert data["result"]["passed"] is False
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--runs", "1"], "--runs: found 1"),
+        (["--runs", "5", "--seed", "-1"], "--seed: found -1"),
+        (["--runs", "5", "--out", "mc.csv"], "found the suffix '.csv'"),
+        (["--out", "run.csv", "--report", "mc.html"], "--report: found without --runs"),
+    ],
+)
+def test_many_runs_that_cannot_be(folder, capsys, more, words):
+    capsys.readouterr()
+    assert simulated(*more) == 2
+    said_once(capsys.readouterr(), words)

@@ -75,7 +75,7 @@ def simulate_selfcal(
 
 
 def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
-    """Many simulated calibrations; exit code 1 where the stated uncertainties are not true."""
+    """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._files import write_text
     from inercal._jit import compiling
     from inercal.records.read import source_of
@@ -96,7 +96,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
         with reading(output, "simulating") as progress:
             found = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
     timing = {"solve": time.perf_counter() - clock}
-    verdict = "the stated uncertainties are true" if found.passed else "the stated uncertainties are not true"
+    verdict = "the stated uncertainties hold" if found.passed else "the stated uncertainties are too small"
     message = f"{verdict}: {found.attempted} runs, {found.runs} of them converged"
     data = envelope("simulate selfcal", message, found.result, [source_of(study)], timing=timing)
     if not found.passed:

@@ -109,7 +109,7 @@ COMMANDS = {
         "states the true coefficients under [truth], and under [disturbances] what real rigs add. The recording goes "
         "to --out (.csv, .npz, .h5, .parquet or .nc): commanded rates, gimbal angles, accelerometers. With --runs N it "
         "is simulated and calibrated N times, and errors are judged by the stated uncertainties and the bound; --out "
-        "then writes the figures (.json), --report a page. Exit code 1: the uncertainties are not true.",
+        "then writes the figures (.json), --report a page. Exit code 1: the uncertainties are too small.",
         "inercal simulate selfcal selfcal.toml --seed 1 --out platform.csv",
     ),
     ("temperature", ""): (

@@ -16,9 +16,16 @@ from inercal.selfcal.settings import SelfcalSettings
 WIDTH = math.radians(60.0)
 """Standard deviation [rad] of a first guess; the filter finds a heading from as far away."""
 
+LAST = 30.0
+"""Prior of the heading at last, in standard uncertainties of what was found: a thousandth of what the recording tells.
+
+From a prior as wide as `WIDTH` the first rows turn beta by many degrees while all else is known poorly too, and what a
+linearised filter loses there it does not get back: errors of several u of other coefficients.
+"""
+
 
 def with_heading(recording: Recording, settings: SelfcalSettings) -> SelfcalSettings:
-    """The study with the heading that its recording tells, to within `WIDTH` or much better, and beta to correct it.
+    """The study with the heading that its recording tells, and beta, with a prior of `LAST` u, to correct it.
 
     The error-state filter of the extended model is run from four headings, a quarter turn apart; the one whose
     innovations fit best is near the true one, and is run again from what it found, until that no longer changes.
@@ -35,7 +42,11 @@ def with_heading(recording: Recording, settings: SelfcalSettings) -> SelfcalSett
         best = replace(best, base=replace(best.base, heading=_wrapped(best.base.heading + change)))
         if abs(change) < 1e-6:
             break
-    return best
+    prior = prior.copy()
+    prior[BETA.start + up] = min(
+        WIDTH, LAST * math.sqrt(_run(recording, best).covariance[BETA, BETA][up, up])
+    )
+    return replace(best, prior=prior)
 
 
 def _run(recording: Recording, settings: SelfcalSettings) -> Filtered:
