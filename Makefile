@@ -25,6 +25,8 @@ bench: .venv/dev/installed
 	$(DEV)/python benchmarks/ferraris.py
 	$(DEV)/python benchmarks/allan.py
 	$(DEV)/python benchmarks/streaming.py
+	$(DEV)/python benchmarks/selfcal_filters.py
+	$(DEV)/python benchmarks/selfcal_coverage.py --runs 1000
 
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network.
 .venv/run/installed: requirements/run.txt pyproject.toml

@@ -21,6 +21,13 @@ Rigs: chains of joints, fixed transforms and elementary errors, base first (`ine
     errors         dphi positioning, dalpha wobble, deps perpendicularity, dtheta mounting, dbase levelling, azimuth;
                    scope sample, position, run or rig: how long a value lasts
 
+    gimbals        th_x outer, th_y inner, th_z platform; frame b of the encoders, p of the platform; q_bp(th);
+                   at zero angles p lies along north-up-east (or as the study says); `inercal.selfcal.rig`
+
+Self-calibration: what a platform finds out about itself (`inercal.selfcal.coefficients`)
+    rate           w_Ip^p = w_c + M w_c + kg0, M from ds, do (kg1); w_c commanded, kg0 gyro bias
+    accelerometers ka0 bias, ka1 scale error, eta misalignments pz, oy, oz; beta base against encoders
+
 Records: labelled columns (`inercal.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
     turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's; rate in a rate test
@@ -38,12 +45,14 @@ Map, lower floors first; each imports only from those above its own line
     records                    record, findings, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
     estimate                   result, status, budget, linear, nonlinear, runs, coverage, exchange, repeat, compare,
-                               checkpoint
+                               checkpoint, consistency, identifiability; kernels: factor, sigma_point, kalman
     noise                      deviation, coefficients, running, outcome
     sensitivity                exact, sampled, local, dense, averages
     design                     candidates, criteria, exchange, comparison
     imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, temperature, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
+    selfcal                    rig, plan, model, simulate; filters: error_state, multiplicative, quaternion, gimbal,
+                               batch, start (behind filtering); bounds, pathdesign, diagnosis, outcome, campaign, task
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     study, report, examples    files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
@@ -58,6 +67,7 @@ if TYPE_CHECKING:
     from inercal.imu.task import calibrate as calibrate_imu
     from inercal.records.read import read as read
     from inercal.records.record import Record as Record
+    from inercal.selfcal.task import calibrate as calibrate_platform
     from inercal.sensitivity.exact import analyse as exact_sobol
     from inercal.turntable.task import calibrate as calibrate_turntable
 
@@ -68,13 +78,23 @@ _WHERE = {
     "Estimate": ("inercal.estimate.result", "Estimate"),
     "Record": ("inercal.records.record", "Record"),
     "calibrate_imu": ("inercal.imu.task", "calibrate"),
+    "calibrate_platform": ("inercal.selfcal.task", "calibrate"),
     "calibrate_turntable": ("inercal.turntable.task", "calibrate"),
     "exact_sobol": ("inercal.sensitivity.exact", "analyse"),
     "load": ("inercal.estimate.exchange", "load"),
     "read": ("inercal.records.read", "read"),
 }
 
-__all__ = ["Estimate", "Record", "calibrate_imu", "calibrate_turntable", "exact_sobol", "load", "read"]
+__all__ = [
+    "Estimate",
+    "Record",
+    "calibrate_imu",
+    "calibrate_platform",
+    "calibrate_turntable",
+    "exact_sobol",
+    "load",
+    "read",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -225,3 +225,13 @@ def test_other_estimators_give_the_same_estimate(sound, kind):
     assert np.abs((other.values - result.values) / result.u).max() < 0.1
     np.testing.assert_allclose(other.u, result.u, rtol=0.02)
     assert other.status is Status.OK
+
+
+def test_a_latitude_that_nobody_knows_hides_what_the_path_shows():
+    """With 5 deg of latitude earth rate is uncertain by more than the prior of the gyro biases: unobservable, and why."""
+    settings = study(path="best", site=replace(SITE, latitude_u=5.0 * DEG))
+    result, _ = assembled(settings)
+    assert result.status is Status.UNOBSERVABLE
+    assert "what is stated of latitude" in result.message
+    assert {"kg0_x", "kg0_y"} <= set(result.result["at_prior"])
+    assert result["kg0_x"].u > 0.9 * settings.prior[0]

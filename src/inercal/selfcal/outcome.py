@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.budget import combine, common
+from inercal.estimate.budget import BudgetItem, combine, common
 from inercal.estimate.consistency import Nis, nis
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
@@ -21,7 +21,7 @@ from inercal.selfcal.coefficients import NAMES, names, product_slope, to_product
 from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filtered import Filtered
 from inercal.selfcal.filtering import LOCK
-from inercal.selfcal.observability import UNOBSERVABLE, Seen, seen
+from inercal.selfcal.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.rig import JOINTS
 from inercal.selfcal.settings import SelfcalSettings
@@ -133,12 +133,20 @@ def assemble(
 
     judged = seen(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
-    result["at_prior"] = list(judged.at_prior)
+    hidden = _hidden(judged, u / bounds.prior, budget)
+    result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
     result["goal"] = _goal(settings.goal, names(p), u)
     hints = _hardly_turned(recording, settings)
     said += _left_at_prior(judged, hints) + _missed(result["goal"], units(p), hints)
+    said += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
     said += _taken_as_exact(exact)
     status, message = _verdict(judged, agreement, [*findings, *recording.findings], hints)
+    lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNOBSERVABLE and name in NAMES}
+    if status is Status.OK and lost:
+        status, message = (
+            Status.UNOBSERVABLE,
+            f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better",
+        )
     return Estimate(
         command=COMMAND,
         names=names(p),
@@ -235,6 +243,17 @@ def _left_at_prior(judged: Seen, hints: Mapping[str, str]) -> list[Finding]:
         )
         for name in judged.at_prior
     ]
+
+
+def _hidden(judged: Seen, ratio: Array, budget: Sequence[BudgetItem]) -> dict[str, tuple[float, str]]:
+    """Coefficients that the path shows, but what is stated of site or base hides: u over prior, and why."""
+    found = {}
+    for name, left in zip(judged.learned.names, ratio, strict=True):
+        if left > AT_PRIOR and name not in judged.at_prior:
+            source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
+            why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
+            found[name] = (float(left), why)
+    return found
 
 
 def _with(text: str, hint: str | None) -> str:
