@@ -199,24 +199,26 @@ def campaign(
         bound=bounds(made.motion, of_study, truth).u,
         nis=sample["nis"][sound],
         rows=float(sample["rows"][sound].mean()),
-        nis_expected=expected_nis(made, of_study, float(sample["dims"][sound].mean())),
+        nis_expected=expected_nis(made, of_study, kind, float(sample["dims"][sound].mean())),
         attempted=runs,
     )
 
 
-def expected_nis(experiment: Experiment, problem: Problem, dims: float) -> float:
+def expected_nis(experiment: Experiment, problem: Problem, kind: FilterKind, dims: float) -> float:
     """Expectation of the mean NIS of a filter whose rows have ``dims`` scalars, which is a little less than that.
 
     The truth is the same in all runs, and not drawn from the prior: the sum over a run is smaller by the number of
-    coefficients less the square of the truth over the prior. And the encoders are said to be noisier than they are:
-    of the covariance ``J J^T + f^2 I``, in units of their noise, ``J J^T`` has the eigenvalues 1 and 1 +- sin thy.
+    coefficients less the square of the truth over the prior. And all but two filters take the encoders for noisier
+    than they are: of the covariance ``J J^T + f^2 I``, in units of their noise, ``J J^T`` has the eigenvalues 1 and
+    1 +- sin thy.
     """
     angles = experiment.motion.angles[1:, 1]
     angles = angles[np.abs(np.cos(angles)) > AWAY]
     if not len(angles):
         return dims
     sine = np.abs(np.sin(angles))
-    floor = sum(FLOOR**2 / (each + FLOOR**2) for each in (np.ones_like(sine), 1.0 + sine, 1.0 - sine))
+    f = 0.0 if kind in ("svd-qukf", "gimbal-ukf") else FLOOR
+    floor = sum(f**2 / (each + f**2) for each in (np.ones_like(sine), 1.0 + sine, 1.0 - sine))
     p = len(problem.prior)
     learned = p - float(np.square(experiment.truth[:p] / problem.prior).sum())
     return float(dims - np.mean(floor) - learned / len(angles))

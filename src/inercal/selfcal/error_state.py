@@ -1,8 +1,10 @@
 """Estimator 4, the product's default: an error-state filter with analytic Jacobians.
 
 The attitude is a quaternion, its error a rotation vector in p (`inercal.selfcal.linearised`); each step is exact for
-a rate held over it. Accelerometers and encoders are put in one scalar after the other, those of the encoders
-decorrelated, all linearised at the prediction.
+a rate held over it. The encoders come first, three decorrelated scalars: whatever the error of the prediction, their
+residual is linear in it. The accelerometers follow, linearised at what the encoders made of it, so that a prediction
+that is far off, as after a wrong start, does no harm. Innovations of accelerometers are those that are
+left once the encoders of the row are known.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.estimate.kalman import innovation_variance, scalar_update
-from inercal.geometry.kernels import exp, log, multiply, normalize
+from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
 from inercal.selfcal.filtered import Problem, Start, State, Trace, empty_trace
 from inercal.selfcal.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.kinematics import Axes, attitude, nearest_turn
@@ -64,6 +66,16 @@ def advance(
 
 
 @kernel
+def _corrected(q: Quaternion, c: Array, x: Array) -> Quaternion:
+    """The attitude with the error state ``x`` put in, and the coefficients ``c`` too, in place; x is then 0."""
+    for j in range(len(c)):
+        c[j] += x[3 + j]
+    turned = normalize(multiply(q, exp((x[0], x[1], x[2]))))
+    x[:] = 0.0
+    return turned
+
+
+@kernel
 def _advance(
     attitude_: Array,
     c: Array,
@@ -101,8 +113,6 @@ def _advance(
         rate, earth_e, up_e = platform_rate(w, c), on_the_base(earth, c), on_the_base(up, c)
         q = normalize(propagate(q, rate, earth_e, dt[k]))
         propagate_covariance(P, c, w, rate, earth_e, q, dt[k], levels[0] * levels[0] * dt[k], top)
-        f = specific_force(q, up_e)
-        read = accelerometers(f, c)
         x[:] = 0.0
         total, count = 0.0, 0
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
@@ -116,13 +126,6 @@ def _advance(
         if history:
             for i in range(6):
                 out_innovations[k, i] = math.nan
-        if take and history:
-            for i in range(3):
-                if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    of_row = accelerometer_row(i, f, c, up_e, q, places, row)
-                    out_innovations[k, i] = (acc[k, i] - read[i]) / math.sqrt(
-                        innovation_variance(P, places, row, of_row, variance)
-                    )
         if take and seen:
             roots, variances = encoder_roots(angles, axes, signs, levels[2])
             miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
@@ -136,15 +139,23 @@ def _advance(
                 z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
                 total += scalar_update(P, x, places, row, i + 1, z, 1.0, work)
                 count += 1
+            q = _corrected(q, c, x)
         if take:
+            up_e = on_the_base(up, c)
+            f = specific_force(q, up_e)
+            read = accelerometers(f, c)
+            for i in range(3):
+                if not math.isnan(acc[k, i]) and admitted(i, gate, near):
+                    of_row = accelerometer_row(i, f, c, up_e, q, places, row)
+                    if history:
+                        own = innovation_variance(P, places, row, of_row, variance)
+                        out_innovations[k, i] = (acc[k, i] - read[i]) / math.sqrt(own)
             for i in range(3):
                 if not math.isnan(acc[k, i]) and admitted(i, gate, near):
                     of_row = accelerometer_row(i, f, c, up_e, q, places, row)
                     total += scalar_update(P, x, places, row, of_row, acc[k, i] - read[i], variance, work)
                     count += 1
-        q = normalize(multiply(q, exp((x[0], x[1], x[2]))))
-        for j in range(p):
-            c[j] += x[3 + j]
+            q = _corrected(q, c, x)
         nis[k] = total if count > 0 else math.nan
         dims[k] = count
         if history:
