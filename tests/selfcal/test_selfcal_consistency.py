@@ -25,8 +25,7 @@ def test_stated_uncertainties_are_true(kind, noise):
     assert found.nees.passed
     assert ((found.rms_over_bound > 0.75) & (found.rms_over_bound < 1.25)).all()
     assert found.nis.mean() == pytest.approx(6.0, abs=0.03)
-    if kind != "svd-qukf":  # which takes the encoders as they are, without a floor
-        assert found.nis_limits[0] <= found.nis.mean() <= found.nis_limits[1]
+    assert found.nis_limits[0] <= found.nis.mean() <= found.nis_limits[1]
     assert found.coverage.passed
 
 

@@ -8,6 +8,7 @@ Angles and accelerometers that are missing are left out of the updates.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -75,7 +76,7 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
-    said = (*_worth_saying(record, columns), *findings)
+    said = (*worth_saying(record, columns), *findings)
     recording = Recording(t, _hold(rate), th, acc, sensor == "gyro", said, record.sources)
     findings = implausible(recording, settings, where)
     if settings.plan is not None:
@@ -100,7 +101,7 @@ def _rate_sensor(record: Record, where: str) -> str:
     return there[0]
 
 
-def _worth_saying(record: Record, columns: list[Column]) -> list[Finding]:
+def worth_saying(record: Record, columns: Collection[Column]) -> list[Finding]:
     """Findings of the record but for numbers that nobody needs: the last row's rate, the first row's accelerometers."""
     needless = {
         column.name: 0 if column.name.startswith("acc") else len(column.values) - 1 for column in columns
