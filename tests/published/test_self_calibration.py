@@ -18,6 +18,7 @@ from inercal.selfcal.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.filtered import Start, problem
 from inercal.selfcal.filtering import LOST, estimate
 from inercal.selfcal.kinematics import attitude
+from inercal.selfcal.observability import gating_costs
 from inercal.selfcal.pathdesign import at_rest, with_stops
 from inercal.selfcal.plan import Plan, Rest, Turn, motion, path
 from inercal.selfcal.rig import Base
@@ -103,11 +104,11 @@ def estimates(runs):
 
 def test_one_run_of_all_estimators(estimates):
     """The table of the page, and errors that the bounds allow: seed 1 is the record that ships with inercal."""
-    allowed = 4.0 * bound_of(study()).u / SIZE
+    bound = 100.0 * bound_of(study()).u / SIZE
     for kind in FILTERS:
-        errors = to_product(estimates[kind][1].coefficients) / TRUTH[:18] - 1.0
-        np.testing.assert_allclose(100.0 * errors, ONE_RUN, rtol=0.02, atol=1e-3)
-        assert np.all(np.abs(errors) < allowed)
+        errors = 100.0 * (to_product(estimates[kind][1].coefficients) / TRUTH[:18] - 1.0)
+        assert np.all(np.abs(errors - ONE_RUN) < 0.01 * bound)
+        assert np.all(np.abs(errors) < 4.0 * bound)
 
 
 def test_estimators_agree(estimates):
@@ -148,12 +149,12 @@ def two_turns():
     prepared = experiment(settings)
     world = settings.world
     nominal = np.array([attitude(th, world.axes, world.signs) for th in prepared.motion.angles])
-    return settings, prepared, simulate(prepared, np.random.default_rng(1)), nominal
+    return settings, simulate(prepared, np.random.default_rng(1)), nominal
 
 
 def test_two_turns_attitude(two_turns):
     """Both models: 5e-7 in each component, and the same in four digits; Euler steps make no difference worth having."""
-    settings, _, run, _ = two_turns
+    settings, run, _ = two_turns
     given = problem(settings)
     found = {
         kind: component_rms(estimate(run.recording, given, kind).history.attitude, run.attitude)
@@ -167,7 +168,7 @@ def test_two_turns_attitude(two_turns):
 
 def test_printed_attitude_errors_are_of_another_kind(two_turns):
     """0.047 to 0.220 in a component are 5 to 25 deg; the commands alone, without any filter, are within 0.1 deg."""
-    settings, prepared, run, nominal = two_turns
+    settings, run, nominal = two_turns
     printed = np.array([[0.059, 0.047, 0.083, 0.062], [0.220, 0.083, 0.087, 0.131]])
     degrees = 2.0 * np.degrees(np.arcsin(printed))
     assert degrees.min() == pytest.approx(5.4, abs=0.05)
@@ -287,6 +288,7 @@ def test_svd_and_cholesky_give_other_points():
         }
         assert low < in_sigma(found["cholesky"], found["svd"]) < high
         assert in_sigma(found["eigen"], found["svd"]) < 0.02 * high
+        assert found["cholesky"].fallbacks == 0
 
 
 def without_sign(P):
@@ -297,9 +299,10 @@ def without_sign(P):
 
 
 def test_an_indefinite_covariance():
-    """Correlations kept to two digits at 180 s make P indefinite. |P| goes on as if nothing were: errors up to 5.9 of
-    its own standard uncertainties, NIS 5.94. Here the filter tells the eigenvalue, which makes its result no result."""
-    run, given = made(1, noise="low")
+    """Correlations kept to three digits at 180 s make P indefinite. |P| goes on as if nothing were: 1.8 standard
+    deviations away from where it would have come, NIS as before. Here the filter tells the eigenvalue, and by that
+    its result is not to be used."""
+    run, given = made()
     recording, given, row = run.recording, replace(given, filter=Filter("svd-qukf")), 900
 
     def advanced(state, rows):
@@ -309,16 +312,16 @@ def test_an_indefinite_covariance():
     state, trace = advanced(quaternion.initial(given, recording.th[0]), slice(0, row))
     assert trace.lowest_eigenvalue > 0.0
     d = np.sqrt(np.diag(state.covariance))
-    kept = np.round(state.covariance / np.outer(d, d), 2) * np.outer(d, d)
+    kept = np.round(state.covariance / np.outer(d, d), 3) * np.outer(d, d)
     ends = {}
-    for name, P in (("told", kept), ("|P|", without_sign(kept))):
+    for name, P in (("sound", state.covariance), ("told", kept), ("|P|", without_sign(kept))):
         copied = [part.copy() for part in (state.attitude, state.coefficients, P, state.near, state.th)]
         ends[name] = advanced(type(state)(*copied), slice(row, None))
-    end, trace = ends["|P|"]
-    assert trace.lowest_eigenvalue > 100.0 * LOST
-    assert trace.nis.mean() == pytest.approx(5.94, abs=0.01)
-    off = np.abs(end.coefficients - to_linear(TRUTH)[:18]) / np.sqrt(np.diag(end.covariance)[4:])
-    assert off.max() > 4.5
+    (sound, of_sound), (end, of_end) = ends["sound"], ends["|P|"]
+    assert of_end.lowest_eigenvalue > 0.0
+    assert of_end.nis.mean() == pytest.approx(of_sound.nis.mean(), abs=0.01)
+    u = np.sqrt(np.diag(sound.covariance)[4:])
+    assert 1.5 < np.max(np.abs(end.coefficients - sound.coefficients) / u) < 2.2
     assert ends["told"][1].lowest_eigenvalue < LOST
 
 
@@ -403,6 +406,24 @@ def test_rules_of_gating_on_this_path(runs):
     assert taken["channel", "accelerometers"] == (1.0, 1.0)
 
 
+def test_what_gating_costs():
+    """Bounds over those without: of accelerometers near level, and of all that is left out with them."""
+    asked = study()
+    costs = gating_costs(motion(asked.plan, asked.world), problem(asked), asked.truth)
+    gyros, accelerometers = [0, 1, 2, *range(6, 12)], [3, 4, 5, *range(12, 18)]
+    for rule in ("any", "two", "channel"):
+        assert costs[rule, "accelerometers"][gyros].max() < 1.055
+    two, channel = (
+        costs["two", "accelerometers"],
+        dict(zip(NAMES, costs["channel", "accelerometers"], strict=True)),
+    )
+    assert two[accelerometers].min() == pytest.approx(1.05, abs=0.01)
+    assert two[accelerometers].max() == pytest.approx(1.71, abs=0.02)
+    assert channel["eta_oz"] > 3000.0
+    assert [channel[name] for name in ("ka0_z", "ka1_z")] == pytest.approx([2.96, 2.15], abs=0.03)
+    assert costs["two", "step"][gyros].max() == pytest.approx(2.32, abs=0.03)
+
+
 # What the model leaves out
 
 
@@ -461,8 +482,8 @@ def test_earth_rate_in_other_axes_than_gravity():
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", [10.0, 120.0])
 def test_initial_errors(runs, degrees):
-    """Of the attitude, and told so, with encoders: mukf, gimbal-ukf and map forget them; svd-qukf only those of 10 deg;
-    the error-state filter none, which its NIS says. It starts from the first encoder reading if not told otherwise."""
+    """Of the attitude, and told so, with encoders: all forget them, but svd-qukf only those of 10 deg; from 120 deg it
+    ends 4 to 12 of its standard uncertainties off, which its NIS says."""
     given, worst, nis = problem(study()), dict.fromkeys(FILTERS, 0.0), dict.fromkeys(FILTERS, np.inf)
     for seed, run in enumerate(runs[:4]):
         axis = np.random.default_rng(100 + seed).standard_normal(3)
@@ -471,12 +492,9 @@ def test_initial_errors(runs, degrees):
             found = estimate(run.recording, given, kind, start, history=False)
             worst[kind] = max(worst[kind], from_truth(found))
             nis[kind] = min(nis[kind], found.nis_mean)
-    assert all(worst[kind] < 4.0 for kind in ("mukf", "gimbal-ukf", "map"))
-    assert worst["svd-qukf"] < (4.0 if degrees == 10.0 else 12.0)
-    assert worst["error-state"] > 10.0
-    assert nis["error-state"] > 50.0
+    assert all(worst[kind] < 4.0 for kind in FILTERS if kind != "svd-qukf" or degrees == 10.0)
     if degrees > 10.0:
-        assert worst["svd-qukf"] > 4.0
+        assert 4.0 < worst["svd-qukf"] < 12.0
         assert nis["svd-qukf"] > 1000.0
 
 
@@ -510,7 +528,7 @@ def test_errors_reach_the_bounds(quiet):
 
 def test_stops_or_none_depends_on_the_rig():
     """On the paper's own path stops at 90 deg win as soon as the rig turns at 5 deg/s in between, even if it measures
-    at rest alone: ds_z, which it hardly sees, by a third. At 2 deg/s they lose."""
+    at rest alone: ds_y by a third, while ds_z loses. At 2 deg/s they lose in all."""
     asked = study()
     continuous = bound_of(asked).u
 
@@ -521,4 +539,5 @@ def test_stops_or_none_depends_on_the_rig():
 
     assert np.exp(np.mean(np.log(ratio(2.0)))) == pytest.approx(1.21, abs=0.02)
     assert np.exp(np.mean(np.log(ratio(5.0)))) == pytest.approx(0.99, abs=0.02)
-    assert ratio(5.0)[NAMES.index("ds_z")] == pytest.approx(0.64, abs=0.02)
+    assert ratio(5.0)[NAMES.index("ds_y")] == pytest.approx(0.64, abs=0.02)
+    assert ratio(5.0)[NAMES.index("ds_z")] == pytest.approx(1.23, abs=0.02)
