@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, TRUTH, study
 
+from inercal.geometry.rotations import exp, rotate
 from inercal.records.findings import Finding
 from inercal.selfcal.diagnosis import diagnose
 from inercal.selfcal.filtered import problem
@@ -147,6 +148,17 @@ def test_unmodelled_gyro_scale_errors():
     truth = TRUTH.copy()
     truth[18:21] = [0.0, -20.0 * PPM, 20.0 * PPM]
     only(named(recording(truth=truth)), "unmodelled", "gyros have scale errors", "kg1_y = -2", "kg1_z = ")
+
+
+def test_sensors_turned_on_the_platform():
+    """The encoders tell the attitude of the joint, the accelerometers stand 5 arcsec off it about each axis."""
+    made = recording()
+    turn = exp(-5.0 * ARCSEC * np.ones(3))
+    turned = replace(made, acc=rotate(turn, made.acc), rate=rotate(turn, made.rate))
+    found = only(
+        named(turned), "unmodelled", "turned on the platform", "gamma_x = 5", "gamma_y = ", "gamma_z = "
+    )
+    assert "beta" not in found.message
 
 
 def test_the_extended_model_has_nothing_left_to_name():

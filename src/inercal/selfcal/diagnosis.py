@@ -156,6 +156,22 @@ def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Pro
     return [Proposal(finding, replace(recording, acc=acc, th=th), cost)]
 
 
+#: constant error -> what it is, its SI unit, what to do about it
+_CONSTANT = {
+    "base": (
+        "the base or the zero of the encoders is turned",
+        "rad",
+        "set extended = true under [filter], or correct heading and tilt under [rig]",
+    ),
+    "scale": ("the gyros have scale errors", "1", "set extended = true under [filter]"),
+    "mounting": (
+        "the sensors are turned on the platform, against the axis of its joint",
+        "rad",
+        "the angles are not those of the sensors' axes: align them, or take the turn out of the angles",
+    ),
+}
+
+
 def _in_words(error: Found, case: Case) -> Finding:
     """A small constant error as a finding."""
     cause, values, u = error.cause, error.values, error.u
@@ -166,21 +182,14 @@ def _in_words(error: Found, case: Case) -> Finding:
         how = "later" if rows > 0.0 else "earlier"
         text = f"the platform acts {1e3 * abs(rows) * dt:.3g} ms {how} than its commands are logged"
         return Finding("command_shift", text)
-    if cause.kind in ("base", "scale"):
-        unit, size = shown_unit("rad" if cause.kind == "base" else "1")
+    if cause.kind in _CONSTANT:
+        what, dimension, advice = _CONSTANT[cause.kind]
+        unit, size = shown_unit(dimension)
         seen = [
             f"{name} = {value / size:.3g} +- {each / size:.1g} {unit}"
             for name, value, each in zip(cause.names, values, u, strict=True)
             if abs(value) > 3.0 * each
         ] or [f"{', '.join(cause.names)} together"]
-        what = (
-            "the base or the zero of the encoders is turned"
-            if cause.kind == "base"
-            else "the gyros have scale errors"
-        )
-        advice = "set extended = true under [filter]"
-        if cause.kind == "base":
-            advice += ", or correct heading and tilt under [rig]"
         return Finding("unmodelled", f"{what}, which the model leaves out: {', '.join(seen)}; {advice}")
     amplitude = math.degrees(float(np.hypot(*values))) * 3600.0
     _, order, _, joint = cause.kind.split()

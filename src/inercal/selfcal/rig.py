@@ -1,8 +1,9 @@
 """Three-axis gimbals on a base: how angles make an attitude, and what earth and gravity are on the base.
 
-Frame b belongs to the encoders: it is the frame of the platform p at zero angles, ``C_bp(0) = 1``. Joints are
-turned in the order x, y, z (outer, inner, platform); about which axis of p each turns at zero angles is data. The
-usual rig has X_K along Z_p, Y_K along X_p, Z_K along Y_p (up): ``q_bp = qz(thx) qx(thy) qy(thz)``.
+Frame b belongs to the encoders: it is the frame of the platform p at zero angles, ``C_bp(0) = 1``; the base as it is
+stated here may be turned against it, which is beta of the extended model. Joints are turned in the order x, y, z
+(outer, inner, platform); about which axis of p each turns at zero angles is data. The usual rig has X_K along Z_p, Y_K
+along X_p, Z_K along Y_p (up): ``q_bp = qz(thx) qx(thy) qy(thz)``.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ LEAST_COSINE = 0.2
 """Rows with a smaller |cos thy| are left out: near gimbal lock innovations are smaller than stated."""
 
 LEAST_SIGMAS = 4.0
-"""Standard uncertainties by which one parameter of an error must differ from 0 for it to be named."""
+"""Standard uncertainties by which one parameter of an error must still differ from 0 beside errors found later."""
 
 _MOST, _ROUNDS = 5, 10
 _FLAT = 1e-12
@@ -182,6 +182,7 @@ def _causes(problem: Problem) -> tuple[Cause, ...]:
     general = (
         Cause("latitude", ("north", "up"), 1e-3 * EARTH_RATE, _other_earth),
         Cause("delay", ("delay",), 0.01, _delayed),
+        Cause("mounting", ("gamma_x", "gamma_y", "gamma_z"), 1e-5, _other_mounting),
     )
     if len(problem.prior) > len(NAMES):
         return general
@@ -190,6 +191,12 @@ def _causes(problem: Problem) -> tuple[Cause, ...]:
         Cause("base", ("beta_x", "beta_y", "beta_z"), 1e-5, _other_base),
         Cause("scale", ("kg1_x", "kg1_y", "kg1_z"), 1e-5, _other_scale),
     )
+
+
+def _other_mounting(recording: Recording, problem: Problem, values: Array) -> Case:
+    """Sensors turned by gamma [rad] against the axes that the encoders tell of: ``q_bp = q_encoders qexp(gamma)``."""
+    turn = exp(values)
+    return replace(recording, acc=rotate(turn, recording.acc), rate=rotate(turn, recording.rate)), problem
 
 
 def _other_earth(recording: Recording, problem: Problem, values: Array) -> Case:
