@@ -97,7 +97,7 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
     from inercal.records.maps import read_map
-    from inercal.study.load import load_imu_study, load_turntable_study
+    from inercal.study.load import load_imu_study, load_selfcal_study, load_turntable_study
 
     texts = [text for page in PAGES for text in blocks(page, "toml")]
     assert texts
@@ -107,8 +107,11 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
         if keys.keys() & {"columns", "file"}:
             read_map(tmp_path / "study.toml")
             continue
-        on_table = keys.get("rig", {}).get("kind", "").endswith("_axis_turntable")
-        (load_turntable_study if on_table else load_imu_study)(tmp_path / "study.toml")
+        kind = keys.get("rig", {}).get("kind", "")
+        if kind == "three_axis_gimbals":
+            load_selfcal_study(tmp_path / "study.toml")
+        else:
+            (load_turntable_study if kind else load_imu_study)(tmp_path / "study.toml")
 
 
 def test_every_link_between_pages_leads_somewhere():

@@ -20,6 +20,11 @@ from inercal.records.titles import fits, titled
         ("t_ms", "t", "ms"),
         ("temp_C", "temperature", "C"),
         ("Temperatur [°C]", "temperature", "°C"),
+        ("thx", "th_x", None),
+        ("GimbalY (deg)", "th_y", "deg"),
+        ("encoder_z [arcsec]", "th_z", "arcsec"),
+        ("wcx", "wc_x", None),
+        ("cmd_rate_y [deg/h]", "wc_y", "deg/h"),
         # where the name means another quantity, or none, the unit decides
         ("gX [mg]", "acc_x", "mg"),
         ("AsX(°/s)", "gyro_x", "°/s"),

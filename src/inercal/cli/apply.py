@@ -14,6 +14,7 @@ from inercal.records.findings import Finding
 
 if TYPE_CHECKING:
     from inercal.convert.correct import Model
+    from inercal.records.record import Record
 
 
 def apply(
@@ -62,12 +63,22 @@ def apply(
     record = apply_to(read_record(paths, map_file, output), model, invert)
     with reading(output) as progress:
         write_record(record, output.out, progress)
-    findings += record.findings
+    findings += _said_of(record, model)
     output.say_findings(findings)
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
     output.emit(envelope("apply", words, result, inputs, findings), words)
+
+
+def _said_of(record: Record, model: Model) -> tuple[Finding, ...]:
+    """Findings of a record, but for the rate and the accelerometers that nobody needs of a platform."""
+    from inercal.convert.platform import PlatformModel
+    from inercal.selfcal.reading import worth_saying
+
+    if isinstance(model, PlatformModel):
+        return tuple(worth_saying(record, record.columns.values()))
+    return record.findings
 
 
 def _model(calibration: Path) -> tuple[Model, tuple[Finding, ...]]:

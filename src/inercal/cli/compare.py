@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -13,7 +13,10 @@ from inercal.cli import process_age
 from inercal.cli.options import ReportOutput
 from inercal.cli.outcome import hand_over
 
-_CALIBRATION = "Calibration that `inercal calibrate --out` wrote."
+if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
+
+_CALIBRATION = "Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out."
 
 
 def compare(
@@ -38,4 +41,17 @@ def compare(
     estimate = compared(*files)
     timing = {"read": read - clock, "solve": time.perf_counter() - read, "total": process_age()}
     estimate = replace(estimate, inputs=inputs, timing=timing)
-    return hand_over(estimate, [table(estimate)], lambda: page(estimate), output, "comparison")
+    shown = _of_field(estimate) if files[0].estimate.command == "selfcal" else estimate
+    return hand_over(estimate, [table(shown)], lambda: page(shown), output, "comparison")
+
+
+def _of_field(estimate: Estimate) -> Estimate:
+    """The comparison of two self-calibrations with its rows in deg/h, arcsec, ug and ppm."""
+    from inercal.selfcal.display import shown_unit
+
+    lengths = ("first", "u_first", "second", "u_second", "difference", "u", "U")
+    rows = []
+    for row in estimate.result["coefficients"]:
+        unit, size = shown_unit(row["unit"])
+        rows.append({**row, **{key: row[key] / size for key in lengths}, "unit": unit})
+    return replace(estimate, result={**estimate.result, "coefficients": rows})

@@ -9,6 +9,8 @@ from inercal.records.channels import is_channel, misfit
 from inercal.units import Unit, parse_unit
 
 _SENSORS = {
+    "wc": r"wc|(?:cmd|command|commanded)(?: (?:rate|angular rate|omega|w))?",
+    "th": r"th|theta|gimbal|gimbal angle|encoder|encoder angle|enc",
     "acc": r"a|f|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha|beschl"
     r"|beschleunigung",
     "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega|drehrate",

@@ -37,6 +37,9 @@ SHIFTS = (-3, -2, -1, 1, 2, 3)
 _LEAST = 3
 """Rows for which an encoder must stand still."""
 
+_SAME = 20
+"""Rows for which it must repeat one reading to the last digit, where its joint is not told to turn."""
+
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -180,6 +183,13 @@ def _stuck(recording: Recording, turn: Turning) -> Iterator[Proposal]:
             yield _without_angles(recording, rows, found, 3.0 * n * n)
             later = Finding("stuck_encoder", f"{text}, and is wrong from then on", found.where)
             yield _without_angles(recording, np.arange(start + 1, n), later, 3.0 * n)
+        # at rest only the noise tells: the longest run, as a coarse encoder has many
+        start, end = max(_runs(turn.moved[:, joint] == 0.0), key=lambda run: run[1] - run[0], default=(0, 0))
+        if end - start >= _SAME and not still[start:end].any():
+            rows = np.arange(start + 1, end + 1)
+            text = f"{name} repeats one reading in {counted(len(rows) + 1, 'row')}"
+            found = Finding("stuck_encoder", text, places("row", rows + 1))
+            yield _without_angles(recording, rows, found, 3.0 * n * n)
 
 
 def _runs(true: NDArray[np.bool_]) -> list[tuple[int, int]]:
