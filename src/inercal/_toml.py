@@ -69,8 +69,12 @@ def check(model: type[M], data: Mapping[str, Any], where: object, error: type[In
 
 
 def _dotted(location: tuple[Any, ...]) -> str:
-    """``imu.static_start`` for ("imu", "static_start"); a key that needs quotes gets them."""
-    return ".".join(text if re.fullmatch(r"[\w-]+", text := str(part)) else shown(text) for part in location)
+    """``imu.static_start`` for ("imu", "static_start"); a key that needs quotes gets them.
+
+    Pydantic's name for the branch of a union, where a quantity or a word may stand, is left out.
+    """
+    keys = (text for part in location if not (text := str(part)).startswith("function-plain["))
+    return ".".join(text if re.fullmatch(r"[\w-]+", text) else shown(text) for text in keys)
 
 
 def _sentence(model: type[BaseModel], first: Any) -> str:

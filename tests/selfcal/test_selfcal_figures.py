@@ -431,7 +431,7 @@ def test_the_page_of_a_campaign():
             rng.chisquare(6 * 275, 200) / 275,
             275.0,
             6.0,
-            np.ones(200),
+            200,
         )
 
     sound, poor = (drawn_by.campaign_page(campaign(size), study()) for size in (1.0, 2.0))
