@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -10,20 +11,25 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli import process_age
-from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_record, working
+from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
 from inercal.cli.outcome import hand_over, printed
 from inercal.cli.streaming import Every, StreamOptions, interval_of, run_stream
 from inercal.errors import InputError, StudyError, UsageError
 
 if TYPE_CHECKING:
     from inercal.records.findings import Finding
+    from inercal.selfcal.settings import SelfcalSettings
+    from inercal.selfcal.task import Calibration
 
 Kind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
 
 
 def selfcal(
     files: Annotated[
-        list[Path] | None, Parameter(help="Recordings; several files with distinct channels are one record.")
+        list[Path] | None,
+        Parameter(
+            help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
+        ),
     ] = None,
     /,
     *,
@@ -58,23 +64,35 @@ def selfcal(
     from inercal._jit import compiling
     from inercal.records.read import source_of
     from inercal.records.write import SUFFIXES
-    from inercal.selfcal.display import compared, displayed
     from inercal.selfcal.task import calibrate, load_kernels
     from inercal.study.load import load_selfcal_study
 
     output.check((".json", ".toml", *SUFFIXES), (*paths, map_file, study))
     settings = load_selfcal_study(study, keys)
     clock = time.perf_counter()
-    record = read_record(paths, map_file, output)
+    records = read_repeats(paths, map_file, output)
     read_s = time.perf_counter() - clock
+    if len(records) > 1 and compare:
+        raise InputError("--compare", f"found {len(records)} runs, expected one")
+    if len(records) > 1 and output.out is not None and output.out.suffix.lower() in SUFFIXES:
+        raise InputError(output.out, f"found {len(records)} runs, expected one for a history, or .json")
     of_all = " all" if compare else f" {settings.filter.kind}"
     with of_study(study), compiling(f"selfcal{of_all}", output.say):
         load_kernels(settings, compare)
+    runs = []
     with of_study(study), working(output) as progress:
-        found = calibrate(record, settings, compare, progress)
-    timing = {"read": read_s, "solve": found.estimate.timing["solve"], "total": process_age()}
-    inputs = (*found.estimate.inputs, source_of(study))
-    found = replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs))
+        for number, record in enumerate(records, start=1):
+            of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
+            found = calibrate(record, settings, compare, lambda text, of_run=of_run: progress(of_run + text))  # type: ignore[misc]
+            timing = {"read": read_s, "solve": found.estimate.timing["solve"], "total": process_age()}
+            inputs = (*found.estimate.inputs, source_of(study))
+            runs.append(replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs)))
+    return _one(runs[0], settings, output) if len(runs) == 1 else _repeated(runs, output)
+
+
+def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) -> int:
+    """Hand over the calibration of one run."""
+    from inercal.selfcal.display import compared, displayed
 
     def page() -> str:
         from inercal.selfcal.figures import calibration_page
@@ -89,6 +107,25 @@ def selfcal(
 
     tables = [printed(displayed(found.estimate)), *(f"{t.title}\n{t.text()}" for t in compared(found))]
     return hand_over(found.estimate, tables, page, output, "calibration", histories)
+
+
+def _repeated(runs: Sequence[Calibration], output: ReportOutput) -> int:
+    """Hand over what repeat runs say together."""
+    from inercal.estimate.repeat import combine_runs
+    from inercal.selfcal.display import displayed
+
+    of_runs = [found.estimate for found in runs]
+    estimate, shown = combine_runs(of_runs), combine_runs([displayed(each) for each in of_runs])
+    solve = sum(each.timing["solve"] for each in of_runs)
+    estimate = replace(estimate, timing={**of_runs[-1].timing, "solve": solve})
+
+    def page() -> str:
+        from inercal.report.figures import repeats
+        from inercal.report.html import render
+
+        return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")
+
+    return hand_over(estimate, [printed(shown)], page, output)
 
 
 def _live(
