@@ -44,7 +44,9 @@ def main() -> None:
     )
     print(file=sys.stderr)
     print(found.table())
-    print(f"{options.runs / (time.perf_counter() - began):.0f} runs/s on {os.cpu_count()} cores, simulation included")
+    print(
+        f"{options.runs / (time.perf_counter() - began):.0f} runs/s on {os.cpu_count()} cores, simulation included"
+    )
 
 
 if __name__ == "__main__":

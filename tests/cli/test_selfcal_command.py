@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -193,6 +194,24 @@ def test_a_stream_gives_the_bytes_of_the_history(kind, capsys, monkeypatch):
     code, out, err = piped(monkeypatch, capsys, *stream)
     assert (code, err) == (0, "")
     assert out == Path(name).read_text()
+
+
+def test_numbers_that_nobody_needs_are_not_said_to_be_missing(capsys, monkeypatch):
+    """The last row has no rate, the first no accelerometers: none is needed. A rate amid the rows is."""
+    header, *rows = Path("short.csv").read_text().splitlines()
+    whole = [header, *rows[:-1], re.sub(r"^([^,]*),[^,]*,[^,]*,[^,]*,", r"\1,,,,", rows[-1])]
+    flawed = whole.copy()
+    flawed[50] = re.sub(r"^([^,]*),[^,]*,", r"\1,,", flawed[50])
+    for lines, said in ((whole, []), (flawed, ["nan: wc_x"])):
+        Path("log.csv").write_text("\n".join(lines) + "\n")
+        assert run(["inspect", "log.csv"]) == 0
+        out = capsys.readouterr().out
+        assert ("nothing suspicious" in out) == (not said)
+        # a table of the whole file counts both places of a channel
+        assert out.count("nan: ") == len(said)
+        code, _, err = piped(monkeypatch, capsys, "selfcal", "--stream", *SELFCAL[2:], log="log.csv")
+        assert code == 0
+        assert [line.split(": missing")[0] for line in err.splitlines() if line.startswith("nan")] == said
 
 
 def test_a_stream_from_a_file_a_line_a_minute(capsys):

@@ -207,3 +207,13 @@ def test_many_runs_that_cannot_be(folder, capsys, more, words):
     capsys.readouterr()
     assert simulated(*more) == 2
     said_once(capsys.readouterr(), words)
+
+
+def test_many_runs_need_a_base_that_is_stated_well(folder, capsys):
+    """A filter alone does not find a base that is half a degree off, and a campaign is of filters alone."""
+    capsys.readouterr()
+    wide = ["--set", "filter.extended=true", "--set", "prior.beta=30 arcmin"]
+    assert simulated("--runs", "5", *wide) == 2
+    assert "prior.beta: found 30 arcmin" in capsys.readouterr().err
+    assert simulated("--runs", "5", "--set", "rig.heading=unknown") == 2
+    assert "rig.heading: found it unknown, expected a known one for a campaign" in capsys.readouterr().err

@@ -127,6 +127,19 @@ def test_every_number_is_that_of_the_table():
     assert all(TERMS[name].name in page.text for name in TERMS)
 
 
+def test_degrees_of_freedom_beyond_a_million_are_infinite():
+    dof = np.array([999_999.0, 1e6, 2433221319326.0, np.inf, 4.2])
+    rows = Page(render(estimate(dof=dof), [], "Report")).rows
+    assert [row[5] for row in rows if len(row) == 7][1:] == ["999999", "∞", "∞", "∞", "4.2"]
+
+
+def test_what_was_recorded_in_four_digits_of_the_larger_end():
+    ranges = {"th_x_deg": [-0.03631672, 179.9956], "temperature_degC": [-0.00012345, 0.06500617]}
+    text = Page(render(estimate(conditions={"ranges": ranges}), [], "Report")).text
+    assert "recorded th x 0.0 to 180.0°" in text
+    assert "recorded temperature -0.00012 to 0.06501 °C" in text
+
+
 @pytest.mark.parametrize("status", Status)
 def test_the_verdict_in_words(status):
     page = Page(render(estimate(status=status, message="why so"), [], "Report"))

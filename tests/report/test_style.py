@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.report.style import COLOURS, envelope, figure, plain_unit, powers_of_ten, svg
+from inercal.report.style import COLOURS, envelope, figure, plain_unit, power_of_ten, powers_of_ten, svg
 
 DRAW = """
 import numpy as np
@@ -95,6 +95,7 @@ def test_powers_of_ten_in_words():
         powers_of_ten(axis)
         texts = [axis.get_major_formatter()(value) for value in (1e-3, 1.0, 100.0, 1e6)]
     assert texts == ["10⁻³", "1", "100", "10⁶"]
+    assert [power_of_ten(value) for value in (0.0, -0.01, -10.0)] == ["0", "−10⁻²", "−10"]
 
 
 def test_units_with_powers():

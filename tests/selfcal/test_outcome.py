@@ -10,12 +10,14 @@ from paper_study import ARCSEC, DEG, TRUTH, study
 from inercal.estimate.exchange import to_json
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site
+from inercal.records.findings import Finding
 from inercal.selfcal.bounds import recorded_bounds
 from inercal.selfcal.coefficients import NAMES, to_product, units
 from inercal.selfcal.diagnosis import diagnose
 from inercal.selfcal.filtered import problem
 from inercal.selfcal.filtering import estimate
 from inercal.selfcal.outcome import assemble, verdict
+from inercal.selfcal.plausibility import implausible
 from inercal.selfcal.rig import Base
 from inercal.selfcal.simulate import experiment, simulate
 
@@ -187,6 +189,25 @@ def test_a_recording_that_contradicts_the_model_is_inconsistent_and_says_why():
     )
 
 
+def test_an_inconsistent_verdict_names_what_explains_it_and_leaves_the_rest_unsaid():
+    """Of gimbals with a wrong sign a saturated sample explains nothing; goals of such numbers are of no interest."""
+    settings = study(path="best", goal={"kg0_x": 1e-12})
+    made = recording(settings)
+    known = (Finding("saturation", "acc_z: 3 samples"), Finding("outlier", "acc_x: 1 sample"))
+    made = replace(made, th=made.th * [1.0, 1.0, -1.0], findings=known)
+    made = replace(made, findings=(*known, *implausible(made, settings, "record")))
+    assert made.findings[-1].code == "sign_suspect"
+    result, _ = assembled(settings, made)
+    assert result.status is Status.INCONSISTENT
+    assert result.message.endswith(made.findings[-1].message)
+    assert [finding.code for finding in result.findings] == ["saturation", "outlier", "sign_suspect"]
+    silent, _ = assembled(settings, replace(made, findings=known[:1]))
+    assert silent.message.endswith("check noise, commands, signs and units")
+    # what the diagnosis found comes before what was seen in single channels
+    told, _ = assembled(settings, made, findings=[Finding("low_scatter", "a"), Finding("unmodelled", "b")])
+    assert told.message.endswith("; b")
+
+
 def test_a_filter_that_did_not_converge_gives_no_numbers(sound):
     settings, _, found = sound
     made = recording(settings)
@@ -228,7 +249,7 @@ def test_other_estimators_give_the_same_estimate(sound, kind):
 
 
 def test_a_latitude_that_nobody_knows_hides_what_the_path_shows():
-    """With 5 deg of latitude earth rate is uncertain by more than the prior of the gyro biases: unobservable, and why."""
+    """With 5 deg of latitude earth rate is uncertain by more than the prior of the gyro biases."""
     settings = study(path="best", site=replace(SITE, latitude_u=5.0 * DEG))
     result, _ = assembled(settings)
     assert result.status is Status.UNOBSERVABLE

@@ -18,6 +18,7 @@ from inercal.estimate.status import Status
 from inercal.geometry.rotations import exp, multiply, normalize
 from inercal.report import filtering
 from inercal.report.cells import Cell
+from inercal.report.figures import dots
 from inercal.report.histories import turning
 from inercal.report.selfcal import attitude_errors
 from inercal.selfcal.bounds import Bounds
@@ -30,7 +31,7 @@ from inercal.selfcal.pathdesign import Designed, Judged
 from inercal.selfcal.plan import Plan, Rest, Turn, path
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.residuals import gimbals
-from inercal.selfcal.tables import turns, weak_combinations
+from inercal.selfcal.tables import bounds_by_path, turns, weak_combinations
 from inercal.selfcal.task import Calibration
 from inercal.units import parse_unit
 
@@ -413,6 +414,48 @@ def test_the_page_of_a_design():
         assert words in page
 
 
+def test_a_design_is_set_against_its_goals():
+    """The last column is the bound of the path found over the goal, and the picture has a bar at each goal."""
+    settings = study(goal={"kg0_x": 0.01 * PER_HOUR})
+    found = Designed((judged("found", SHORT, np.full(18, 0.002), settings),), "", ())
+    table = bounds_by_path(found)
+    ratio = 0.002 * PRIOR[0] / (0.01 * PER_HOUR)
+    assert table.columns[-1] == ("of goal", "")
+    assert [row[-1] for row in table.rows] == [f"{ratio:.3g}", *["–"] * 17]
+    assert "Bar: the goal." in drawn_by.design_page(found, settings)
+    without = Designed((judged("found", SHORT, np.full(18, 0.002), study()),), "", ())
+    assert bounds_by_path(without).columns[-1] == ("prior", "")
+    assert "Bar: the goal." not in drawn_by.design_page(without, study())
+    with_goal, plain = (
+        dots("", "", ("a", "b"), ("1", "1"), {"found": np.array([2.0, 3.0])}, goal)
+        for goal in (np.array([1.0, np.nan]), None)
+    )
+    assert "goal" in texts(with_goal)
+    assert "goal" not in texts(plain)
+
+
+def test_statistics_are_in_words():
+    """Nothing of a self-calibration is a residual of |f|; what a row cost is there with its share of the interval."""
+    statistics = {"residual_rms": 1.001, "chi2": 16220.0, "nis_mean": 6.008, "steps": 2700.0}
+    calibration = evidence()
+    own = replace(calibration.estimate, statistics=statistics, result={"step_us": 4.0, "sample_share": 2e-5})
+    page = drawn_by.calibration_page(replace(calibration, estimate=own), study(plan=SHORT))
+    for words in (
+        "<dt>root-mean-square normalised innovation, expected 1</dt><dd>1.001</dd>",
+        "<dt>normalised innovation squared of a row (NIS), mean</dt><dd>6.008</dd>",
+        "<dt>time of a row</dt><dd>4 µs</dd>",
+        "<dt>time of a row, of the sample interval</dt><dd>0.002 %</dd>",
+    ):
+        assert words in page
+    assert "|f|" not in page
+
+
+def test_logarithmic_axes_have_one_style():
+    (drawn,) = (each for each in drawn_by.convergence(evidence()) if "fall" in each.title)
+    assert {"10⁻²", "1"} <= set(texts(drawn))
+    assert "0.01" not in texts(drawn)
+
+
 def test_the_page_of_a_campaign():
     """Errors of the stated size pass; those of twice the size are outside, in numbers and in colour."""
     rng, u = np.random.default_rng(10), 0.01 * PRIOR[:18]
@@ -434,7 +477,12 @@ def test_the_page_of_a_campaign():
             200,
         )
 
-    sound, poor = (drawn_by.campaign_page(campaign(size), study()) for size in (1.0, 2.0))
+    sound, poor, cautious = (drawn_by.campaign_page(campaign(size), study()) for size in (1.0, 2.0, 0.3))
+    assert "the stated uncertainties hold." in sound
+    assert "the stated uncertainties are too small" in poor
+    assert "the stated uncertainties hold; outside, but harmless" in cautious
+    assert campaign(1.0).harmless == ""
+    assert campaign(0.3).table().splitlines()[-1].endswith("NEES")
     for page in (check(sound), check(poor)):
         assert "200 runs of the error-state filter" in page
         assert "Coverage, and errors beside uncertainties and bounds" in page

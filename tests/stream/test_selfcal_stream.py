@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from paper_study import TRUTH, study
 
 from inercal.errors import InputError, RecordError, StudyError
+from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.write import write_record
 from inercal.selfcal.filtered import problem
@@ -97,6 +99,73 @@ def test_so_they_are_with_other_states_gating_and_factors(filter_, tmp_path):
     settings = study(plan=None, filter=filter_)
     text = recorded(tmp_path, 2)
     assert live(text, settings) == of_file(text, settings, tmp_path)
+
+
+def across(rows):
+    """Rows that lack the end of the first turn, encoders silent behind it; rates that lack the beginning of another."""
+    for k, row in enumerate(rows):
+        if 216 <= k < 222:
+            row["th_x [deg]"] = ""
+        if 250 <= k < 256:
+            row["wc_x [deg/h]"] = ""
+    return rows[:204] + rows[216:]
+
+
+@pytest.mark.parametrize("kind", RECURSIVE)
+def test_a_turn_that_ended_in_a_gap_is_found_out_as_in_a_file(kind, tmp_path):
+    settings, said = study(plan=None, filter=Filter(kind)), []
+    text = recorded(tmp_path, 6, change=across)
+    assert live(text, settings, said=said) == of_file(text, settings, tmp_path)
+    anew = [finding for finding in said if "attitude is taken anew" in finding.message]
+    assert [finding.code for finding in anew] == ["gap"] * len(anew)
+    assert anew[0].where == "t = 44.4 s"
+
+
+def test_killed_in_doubt_and_resumed(tmp_path):
+    settings, saving = study(plan=None), Saving(tmp_path / "state", 1)
+    text = recorded(tmp_path, 6, change=across)
+    given = []
+    for kill in (207, 241, None):
+        given += live(text, settings, saving=saving, kill=kill)
+    assert list(dict.fromkeys(given)) == live(text, settings)
+
+
+@pytest.mark.parametrize("rows", [slice(0, 0), slice(100, 120)])
+def test_increments_in_the_place_of_rates(rows, tmp_path):
+    """Gained since the row before: over a gap the last interval's is known, and held backward."""
+    settings = study(plan=None)
+    record = to_record(simulate(experiment(study(plan=SHORT)), np.random.default_rng(7)).recording)
+    names = [f"wc_{axis}" for axis in "xyz"]
+    gained = {name: np.append(np.nan, record[name].si()[:-1]) * 0.2 for name in names}
+    columns = [record["th_x"].t, *gained.values()]
+    columns += [record[f"{name}_{axis}"].si() for name in ("th", "acc") for axis in "xyz"]
+    table = np.delete(np.column_stack(columns), np.arange(len(columns[0]))[rows], axis=0)
+    text = "\n".join(",".join("" if x != x else repr(float(x)) for x in row) for row in table) + "\n"
+    titles = ["t", *names, *(f"{name}_{axis}" for name in ("th", "acc") for axis in "xyz")]
+    units = ["s", *["rad"] * 6, *["m/s^2"] * 3]
+    entries = [
+        f'[columns.{name}]\nfrom = {k}\nunit = "{unit}"\n'
+        + ('kind = "increment"\n' if name[0] == "w" else "")
+        for k, (name, unit) in enumerate(zip(titles, units, strict=True))
+    ]
+    (tmp_path / "map.toml").write_text('[time]\nrate = "5 Hz"\n' + "".join(entries))
+    (tmp_path / "whole.csv").write_text(text)
+    recording = recording_of(read(tmp_path / "whole.csv", tmp_path / "map.toml"), settings)
+    found = estimate(recording, problem(settings))
+    assert len(recording.held) == (rows.stop > 0)
+    assert found.restarts == ()
+    assert found.nis_mean == pytest.approx(6.0, abs=5.0 * np.sqrt(12.0 / len(found.nis)))
+    lines = Lines(io.BytesIO(text.encode()), "log", read_map(tmp_path / "map.toml"), lambda finding: None)
+    out = []
+    run(Selfcal(lines, problem(settings)), lines, out.append)
+    told = problem(settings)
+    write_record(history_record(found, recording, told.world), tmp_path / "history.csv")
+    whole = (tmp_path / "history.csv").read_text().splitlines()
+    assert out[0] == whole[0]
+    numbers = [np.genfromtxt(each[1:], delimiter=",") for each in (out, whole)]
+    assert_allclose(
+        numbers[0], numbers[1], rtol=1e-6, atol=1e-12
+    )  # increments become rates by other roundings
 
 
 def test_measured_rates_in_the_place_of_commanded_ones(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isnan
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,10 @@ def inspect(
 
     output.check((".json",), (*files, map_file))
     record = read_record(files, map_file, output)
+    if {"wc_x", "th_x", "acc_x"} <= record.columns.keys():  # a platform in gimbals
+        from inercal.selfcal.reading import worth_saying
+
+        record = replace(record, findings=tuple(worth_saying(record, record.columns.values())))
     rows = summary(record)
     words = counted(len(record.findings), "finding") if record.findings else "nothing suspicious"
     result = {"channels": [vars(row) for row in rows]}

@@ -14,7 +14,7 @@ from inercal.cli import process_age
 from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
 from inercal.cli.outcome import hand_over, printed
 from inercal.cli.streaming import Every, StreamOptions, interval_of, run_stream
-from inercal.errors import InputError, StudyError, UsageError
+from inercal.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from inercal.records.findings import Finding
@@ -139,6 +139,7 @@ def _live(
 ) -> None:
     """Calibrate row by row."""
     from inercal._jit import compiling
+    from inercal.selfcal.base_search import stated_well
     from inercal.selfcal.filtered import problem
     from inercal.stream.selfcal import Selfcal, filter_of, load
     from inercal.study.load import load_selfcal_study
@@ -148,8 +149,8 @@ def _live(
     file = paths[0] if paths else None
     streaming.check(output, (file, map_file, study))
     settings = load_selfcal_study(study, keys)
-    if settings.heading_unknown:
-        raise StudyError(study, "rig.heading: found it unknown, expected a known one for a stream")
+    with of_study(study):
+        stated_well(settings, "a stream")
     told = problem(settings)
 
     def say(finding: Finding) -> None:

@@ -96,8 +96,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
         with reading(output, "simulating") as progress:
             found = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
     timing = {"solve": time.perf_counter() - clock}
-    verdict = "the stated uncertainties hold" if found.passed else "the stated uncertainties are too small"
-    message = f"{verdict}: {found.attempted} runs, {found.runs} of them converged"
+    message = f"{found.verdict}: {found.attempted} runs, {found.runs} of them converged"
     data = envelope("simulate selfcal", message, found.result, [source_of(study)], timing=timing)
     if not found.passed:
         data["status"]["code"] = "inconsistent"

@@ -58,6 +58,7 @@ CODES: dict[str, str] = {
     "unmodelled": "the recording shows errors that the model leaves out",
     "site_suspect": "earth rate does not fit the stated site",
     "low_scatter": "the scatter of the residuals is below what the stated noise explains",
+    "prior_suspect": "a value is far outside what its prior allows",
     "filter_fails": "an estimator fails on a sound recording",
     "perhaps_common": "sources that may act alike in two calibrations",
 }

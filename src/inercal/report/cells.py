@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.report.style import INK, QUIET, figure
+from inercal.report.style import INK, QUIET, figure, power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GRID = "#E3E7EB"
 _TICK = 0.03
 
@@ -133,9 +132,7 @@ def frame(
 
 def number(value: float, scale: str) -> str:
     """A tick's number: plain, or a power of ten."""
-    if scale == "log" and not 1e-2 <= value <= 1e3:
-        return f"10{str(round(np.log10(value))).translate(_SUPERSCRIPTS)}"
-    return f"{value:g}".replace("-", "−")
+    return power_of_ten(value) if scale == "log" else f"{value:g}".replace("-", "−")
 
 
 def line(axes: Axes, cell: Cell, x: Array, y: Array, **look: Any) -> None:

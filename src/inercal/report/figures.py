@@ -144,11 +144,16 @@ def heat(
 
 
 def dots(
-    title: str, caption: str, names: Sequence[str], units: Sequence[str], series: Mapping[str, Array]
+    title: str,
+    caption: str,
+    names: Sequence[str],
+    units: Sequence[str],
+    series: Mapping[str, Array],
+    goal: Array | None = None,
 ) -> Picture:
     """Uncertainties (p,) of coefficients in several cases, on a logarithmic scale for each unit.
 
-    What is not finite is left out.
+    A bar is the ``goal`` (p,), the uncertainty that is wanted. What is not finite is left out.
     """
     groups = [[k for k, own in enumerate(units) if own == unit] for unit in dict.fromkeys(units)]
     heights = [len(group) + 1.5 for group in groups]
@@ -165,6 +170,17 @@ def dots(
                     mfc="none" if k else COLOURS[0],
                     mew=1.1,
                     label=label,
+                )
+            if goal is not None:
+                axes.plot(
+                    goal[group],
+                    np.arange(len(group)),
+                    "|",
+                    color=INK,
+                    ms=9.0,
+                    mew=1.6,
+                    label="goal",
+                    zorder=1,
                 )
             axes.set_yticks(np.arange(len(group)), [names[k] for k in group], fontsize=7)
             axes.set_ylim(len(group) - 0.5, -0.5)

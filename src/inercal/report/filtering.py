@@ -196,6 +196,7 @@ def covered(found: Coverage, names: Sequence[str], over_bound: Array) -> Picture
         f"Left: share of {found.runs} runs in which the interval stated for {100.0 * found.level:g} % held the truth; "
         "band: where all of them lie by chance. Middle and right: root mean square of the errors over the stated "
         "standard uncertainty, and over the Cramér-Rao bound, 1 for a filter that uses all that the path tells; band: "
-        "1 ± three standard deviations of such a ratio. Red: outside.",
+        "1 ± three standard deviations of such a ratio. Red: outside; right of the band on the left, and left of it "
+        "elsewhere, that is harmless, for uncertainties are then rather too large.",
         drawn,
     )

@@ -22,6 +22,7 @@ from inercal.report.style import (
     envelope,
     figure,
     plain_unit,
+    power_of_ten,
     svg,
 )
 
@@ -242,7 +243,7 @@ def _symlog(axes: Axes, linear: float) -> None:
     powers = linear * 10.0 ** np.arange(0, int(np.log10(far / linear)) + 1)
     every = powers[:: max(1, -(-len(powers) // 4))]
     ticks = [*(-every[::-1]), 0.0, *every]
-    axes.set_yticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks])
+    axes.set_yticks(ticks, list(map(power_of_ten, ticks)))
     axes.set_yticks([], minor=True)
     axes.set_ylim(
         max(low, -far) * 1.3 if low < 0.0 else -linear, min(high, far) * 1.3 if high > 0.0 else linear

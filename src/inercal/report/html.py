@@ -16,6 +16,9 @@ from inercal.estimate.table import Table
 from inercal.instruments.terms import TERMS
 from inercal.report.style import plain_unit
 
+_INFINITE = 1e6
+"""Degrees of freedom from which they are shown as infinite: k is that of the normal distribution to six digits."""
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -78,6 +81,8 @@ _UNITS = {
     "_deg": "°",
     "_arcsec": "arcsec",
     "_hz": "Hz",
+    "_percent": "%",
+    "_us": "µs",
     "_s": "s",
 }
 
@@ -193,7 +198,7 @@ def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _Row:
     value, u, U = rounded(p.value, p.u, p.U)
     term, order = _term(p.name)
     name = TERMS[term].name + order if term in TERMS else ""
-    dof = "∞" if math.isinf(p.dof) else f"{p.dof:.{0 if p.dof >= 100 else 1}f}"
+    dof = "∞" if p.dof >= _INFINITE else f"{p.dof:.{0 if p.dof >= 100 else 1}f}"
     return _Row(p, name, value, u, U, dof, tuple(item.share.get(p.name) for item in budget))
 
 
@@ -227,8 +232,11 @@ def _leaves(value: Any, keys: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str,
         for key, item in value.items():
             yield from _leaves(item, (*keys, key))
     elif value not in (None, "", []):
-        interval = "ranges" in keys and isinstance(value, list) and len(value) == 2
-        yield keys, " to ".join(map(_text, value)) if interval else _text(value)
+        recorded = "ranges" in keys
+        if recorded and isinstance(value, list) and len(value) == 2:
+            yield keys, " to ".join(_column(value))
+        else:
+            yield keys, f"{value:.6g}" if recorded and isinstance(value, float) else _text(value)
 
 
 def _text(value: Any) -> str:
@@ -278,7 +286,7 @@ def _column(values: Sequence[Any]) -> list[str]:
     if len(numbers) < len(values) or not 1e-6 < largest < 1e9:
         return [_short(value) for value in values]
     places = max(0, 3 - math.floor(math.log10(largest)))
-    return [f"{x:.{places}f}" for x in numbers]
+    return [f"{round(x, places) + 0.0:.{places}f}" for x in numbers]
 
 
 def _short(value: Any) -> str:

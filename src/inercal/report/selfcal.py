@@ -10,12 +10,21 @@ from numpy.typing import NDArray
 from inercal.estimate.result import rounded
 from inercal.report.histories import Line, panels_of_lines
 from inercal.report.html import Picture
-from inercal.report.style import ALARM, COLOURS, QUIET, WIDTH, few_powers, figure, plain_unit, svg
+from inercal.report.style import (
+    ALARM,
+    COLOURS,
+    QUIET,
+    WIDTH,
+    few_powers,
+    figure,
+    plain_unit,
+    power_of_ten,
+    svg,
+)
 
 Array = NDArray[np.float64]
 
 _MARKS = "osD^vP"
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> Picture:
@@ -31,7 +40,7 @@ def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> P
         (float(np.nanmax(np.abs(e), initial=0.0, where=np.isfinite(e))) for e in errors.values()), default=0.0
     )
     power = 3 * int(np.floor(np.log10(largest) / 3.0)) if 0.0 < largest < 1e100 else 0
-    unit = f" [10{str(power).translate(_SUPERSCRIPTS)}]" if power else ""
+    unit = f" [{power_of_ten(10.0**power)}]" if power else ""
     panels = {
         f"q{k}{unit}": [Line(label, e[:, k] / 10.0**power) for label, e in errors.items()] for k in range(4)
     }
@@ -146,7 +155,7 @@ def filters_apart(names: Sequence[str], apart: Mapping[str, Array], first: str) 
         powers = 10.0 ** np.arange(-2, int(np.ceil(np.log10(top))) + 1)
         powers = powers[:: max(1, -(-len(powers) // 5))]
         ticks = [*(-powers[::-1]), 0.0, *powers]
-        axes.set_xticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks], minor=False)
+        axes.set_xticks(ticks, list(map(power_of_ten, ticks)), minor=False)
         axes.set_xticks([], minor=True)
         axes.set_xlim(-1.5 * top, 1.5 * top)
         axes.set_ylim(len(names) - 0.4, -0.6)

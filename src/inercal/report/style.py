@@ -66,6 +66,7 @@ _STYLE: Any = {
 }
 
 _LOCK = threading.RLock()
+_HELD: list[bool] = []  # not empty while this thread, which has the lock, has our settings on
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -74,10 +75,18 @@ def _style() -> Iterator[None]:
     """Matplotlib's settings for the time being ours, in one thread at a time."""
     import matplotlib
 
-    with _LOCK, matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_STYLE)
-        yield
+    with _LOCK:
+        if _HELD:  # setting them takes longer than drawing a small figure
+            yield
+            return
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(_STYLE)
+            _HELD.append(True)
+            try:
+                yield
+            finally:
+                _HELD.clear()
 
 
 @contextmanager
@@ -124,15 +133,19 @@ def envelope(t: Array, values: Array, pieces: int = 800) -> tuple[Array, Array]:
     return np.repeat(middle, 2), np.column_stack([low, high]).ravel()
 
 
+def power_of_ten(value: float) -> str:
+    """Zero or a power of ten with its sign, as logarithmic axes show it: ``1``, ``100``, ``10⁶``, ``−10⁻²``."""
+    if value == 0.0:
+        return "0"
+    sign, power = "−" if value < 0.0 else "", round(np.log10(abs(value)))
+    return sign + (f"{abs(value):g}" if 0 <= power <= 3 else f"10{str(power).translate(_SUPERSCRIPTS)}")
+
+
 def powers_of_ten(axis: Axis) -> None:
     """Label a logarithmic axis with plain powers of ten."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    def text(value: float, _: int | None) -> str:
-        power = round(np.log10(value))
-        return f"{value:g}" if 0 <= power <= 3 else f"10{str(power).translate(_SUPERSCRIPTS)}"
-
-    axis.set_major_formatter(FuncFormatter(text))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     axis.set_minor_formatter(NullFormatter())
 
 

@@ -14,6 +14,7 @@ Cramer-Rao bound along the path found (Triggs et al. 2000, "Bundle adjustment - 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from inercal._jit import kernel
 from inercal.geometry.rotations import boxminus, boxplus, conjugate, exp, multiply, normalize, to_matrix
 from inercal.selfcal.filtered import Filtered, History, Problem, Start
+from inercal.selfcal.gaps import broken
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.residuals import (
     Readings,
@@ -81,13 +83,13 @@ def estimate_map(
     followed(first.attitude, np.empty((0, 3)))
     inverse_diagonal(np.ones((2, 2), order="F"), np.empty(2))
     began = time.perf_counter()
-    measured = readings(recording, problem)
+    measured, loose = readings(recording, problem), broken(recording, problem, start)
     q, c = _first_guess(recording, problem, measured, start)
     p = len(c)
     message = f"the iteration did not end in {ITERATIONS} steps, so far is the recording from the model"
     covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
     for _ in range(ITERATIONS):
-        terms = _terms(q, c, recording, problem, measured, first)
+        terms = _terms(q, c, recording, problem, measured, first, loose)
         try:
             step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
@@ -113,6 +115,7 @@ def estimate_map(
         converged=not message,
         message=message,
         gimbal_cosine=least_cosine(recording),
+        restarts=tuple(k + 1 for k in loose),
     )
 
 
@@ -153,9 +156,15 @@ class _Terms(NamedTuple):
 
 
 def _terms(
-    q: Array, c: Array, recording: Recording, problem: Problem, measured: Readings, start: Start
+    q: Array,
+    c: Array,
+    recording: Recording,
+    problem: Problem,
+    measured: Readings,
+    start: Start,
+    loose: Sequence[int] = (),
 ) -> _Terms:
-    """All terms at attitudes (n, 4) and coefficients (p,)."""
+    """All terms at attitudes (n, 4) and coefficients (p,); of the ``loose`` steps nothing is known."""
     world, prior, dt = problem.world, problem.prior, recording.dt
     found = sensed(q[1:], c, measured, world)
     base = on_base(c, world)
@@ -168,6 +177,7 @@ def _terms(
         slope[:, :, -3:] += np.swapaxes(to_matrix(propagated), 1, 2) @ by_earth
     residual = boxminus(q[1:], propagated)
     weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(dt))
+    weight[list(loose)] = 1.0 / np.pi
     left = inverse_left_jacobian(residual) * weight[:, None, None]
     miss = boxminus(start.attitude, q[0])
     return _Terms(

@@ -10,7 +10,7 @@ prior. Split by where errors come from, the same recursion says how much each so
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from inercal._jit import kernel
 from inercal.selfcal.coefficients import names, product_slope, to_linear
 from inercal.selfcal.filtered import Problem
+from inercal.selfcal.gaps import anew
 from inercal.selfcal.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.kinematics import Axes, attitude
 from inercal.selfcal.linearised import Indices, accelerometer_row, encoder_roots, propagate_covariance
@@ -112,6 +113,7 @@ def recorded_bounds(
     coefficients: Array,
     history: bool = False,
     contributions: bool = False,
+    restarts: Sequence[int] = (),
 ) -> Bounds:
     """Bounds along a path as it was estimated, with the measurements that a recording has.
 
@@ -125,10 +127,12 @@ def recorded_bounds(
         Estimated, linear form.
     history, contributions : bool
         Whether to return these.
+    restarts : sequence of int
+        Rows at which the attitude was taken anew from the encoders.
     """
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     path = recording.th, recording.dt, recording.rate
-    return _along(attitudes, *path, seen, coefficients, problem, history, contributions)
+    return _along(attitudes, *path, seen, coefficients, problem, history, contributions, restarts)
 
 
 def _along(
@@ -141,6 +145,7 @@ def _along(
     problem: Problem,
     history: bool,
     contributions: bool,
+    restarts: Sequence[int] = (),
 ) -> Bounds:
     """Bounds along attitudes (n, 4) with coefficients (p,), linear form."""
     p, world, noise = len(c), problem.world, problem.noise
@@ -153,7 +158,17 @@ def _along(
         P[3], P[4] = np.diag(start[0]), np.diag(start[1])
     sigmas = noise.levels
     gate = gate_of(problem.filter.gating)
-    riccati(P, q, th, dt, rate, seen, c, world.earth, world.up, world.axes, world.signs, sigmas, gate, u)
+    told = c, world.earth, world.up, world.axes, world.signs, sigmas, gate
+    first, angles = 0, np.arange(3)
+    for last in (*restarts, len(q)):
+        rows, steps = slice(first, last), slice(first, max(last - 1, 0))
+        riccati(P, q[rows], th[rows], dt[steps], rate[steps], seen[rows], *told, u[rows])
+        if last < len(q):
+            P[:, :3], P[:, :, :3] = 0.0, 0.0
+            P[:, angles, angles] = [
+                [anew(problem, th[last]).sigma ** 2 if s in (0, 3) else 0.0] for s in range(len(P))
+            ]
+        first = last
     slope = product_slope(c)
     whole, *parts = (slope @ each[3:, 3:] @ slope.T for each in P)
     split = dict(zip(SOURCES, parts, strict=True)) if contributions else {}

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from inercal.errors import InputError
 from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
+from inercal.selfcal.base_search import stated_well
 from inercal.selfcal.bounds import bounds
 from inercal.selfcal.coefficients import names, product_slope, to_product
 from inercal.selfcal.filtered import Filtered, Problem, problem
@@ -83,6 +84,21 @@ class Campaign:
         return bool(self.runs == self.attempted and held and fitting)
 
     @property
+    def verdict(self) -> str:
+        """`passed` in words."""
+        return f"the stated uncertainties {'hold' if self.passed else 'are too small'}"
+
+    @property
+    def harmless(self) -> str:
+        """What is outside its limits on the side where uncertainties are rather too large, in words; or nothing."""
+        coverage, nees = self.coverage, self.nees
+        high = np.append(coverage.fraction > coverage.limits[1], coverage.pooled > coverage.pooled_limits[1])
+        found = [name for name, out in zip((*self.names, "all together"), high, strict=True) if out]
+        found += ["NEES"] if nees.mean < nees.limits[0] else []
+        text = "outside, but harmless, as their uncertainties are rather too large"
+        return f"{text}: {', '.join(found)}" if found else ""
+
+    @property
     def result(self) -> dict[str, Any]:
         """The figures as plain objects."""
         coverage, nees = self.coverage, self.nees
@@ -140,6 +156,7 @@ class Campaign:
                 f"NIS {self.nis.mean():.4f}, expected {low:.4f} to {high:.4f}",
                 "rms error over the bound:",
                 ratio,
+                *filter(None, [self.harmless]),
             ]
         )
 
@@ -169,10 +186,11 @@ def campaign(
     Raises
     ------
     StudyError
-        The study has no plan or no truth.
+        The study has no plan or no truth, or a base that would have to be found first.
     InputError
         Fewer than two runs converged.
     """
+    stated_well(settings, "a campaign")
     of_study, made = problem(settings), experiment(settings)
     kind = of_study.filter.kind if kind is None else kind
     load_kernels(kind, of_study)

@@ -16,14 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.consistency import nis, surprising, whiteness
+from inercal.estimate.result import rounded
 from inercal.geometry.earth import EARTH_RATE
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
+from inercal.selfcal.coefficients import names, units
 from inercal.selfcal.display import shown_unit
 from inercal.selfcal.faults import RISK, Proposal, proposals
 from inercal.selfcal.filtered import Filtered, Problem
+from inercal.selfcal.observability import UNOBSERVABLE
 from inercal.selfcal.recording import Recording
-from inercal.selfcal.unmodelled import Case, Found, directions, filtered, regular, search
+from inercal.selfcal.unmodelled import Case, Cause, Found, directions, filtered, likely, regular, search
 
 Array = NDArray[np.float64]
 
@@ -41,7 +44,9 @@ SAID = ("unit_suspect", "channel_swap", "sign_suspect")
 _FAULTS = 4
 
 
-def diagnose(recording: Recording, problem: Problem, found: Filtered) -> list[Finding]:
+def diagnose(
+    recording: Recording, problem: Problem, found: Filtered, stated: Cause | None = None
+) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
     Parameters
@@ -50,13 +55,18 @@ def diagnose(recording: Recording, problem: Problem, found: Filtered) -> list[Fi
     problem : Problem
     found : Filtered
         What the estimator of the study made of it; the error-state filter judges the recording itself.
+    stated : Cause, optional
+        What the study states with an uncertainty: no error within that is named.
     """
     if any(finding.code in SAID for finding in recording.findings):
         return []
-    repaired, findings = _without_faults(recording, problem)
-    if not findings or not _sound(filtered((repaired, problem))):
-        findings += _small_errors((repaired, problem))
-    if not findings and not _sound(found):
+    repaired, findings = _without_faults(recording, problem, stated)
+    if not findings or not _sound(filtered((repaired, _fair(repaired, problem, stated)))):
+        findings += _small_errors((repaired, problem), stated)
+    if findings or _sound(found):
+        return findings
+    # where what is stated is wrong within its uncertainty all estimators have large innovations
+    if not found.converged or _sound(filtered((recording, problem))):
         text = (
             f"the error-state filter finds no contradiction in this recording: the {found.kind} fails on it"
         )
@@ -64,17 +74,52 @@ def diagnose(recording: Recording, problem: Problem, found: Filtered) -> list[Fi
     return findings
 
 
-def _small_errors(case: Case) -> list[Finding]:
-    """What the model leaves out, and noise that is not what is stated."""
-    errors, corrected = search(*case)
+def _fair(recording: Recording, problem: Problem, stated: Cause | None) -> Problem:
+    """The problem as it may be meant: what is stated moved within its uncertainty, and no prior that is in the way."""
+    moved = likely(recording, problem, stated)
+    found = filtered((recording, moved))
+    if not found.converged:
+        return problem
+    u, prior = np.sqrt(np.diag(found.covariance)), problem.prior
+    # values are distributed about 0 with this variance where the prior holds
+    spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
+    far = (u < UNOBSERVABLE * prior) & ~(np.abs(found.coefficients) < _most(len(prior)) * spread)
+    return replace(moved, prior=np.where(far, 10.0 * np.maximum(np.abs(found.coefficients), prior), prior))
+
+
+def _most(alternatives: int) -> float:
+    """Standard deviations that a normal variable keeps to, at `RISK` over some of them (Bonferroni)."""
+    from scipy.special import ndtri
+
+    return -float(ndtri(0.5 * RISK / alternatives))
+
+
+def _small_errors(case: Case, stated: Cause | None) -> list[Finding]:
+    """What the model leaves out, a prior that is too narrow, and noise that is not what is stated."""
+    recording, problem = case
+    fair = (recording, _fair(*case, stated))
+    errors, corrected = search(recording, replace(problem, prior=fair[1].prior), stated)
     now = filtered(corrected)
     # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
-    if errors and not _white(corrected, now) and (walk := _restless(case)) is not None:
+    if errors and not _white(corrected, now) and (walk := _restless(fair)) is not None:
         return [walk]
     rest = _scatter(corrected, now)
     if errors and any(finding.code == "contradiction" for finding in rest):
-        return _scatter(case, filtered(case))  # errors that leave a contradiction are none
-    return [*(_in_words(each, corrected) for each in errors), *rest]
+        return _scatter(fair, filtered(fair))  # errors that leave a contradiction are none
+    return [*(_in_words(each, corrected) for each in errors), *_beyond_prior(now, problem.prior), *rest]
+
+
+def _beyond_prior(found: Filtered, prior: Array) -> list[Finding]:
+    """Coefficients, found without a prior in the way, that the prior [SI] did not expect."""
+    values, variance = found.coefficients, np.diag(found.covariance)
+    findings = []
+    far = ~(np.abs(values) <= _most(len(prior)) * np.sqrt(prior**2 + variance))
+    for i in np.flatnonzero(far):
+        unit, size = shown_unit(units(len(prior))[i])
+        value, u = rounded(values[i] / size, math.sqrt(variance[i]) / size)
+        text = f"{names(len(prior))[i]}: the recording says {value} +- {u} {unit}, its prior is {prior[i] / size:.3g}"
+        findings.append(Finding("prior_suspect", f"{text} {unit}: state a wider one"))
+    return findings
 
 
 def _white(case: Case, found: Filtered) -> bool:
@@ -90,22 +135,30 @@ def _sound(found: Filtered) -> bool:
     return mean.excess <= 5.0 and not len(surprising(found.nis, found.dims, RISK))
 
 
-def _without_faults(recording: Recording, problem: Problem) -> tuple[Recording, list[Finding]]:
+def _without_faults(
+    recording: Recording, problem: Problem, stated: Cause | None
+) -> tuple[Recording, list[Finding]]:
     """The recording without its gross faults, and these."""
     findings = list[Finding]()
-    now = filtered((recording, problem))
+    of = likely(recording, problem, stated)
+    now = filtered((recording, of))
     while len(findings) < _FAULTS and not _sound(now):
-        best, then = _best(proposals(recording, problem), now, problem)
+        best, then = _best(proposals(recording, of), now, of)
         if not _sound(then) and not _misfit(then) < 0.1 * _misfit(now):
-            single, after = _best(_outliers(recording, problem, now), now, problem)
+            fair = _fair(recording, problem, stated)
+            if _sound(filtered((recording, fair))):
+                break
+            single, after = _best(_outliers(recording, of, now), now, of)
             if single is not None and _sound(after):
                 best, then = single, after
-            elif _sound(filtered(search(recording, problem)[1])):
+            elif _sound(filtered(search(recording, replace(problem, prior=fair.prior), stated)[1])):
                 break
         # what explains less than half is not what happened
         if best is None or not _misfit(then) < 0.5 * _misfit(now):
             break
-        recording, now = best.recording, then
+        recording = best.recording
+        of = likely(recording, problem, stated)
+        now = filtered((recording, of))
         findings.append(best.finding)
     return recording, findings
 
@@ -131,7 +184,7 @@ def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Pro
     follows."""
     rows = np.zeros(0, dtype=np.int64)
     left_out = 0
-    names = set[str]()
+    channels = set[str]()
     acc, th = recording.acc.copy(), recording.th.copy()
     while now.converged and len(off := surprising(now.nis, now.dims, RISK)):
         row = int(off[0])
@@ -140,17 +193,19 @@ def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Pro
             return []
         if wrong[3:].any():
             th[row + 1] = np.nan
-            names.add("th")
+            channels.add("th")
         else:
             acc[row + 1, wrong[:3]] = np.nan
-            names |= {f"acc_{axis}" for axis, each in zip("xyz", wrong[:3], strict=True) if each}
+            channels |= {f"acc_{axis}" for axis, each in zip("xyz", wrong[:3], strict=True) if each}
         rows = np.append(rows, row)
         left_out += 3 if wrong[3:].any() else int(wrong[:3].sum())
         now = filtered((replace(recording, acc=acc.copy(), th=th.copy()), problem))
     rows = np.unique(rows)
     if not len(rows) or (len(rows) > 3 and np.ptp(rows) < 2 * len(rows)):
         return []  # a change, not single readings
-    text = f"{counted(len(rows), 'reading')} far from what the filter expects, of {', '.join(sorted(names))}"
+    text = (
+        f"{counted(len(rows), 'reading')} far from what the filter expects, of {', '.join(sorted(channels))}"
+    )
     cost = left_out + 2.0 * len(rows) * math.log(2.0 * len(recording.t) / RISK)
     finding = Finding("outlier", text, places("row", rows + 2))
     return [Proposal(finding, replace(recording, acc=acc, th=th), cost)]
@@ -253,15 +308,38 @@ def _even(columns: Array, mean: float) -> bool:
 
 def _restless(case: Case) -> Finding | None:
     """Gyro noise other than stated, where that explains the innovations."""
-    recording, problem = case
-    for octaves in (*np.arange(0.5, 10.1, 0.5), -0.5, -1.0, -1.5, -2.0, -3.0):
-        factor = 2.0**octaves
-        noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
-        tried = (recording, replace(problem, noise=noise))
-        if _white(tried, filtered(tried)):
-            text = f"the gyros' angle random walk looks about {factor:.2g} times what is stated"
-            return Finding("excess_scatter" if factor > 1.0 else "low_scatter", text)
+    for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
+        fitting = list[float]()
+        for factor in 2.0**octaves:
+            if _explained_by_walk(case, factor):
+                fitting.append(float(factor))
+            elif fitting:
+                break
+        if fitting:
+            about = _short(math.sqrt(fitting[0] * fitting[-1]))
+            text = f"the gyros' angle random walk looks about {about} times what is stated"
+            code, span = (
+                "excess_scatter" if octaves[0] > 0.0 else "low_scatter",
+                sorted((fitting[0], fitting[-1])),
+            )
+            more = f" ({_short(span[0])} to {_short(span[1])})" if len(fitting) > 1 else ""
+            return Finding(code, text + more)
     return None
+
+
+def _short(factor: float) -> str:
+    """A number to two digits, without an exponent."""
+    return f"{float(f'{factor:.2g}'):g}"
+
+
+def _explained_by_walk(case: Case, factor: float) -> bool:
+    """Whether a walk of the gyros, larger by a factor, leaves innovations white."""
+    recording, problem = case
+    noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
+    tried = (recording, replace(problem, noise=noise))
+    now = filtered(tried)
+    # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
+    return _white(tried, now) and float(np.nanmean(np.square(now.innovations[:, 3:]))) > 0.5
 
 
 def _unexplained(z: Array) -> Finding:
@@ -271,7 +349,21 @@ def _unexplained(z: Array) -> Finding:
     size = [float(np.nanmean(squares[part])) if np.isfinite(squares[part]).any() else 0.0 for part in parts]
     worst = parts[int(np.argmax(size))]
     text = (
-        f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1, or correlated in time), "
-        "and no fault that is looked for explains them"
+        f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1{_correlated(z)})"
     )
-    return Finding("contradiction", text, places("row", worst + 2))
+    return Finding(
+        "contradiction", f"{text}, and no fault that is looked for explains them", places("row", worst + 2)
+    )
+
+
+def _correlated(z: Array) -> str:
+    """Correlation from one row to the next of the sensors that have it, in words."""
+    words = ""
+    for sensor, columns in zip(SENSORS, (z[:, :3], z[:, 3:]), strict=True):
+        products = columns[1:] * columns[:-1]
+        count = int(np.isfinite(products).sum())
+        if count and abs(
+            share := float(np.nanmean(products) / np.nanmean(np.square(columns)))
+        ) > 5.0 / math.sqrt(count):
+            words += f"; {sensor}: correlated from row to row, by {share:.2g}"
+    return words or ", or correlated in time"

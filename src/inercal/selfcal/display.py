@@ -20,6 +20,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: key of the statistics -> in words
+_STATISTICS = {
+    "residual_rms": "root-mean-square normalised innovation, expected 1",
+    "chi2": "normalised innovations squared, summed",
+    "nis_mean": "normalised innovation squared of a row (NIS), mean",
+    "nis_expected": "NIS, expected",
+    "nis_limit": "NIS, largest mean of a recording that fits the model",
+    "steps": "steps from row to row",
+}
+
 FILTERS: Final[Mapping[str, str]] = {
     "error-state": "error-state filter",
     "mukf": "multiplicative sigma-point filter",
@@ -52,7 +62,8 @@ def of_field(p: int) -> tuple[tuple[str, ...], Array]:
 
 
 def displayed(estimate: Estimate) -> Estimate:
-    """The estimate with coefficients and budget in units of the field, and angles of the conditions in degrees.
+    """The estimate with coefficients and budget in units of the field, angles of the conditions in degrees, and keys
+    of the statistics in words.
 
     What has unit 1 in the budget, and all of ``result``, stays as it is.
     """
@@ -65,12 +76,22 @@ def displayed(estimate: Estimate) -> Estimate:
         covariance=estimate.covariance / np.outer(size, size),
         common=None if estimate.common is None else estimate.common / np.outer(size, size),
         conditions=_in_degrees(estimate.conditions),
+        statistics=_in_words(estimate),
         budget=tuple(
             replace(item, u=item.u / size, unit=unit)
             for item in estimate.budget
             for unit, size in [(item.unit, 1.0) if item.unit == "1" else shown_unit(item.unit)]
         ),
     )
+
+
+def _in_words(estimate: Estimate) -> dict[str, float]:
+    """Statistics under keys for people, and what a row cost."""
+    told = {_STATISTICS.get(key, key): value for key, value in estimate.statistics.items()}
+    if "step_us" in estimate.result:
+        told["time of a row_us"] = estimate.result["step_us"]
+        told["time of a row, of the sample interval_percent"] = 100.0 * estimate.result["sample_share"]
+    return told
 
 
 def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:

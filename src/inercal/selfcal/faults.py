@@ -99,6 +99,8 @@ def proposals(recording: Recording, problem: Problem) -> Iterator[Proposal]:
     turn = turning(recording, problem)
     yield from _accelerometer_axes(recording, turn)
     yield from _shifts(recording, turn)
+    yield from _late_accelerometers(recording, turn)
+    yield from _frozen(recording)
     yield from _stuck(recording, turn)
     yield from _missing_rows(recording, turn)
 
@@ -167,6 +169,59 @@ def _shifted(recording: Recording, shift: int, first: int, cost: float) -> Propo
     text = f"commands are logged {counted(abs(shift), 'row')} {how} than the platform acts on them"
     where = places("row", np.arange(first, last + 1) + 1) if first else ""
     return Proposal(Finding("command_shift", text, where), replace(recording, rate=rate), cost)
+
+
+def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Proposal]:
+    """Accelerometers logged some rows late or early: the shift nearest to what the encoders say."""
+    moved = {shift: _by_rows(recording.acc, shift) for shift in SHIFTS}
+
+    def off(shift: int) -> float:
+        return (
+            float(np.nanmean(np.square(moved[shift] - turn.up)))
+            if np.isfinite(moved[shift]).any()
+            else math.inf
+        )
+
+    shift = min(SHIFTS, key=off)
+    how = "late" if shift > 0 else "early"
+    text = f"accelerometers are logged {counted(abs(shift), 'row')} {how}, against angles and commands"
+    left_out = int(np.isfinite(recording.acc).sum() - np.isfinite(moved[shift]).sum())
+    cost = _cost(len(SHIFTS), left_out)
+    yield Proposal(Finding("command_shift", text), replace(recording, acc=moved[shift]), cost)
+
+
+def _by_rows(values: Array, shift: int) -> Array:
+    """Each row (n, m) replaced by that ``shift`` rows further down, NaN where there is none."""
+    out = np.full_like(values, np.nan)
+    if shift > 0:
+        out[:-shift] = values[shift:]
+    else:
+        out[-shift:] = values[:shift]
+    return out
+
+
+def _frozen(recording: Recording) -> Iterator[Proposal]:
+    """Readings that repeat, of all sensors, the accelerometers, or one of them: the longest run, as a coarse one has
+    many."""
+    n = len(recording.acc)
+    read = np.hstack([recording.acc, recording.th])
+    same = np.diff(read, axis=0) == 0.0
+    for columns in ([0, 1, 2, 3, 4, 5], [0, 1, 2], [0], [1], [2]):
+        runs = _runs(same[:, columns].all(axis=1))
+        start, end = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
+        if end > start:
+            rows = np.arange(start + 1, end + 1)
+            known = read.copy()
+            known[rows[:, None], columns] = np.nan
+            which = (
+                "accelerometers and angles"
+                if len(columns) == 6
+                else ", ".join(f"acc_{'xyz'[i]}" for i in columns)
+            )
+            text = f"{which} repeat{'' if len(columns) > 1 else 's'} one reading in {counted(len(rows) + 1, 'row')}"
+            cost = _cost(2.5 * n * n, len(rows) * len(columns))
+            without = replace(recording, acc=known[:, :3], th=known[:, 3:])
+            yield Proposal(Finding("dead_channel", text, places("row", rows + 1)), without, cost)
 
 
 def _stuck(recording: Recording, turn: Turning) -> Iterator[Proposal]:

@@ -190,10 +190,13 @@ def design_page(designed: Designed, settings: SelfcalSettings) -> str:
         dots(
             "Bounds by path",
             "Standard uncertainty of each coefficient at the end of each path, the best that any filter can reach with "
-            "the stated noise and prior; further left is better.",
+            f"the stated noise and prior; further left is better.{' Bar: the goal.' if settings.goal else ''}",
             bounds.names,
             units,
             {each.name: each.seen.bounds.u / size for each in designed.compare},
+            np.array([settings.goal.get(name, np.nan) for name in bounds.names]) / size
+            if settings.goal
+            else None,
         ),
     ]
     return page(
@@ -244,8 +247,17 @@ def campaign_page(campaign: Campaign, settings: SelfcalSettings) -> str:
     return page(
         "selfcal.html",
         title="Self-calibration simulated many times",
-        message=f"{campaign.attempted} runs of the {FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind}), "
-        f"{campaign.runs} of them converged",
+        message="; ".join(
+            filter(
+                None,
+                [
+                    f"{campaign.attempted} runs of the {FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind}), "
+                    f"{campaign.runs} of them converged",
+                    campaign.verdict,
+                    campaign.harmless,
+                ],
+            )
+        ),
         facts=_facts(settings),
         findings=None,
         tables=[campaign_table(campaign)],

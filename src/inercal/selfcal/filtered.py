@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.geometry.rotations import multiply
+from inercal.selfcal.kinematics import attitude
 from inercal.selfcal.rig import World
 from inercal.selfcal.settings import Filter, Noise, SelfcalSettings
 
@@ -59,6 +61,7 @@ class Trace(NamedTuple):
     """What a recursive filter says of m rows: as in `History` and `Filtered`, a row for each step.
 
     ``nis`` and ``dims`` are there always; the arrays before them have no rows where no history was asked for.
+    ``restarts`` are the steps after which the attitude was taken anew (`inercal.selfcal.gaps`).
     """
 
     attitude: Array
@@ -71,6 +74,7 @@ class Trace(NamedTuple):
     lowest_eigenvalue: float
     fallbacks: int
     gimbal_cosine: float
+    restarts: tuple[int, ...] = ()
 
 
 def empty_trace(m: int, p: int, history: bool) -> Trace:
@@ -105,6 +109,29 @@ class History:
     u: Array
 
 
+def known_in(state: State, problem: Problem) -> History:
+    """What a state knows, as the one row of a history."""
+    u = np.sqrt(np.diag(state.covariance))
+    q = attitude_of(state, problem)
+    of_attitude = u[:3]
+    if len(u) - len(problem.prior) == 4:  # of a quaternion: 2 |q (0, e_i)| along each axis
+        across = multiply(q, np.eye(4)[1:])
+        of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
+    return History(
+        q[None],
+        of_attitude[None],
+        state.coefficients[None].copy(),
+        u[-len(problem.prior) :][None],
+    )
+
+
+def attitude_of(state: State, problem: Problem) -> Array:
+    """q_bp of a state."""
+    if len(state.attitude) == 4:
+        return state.attitude.copy()
+    return np.array(attitude(state.attitude, problem.world.axes, problem.world.signs))
+
+
 @dataclass(frozen=True, eq=False)
 class Filtered:
     """What an estimator found.
@@ -135,6 +162,9 @@ class Filtered:
         Steps at which Cholesky's factor failed and the eigen factor was taken.
     gimbal_cosine : float
         Least |cos thy| on the path.
+    restarts : tuple of int
+        Rows at which the attitude was taken anew from the encoders, as these contradict a turn that was held
+        (`inercal.selfcal.gaps`).
     state : State or None
         Of a recursive filter, at the end, with the joint covariance of attitude and coefficients.
     """
@@ -153,6 +183,7 @@ class Filtered:
     lowest_eigenvalue: float = float("nan")
     fallbacks: int = 0
     gimbal_cosine: float = 1.0
+    restarts: tuple[int, ...] = ()
     state: State | None = None
 
     @property

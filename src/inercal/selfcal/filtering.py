@@ -10,9 +10,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.geometry.rotations import multiply
-from inercal.selfcal.filtered import Filtered, History, Problem, Start, State, Trace
-from inercal.selfcal.kinematics import attitude
+from inercal.selfcal.filtered import Filtered, History, Problem, Start, State, Trace, attitude_of, known_in
+from inercal.selfcal.gaps import advance
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.settings import FilterKind
 
@@ -78,16 +77,15 @@ def estimate(
     began = time.perf_counter()
     state: State = module.initial(problem, recording.th[0], start)
     first = known_in(state, problem)
-    state, trace = module.advance(
-        state, problem, recording.dt, recording.rate, recording.acc[1:], recording.th[1:], history
-    )
+    rows = recording.dt, recording.rate, recording.acc[1:], recording.th[1:]
+    state, trace = advance(module, state, problem, *rows, recording.held, history)
     seconds = time.perf_counter() - began
     size = len(problem.prior)
     found = Filtered(
         kind=kind,
         coefficients=state.coefficients,
         covariance=state.covariance[-size:, -size:],
-        attitude=_attitude_of(state, problem),
+        attitude=attitude_of(state, problem),
         nis=trace.nis,
         dims=trace.dims,
         innovations=trace.innovations,
@@ -96,6 +94,7 @@ def estimate(
         lowest_eigenvalue=trace.lowest_eigenvalue,
         fallbacks=trace.fallbacks,
         gimbal_cosine=trace.gimbal_cosine,
+        restarts=tuple(k + 1 for k in trace.restarts),
         state=state,
     )
     message = _fault(found)
@@ -108,29 +107,6 @@ def load_kernels(kind: FilterKind, problem: Problem) -> None:
     if module is not None:
         none = np.empty((0, 3))
         module.advance(module.initial(problem, np.zeros(3)), problem, np.empty(0), none, none, none)
-
-
-def known_in(state: State, problem: Problem) -> History:
-    """What a state knows, as the one row of a history."""
-    u = np.sqrt(np.diag(state.covariance))
-    q = _attitude_of(state, problem)
-    of_attitude = u[:3]
-    if len(u) - len(problem.prior) == 4:  # of a quaternion: 2 |q (0, e_i)| along each axis
-        across = multiply(q, np.eye(4)[1:])
-        of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
-    return History(
-        q[None],
-        of_attitude[None],
-        state.coefficients[None].copy(),
-        u[-len(problem.prior) :][None],
-    )
-
-
-def _attitude_of(state: State, problem: Problem) -> Array:
-    """q_bp of a state."""
-    if len(state.attitude) == 4:
-        return state.attitude.copy()
-    return np.array(attitude(state.attitude, problem.world.axes, problem.world.signs))
 
 
 def _history(first: History, trace: Trace) -> History:

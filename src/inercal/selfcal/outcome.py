@@ -19,13 +19,16 @@ from inercal.records.places import counted
 from inercal.selfcal.bounds import Bounds
 from inercal.selfcal.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.display import shown_unit
-from inercal.selfcal.filtered import Filtered
+from inercal.selfcal.filtered import Filtered, problem
 from inercal.selfcal.filtering import LOCK
 from inercal.selfcal.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.rig import JOINTS
 from inercal.selfcal.settings import SelfcalSettings
 from inercal.selfcal.sources import stated, within
+from inercal.selfcal.stated import stated_errors
+from inercal.selfcal.unmodelled import filtered as judging
+from inercal.selfcal.unmodelled import likely
 
 Array = NDArray[np.float64]
 
@@ -67,6 +70,15 @@ _BY_KIND = {
     "svd-qukf": (_SIGMA_POINTS,),
     "gimbal-ukf": (_SIGMA_POINTS,),
 }
+
+_CAUSES = (
+    "unit_suspect", "channel_swap", "sign_suspect", "command_shift", "stuck_encoder", "dead_channel", "gap",
+    "unmodelled", "site_suspect", "prior_suspect", "excess_scatter", "filter_fails", "contradiction", "outlier",
+)  # fmt: skip
+"""Findings that explain innovations too large, those of a recording's reading the likeliest first."""
+
+#: findings of the diagnosis that leave the values good
+_HARMLESS = ("gap", "low_scatter")
 
 #: axis of p -> coefficients that only a turn about it shows well
 _BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
@@ -137,16 +149,22 @@ def assemble(
     result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
     result["goal"] = _goal(settings.goal, names(p), u)
     hints = _hardly_turned(recording, settings)
-    said += _left_at_prior(judged, hints) + _missed(result["goal"], units(p), hints)
-    said += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
-    said += _taken_as_exact(exact)
-    status, message = _verdict(judged, agreement, [*findings, *recording.findings], hints)
+    said += _left_at_prior(judged, hints)
+    limit = _limit(agreement, recording, settings)
+    status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
+    # of numbers that are not to be used, more would be noise
+    if status is not Status.INCONSISTENT:
+        said += _missed(result["goal"], units(p), hints)
+        said += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
+        said += _taken_as_exact(exact)
     lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNOBSERVABLE and name in NAMES}
     if status is Status.OK and lost:
         status, message = (
             Status.UNOBSERVABLE,
             f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better",
         )
+    if status is Status.OK:
+        message = _doubted(message, findings)
     return Estimate(
         command=COMMAND,
         names=names(p),
@@ -165,7 +183,7 @@ def assemble(
             "chi2": float(np.nansum(filtered.nis)),
             "nis_mean": agreement.mean,
             "nis_expected": agreement.expected,
-            "nis_limit": agreement.limit(),
+            "nis_limit": limit,
             "steps": float(filtered.steps),
         },
         budget=budget,
@@ -184,18 +202,50 @@ def verdict(
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
     known = Bounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
     agreement = nis(filtered.nis, filtered.dims)
-    return _verdict(seen(known, {}), agreement, findings, _hardly_turned(recording, settings))
+    cause = _cause(findings, recording.findings)
+    limit = _limit(agreement, recording, settings)
+    return _verdict(seen(known, {}), agreement, limit, cause, _hardly_turned(recording, settings))
+
+
+def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
+    """What explains innovations that are too large: the diagnosis, else the reading of the recording."""
+    by_rank = sorted(
+        (each for each in recorded if each.code in _CAUSES), key=lambda each: _CAUSES.index(each.code)
+    )
+    explaining = [*(each for each in diagnosed if each.code in _CAUSES), *by_rank]
+    return explaining[0].message if explaining else "check noise, commands, signs and units"
+
+
+def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> float:
+    """Largest mean NIS of a recording that does not contradict the model.
+
+    Beyond that of an exact study there is room for as much as disappears where what is stated of site and base is
+    moved, within its uncertainty, to where the recording fits best.
+    """
+    errors, of = stated_errors(settings), problem(settings)
+    if errors is None:
+        return agreement.limit()
+    moved = likely(recording, of, errors)
+    before, after = (float(np.nansum(judging((recording, each)).nis)) for each in (of, moved))
+    return agreement.limit() + max(0.0, before - after) / agreement.rows
+
+
+def _doubted(message: str, diagnosed: Sequence[Finding]) -> str:
+    """The sentence of a verdict that values can be used, with the findings for which they may be wrong all the same."""
+    codes = dict.fromkeys(each.code for each in diagnosed if each.code not in _HARMLESS)
+    if not codes:
+        return message
+    return f"{message}; but see {', '.join(codes)}: values may be off by more than their u"
 
 
 def _verdict(
-    judged: Seen, agreement: Nis, findings: Sequence[Finding], hints: Mapping[str, str]
+    judged: Seen, agreement: Nis, limit: float, cause: str, hints: Mapping[str, str]
 ) -> tuple[Status, str]:
     """Status and its sentence, of numbers that can be used."""
-    if agreement.mean > agreement.limit():
-        why = findings[0].message if findings else "check noise, commands, signs and units"
+    if agreement.mean > limit:
         return Status.INCONSISTENT, (
             f"the recording contradicts the model: mean NIS {agreement.mean:.4g}, expected {agreement.expected:.4g} "
-            f"and at most {agreement.limit():.4g}; {why}"
+            f"and at most {limit:.4g}; {cause}"
         )
     ratio = judged.learned.ratio[: len(NAMES)]
     unseen = [name for name, left in zip(NAMES, ratio, strict=True) if left > UNOBSERVABLE]

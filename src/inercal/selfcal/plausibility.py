@@ -53,13 +53,15 @@ class _Motion:
     """Motion in each of m steps between rows whose angles are known.
 
     ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
-    space, in p, that the rates tell of; ``stretch`` (m,) the stretch that each step belongs to.
+    space, in p, that the rates tell of; ``stretch`` (m,) the stretch that each step belongs to; ``told`` (m,) whether
+    all rates in it were recorded.
     """
 
     th: Array
     dt: Array
     rate: Array
     stretch: NDArray[np.int64]
+    told: NDArray[np.bool_]
 
     def turned(self, world: World) -> Array:
         """(s, 3) rad: turns of the stretches against inertial space, in p, that the angles tell of such a rig."""
@@ -68,8 +70,8 @@ class _Motion:
         return self.summed(log(multiply(conjugate(q[:-1]), q[1:])) + of_earth)
 
     def summed(self, steps: Array) -> Array:
-        """(s, 3) of each stretch."""
-        return np.stack([np.bincount(self.stretch, steps[:, k]) for k in range(3)], axis=-1)
+        """(s, 3) of each stretch, without steps whose rates are a guess."""
+        return np.stack([np.bincount(self.stretch, steps[:, k] * self.told) for k in range(3)], axis=-1)
 
 
 def implausible(recording: Recording, settings: SelfcalSettings, where: object) -> list[Finding]:
@@ -110,7 +112,10 @@ def _motion(recording: Recording, known: NDArray[np.int64]) -> _Motion:
     gained = np.vstack([np.zeros(3), np.cumsum(recording.rate * recording.dt[:, None], axis=0)])
     part = (t[known[:-1]] - t[known[0]]) / (t[known[-1]] - t[known[0]])
     _, numbered = np.unique((STRETCHES * part).astype(np.int64), return_inverse=True)
-    return _Motion(recording.th[known], np.diff(t[known]), np.diff(gained[known], axis=0), numbered)
+    held = np.zeros(len(t), dtype=np.int64)
+    held[np.array(recording.held, dtype=np.int64) + 1] = 1
+    told = np.diff(np.cumsum(held)[known]) == 0
+    return _Motion(recording.th[known], np.diff(t[known]), np.diff(gained[known], axis=0), numbered, told)
 
 
 def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
@@ -234,10 +239,13 @@ def _exchanged(sensor: str, found: Array, expected: Array, noise: float) -> list
     return [Finding(code, f"{sensor}: {words}, as the angles have it")]
 
 
-def off_the_path(recording: Recording, plan: Plan, began: float, rows: NDArray[np.int64]) -> list[Finding]:
+def off_the_path(
+    recording: Recording, plan: Plan, world: World, began: float, rows: NDArray[np.int64]
+) -> list[Finding]:
     """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s].
 
-    ``rows`` (n,) of the file, from 0.
+    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it: at gimbal lock they are not
+    unique.
     """
     t = recording.t - began
     findings = []
@@ -248,7 +256,9 @@ def off_the_path(recording: Recording, plan: Plan, began: float, rows: NDArray[n
     then = plan.step * np.arange(len(nominal))
     expected = np.stack([np.interp(t, then, nominal[:, k]) for k in range(3)], axis=-1)
     away = np.abs(np.remainder(recording.th - expected + math.pi, 2.0 * math.pi) - math.pi)
-    away = np.where(np.isfinite(away), away, 0.0)
+    there, planned = (gimbals(np.nan_to_num(th), world)[0] for th in (recording.th, expected))
+    turned = np.linalg.norm(log(multiply(conjugate(planned), there)), axis=1, keepdims=True)
+    away = np.where(np.isfinite(recording.th).all(axis=1, keepdims=True) & (turned > OFF_THE_PATH), away, 0.0)
     if away.max() > OFF_THE_PATH:
         first, joint = divmod(int(np.argmax(away > OFF_THE_PATH)), 3)
         text = (

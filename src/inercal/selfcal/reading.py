@@ -1,9 +1,9 @@
 """A record as a recording of a platform: SI, one clock that increases, continuous angles, a rate for every step.
 
-What is missing is dealt with in one way: a rate is held until the next one is known, as the platform does that is
-commanded. So it is in a gap between rows, and where a rate is no number. That is right within a turn or a rest; where
-the command changed meanwhile the attitude is wrong from there on, which the filters show as inconsistent innovations.
-Angles and accelerometers that are missing are left out of the updates.
+In a gap between rows, and where a rate is no number, the platform is taken to turn on over the base as before: a rate
+against inertial space, which follows the earth besides, would not stay the same. That is right within a turn or a
+rest. Where a turn began or ended meanwhile the encoders contradict it, and estimators take the attitude anew
+(`inercal.selfcal.gaps`). Angles and accelerometers that are missing are left out of the updates.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from inercal.errors import RecordError
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Column, Record
+from inercal.selfcal.gaps import with_held
 from inercal.selfcal.kinematics import TWO_PI
 from inercal.selfcal.plausibility import implausible, off_the_path
 from inercal.selfcal.recording import Recording
@@ -71,17 +72,19 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     rows, findings = _used_rows(time, th, rate, where)
     t, rate, th, acc = time[rows], rate[rows[:-1]], th[rows], acc[rows]
     _increasing(t, rows, where)
-    findings += _held(rate, rows, sensor)
+    findings += _lacking(rate, rows, sensor)
     findings += _gaps(t, record)
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
     said = (*worth_saying(record, columns), *findings)
-    recording = Recording(t, _hold(rate), th, acc, sensor == "gyro", said, record.sources)
+    gained = all(column.increment for column in columns[:3])
+    rate, held = with_held(t, rate, th, settings.world, gained)
+    recording = Recording(t, rate, th, acc, sensor == "gyro", said, record.sources, held)
     findings = implausible(recording, settings, where)
     if settings.plan is not None:
         began = float(time[np.argmax(np.isfinite(time))])
-        findings += off_the_path(recording, settings.plan, began, rows)
+        findings += off_the_path(recording, settings.plan, settings.world, began, rows)
     return replace(recording, findings=(*said, *findings))
 
 
@@ -141,7 +144,7 @@ def _used_rows(t: Array, th: Array, rate: Array, where: str) -> tuple[NDArray[np
     findings = []
     untimed = np.setdiff1d(np.arange(rows[0], len(t)), rows)
     if untimed.size:
-        text = f"t: {counted(untimed.size, 'row')} without a time left out, the rate before held"
+        text = f"t: {counted(untimed.size, 'row')} without a time left out, the platform taken to turn on as before"
         findings.append(Finding("nan", text, places("row", untimed + 1)))
     if rows[0] > 0:
         text = f"{counted(int(rows[0]), 'row')} before the first with a time, all angles and a rate left out"
@@ -162,22 +165,16 @@ def _increasing(t: Array, rows: NDArray[np.int64], where: str) -> None:
         )
 
 
-def _held(rate: Array, rows: NDArray[np.int64], sensor: str) -> list[Finding]:
-    """``nan``: rows between which the rate before is held."""
+def _lacking(rate: Array, rows: NDArray[np.int64], sensor: str) -> list[Finding]:
+    """``nan``: rows from which on no rate is known."""
     lacking = np.flatnonzero(~np.isfinite(rate).all(axis=1))
     if not lacking.size:
         return []
     text = (
-        f"{sensor}: no rate in {counted(lacking.size, 'row')}, the one before is held; where it changed meanwhile "
-        "the attitude is wrong from there on"
+        f"{sensor}: no rate in {counted(lacking.size, 'row')}, the platform is taken to turn on as before; where the "
+        "encoders contradict that the attitude is taken anew"
     )
     return [Finding("nan", text, places("row", rows[lacking] + 1))]
-
-
-def _hold(rate: Array) -> Array:
-    """Rates (m, 3) with each missing number replaced by the last known; the first row is complete."""
-    row = np.where(np.isfinite(rate), np.arange(len(rate))[:, None], 0)
-    return np.asarray(np.take_along_axis(rate, np.maximum.accumulate(row, axis=0), axis=0))
 
 
 def _gaps(t: Array, record: Record) -> list[Finding]:
@@ -187,8 +184,8 @@ def _gaps(t: Array, record: Record) -> list[Finding]:
     step = np.diff(t)
     long = step > 1.5 * np.median(step)
     text = (
-        f"the rate before is held through {step[long].sum():.4g} s without rows; where it changed meanwhile the "
-        "attitude is wrong from there on"
+        f"the platform is taken to turn on as before through {step[long].sum():.4g} s without rows; where the "
+        "encoders contradict that the attitude is taken anew"
     )
     return [Finding("gap", text)] if long.any() else []
 

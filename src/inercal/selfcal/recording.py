@@ -30,6 +30,9 @@ class Recording:
     measured : bool
     findings, sources
         Of the record.
+    held : tuple of int
+        Steps whose rate was not recorded, and is that of a platform that turns on as before
+        (`inercal.selfcal.gaps`).
     """
 
     t: Array
@@ -39,6 +42,7 @@ class Recording:
     measured: bool = False
     findings: tuple[Finding, ...] = ()
     sources: tuple[Source, ...] = ()
+    held: tuple[int, ...] = ()
 
     @property
     def dt(self) -> Array:

@@ -8,15 +8,16 @@ along X_p, Z_K along Y_p (up): ``q_bp = qz(thx) qx(thy) qy(thz)``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.geometry.earth import earth_rate
-from inercal.geometry.rotations import Axis, elementary, exp, to_matrix
+from inercal.geometry.rotations import Axis, conjugate, elementary, exp, from_matrix, log, multiply, to_matrix
 from inercal.geometry.site import Site
 from inercal.rigs.chain import Chain, Joint
 
@@ -96,6 +97,19 @@ class Base:
         about_north, about_east = self.tilt
         tilted = to_matrix(exp(np.array([about_north, -about_east, 0.0])))
         return np.asarray(_AXES[self.frame] @ (tilted @ elementary("z", -self.heading)).T)
+
+    def turned(self, beta: Array) -> Base:
+        """The base of which a rotation vector ``beta`` (3,) [rad], in b, is the zero of the encoders against this one.
+
+        ``qexp(beta)`` turns components in b to those in the new b. The turn from geographic axes is split into one
+        about the vertical, the heading, and after it one about a level axis, the tilt (swing and twist).
+        """
+        to_base = to_matrix(exp(beta)) @ self.from_geographic()
+        whole = from_matrix(to_base.T @ _AXES[self.frame])
+        about_vertical = 2.0 * math.atan2(whole[3], whole[0])
+        twist = exp(np.array([0.0, 0.0, about_vertical]))
+        north, west, _ = (float(each) for each in log(multiply(whole, conjugate(twist))))
+        return replace(self, heading=math.remainder(-about_vertical, 2.0 * math.pi), tilt=(north, -west))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,27 +6,21 @@ error-state filter, run again with it changed by one standard uncertainty either
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import TypeA, TypeB
-from inercal.geometry.site import Site
 from inercal.selfcal.bounds import Bounds
 from inercal.selfcal.coefficients import names, to_product
 from inercal.selfcal.filtered import problem
 from inercal.selfcal.filtering import estimate
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.settings import Noise, SelfcalSettings
+from inercal.selfcal.stated import statements
 
 Array = NDArray[np.float64]
-
-_DEG = math.radians(1.0)
-_SECOND = ("arcsec", _DEG / 3600.0)
 
 
 def within(covariance: Array, bounds: Bounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
@@ -57,57 +51,6 @@ def within(covariance: Array, bounds: Bounds, noise: Noise, dof: float) -> list[
     return found
 
 
-@dataclass(frozen=True)
-class _Knob:
-    """One thing that is stated: its ``u`` (0 where it is taken as exact), a step for the derivative, the study with it
-    changed, and how errors of it are said."""
-
-    name: str
-    u: float
-    step: float
-    changed: Callable[[float], SelfcalSettings]
-    unit: str
-    size: float
-
-
-def _knobs(settings: SelfcalSettings) -> list[_Knob]:
-    """What is stated; heading and tilt not where beta, with its prior, takes their place."""
-    site, base = settings.site, settings.base
-
-    def with_base(**change: Any) -> SelfcalSettings:
-        return replace(settings, base=replace(base, **change))
-
-    by_gravity = (each for each in site.inputs if each.source != "latitude")
-    gravity_u = math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in by_gravity))
-    knobs = [
-        _Knob("latitude", site.latitude_u, 1e-4, lambda by: replace(settings, site=_moved(site, by)), "deg", _DEG),
-        _Knob(
-            "gravity", gravity_u, 1e-5 * site.gravity,
-            lambda by: replace(settings, site=replace(site, gravity=site.gravity + by)), "m/s^2", 1.0,
-        ),
-    ]  # fmt: skip
-    if settings.filter.extended:
-        return knobs
-    north, east = base.tilt
-    return [
-        *knobs,
-        _Knob("heading", base.heading_u, 1e-4, lambda by: with_base(heading=base.heading + by), "deg", _DEG),
-        _Knob(
-            "tilt about north", base.tilt_u[0], 1e-6, lambda by: with_base(tilt=(north + by, east)), *_SECOND
-        ),
-        _Knob(
-            "tilt about east", base.tilt_u[1], 1e-6, lambda by: with_base(tilt=(north, east + by)), *_SECOND
-        ),
-    ]
-
-
-def _moved(site: Site, by: float) -> Site:
-    """The site at another latitude, with gravity as it was computed from it, if it was."""
-    slope = sum(each.sensitivity for each in site.inputs if each.source == "latitude")
-    latitude = min(max((site.latitude or 0.0) + by, -0.5 * math.pi), 0.5 * math.pi)
-    return replace(site, latitude=latitude, gravity=site.gravity + slope * by)
-
-
 def stated(
     recording: Recording, settings: SelfcalSettings, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
@@ -129,25 +72,27 @@ def stated(
     """
     sources, exact = list[TypeB](), dict[str, str]()
     known = names(len(u))
-    for knob in _knobs(settings):
-        by = knob.u or knob.step
+    for statement in statements(settings):
+        by = statement.u or statement.step
         ends = [
             to_product(
-                estimate(recording, problem(knob.changed(each)), "error-state", history=False).coefficients
+                estimate(
+                    recording, problem(statement.changed(each)), "error-state", history=False
+                ).coefficients
             )
             for each in (-by, by)
         ]
         slope = (ends[1] - ends[0]) / (2.0 * by)
         worst = int(np.argmax(np.abs(slope) / u))
-        if knob.name == "gravity" and knob.u:
+        if statement.name == "gravity" and statement.u:
             sources += [
                 TypeB(each.source, each.u, each.unit, each.sensitivity * slope)
                 for each in settings.site.inputs
                 if each.source != "latitude"
             ]
-        elif knob.u:
-            sources.append(TypeB(knob.name, knob.u, "rad", slope))
+        elif statement.u:
+            sources.append(TypeB(statement.name, statement.u, "rad", slope))
         elif slope[worst] != 0.0:
-            error = u[worst] / abs(slope[worst]) / knob.size
-            exact[knob.name] = f"{error:.2g} {knob.unit} of {knob.name} ({known[worst]})"
+            error = u[worst] / abs(slope[worst]) / statement.size
+            exact[statement.name] = f"{error:.2g} {statement.unit} of {statement.name} ({known[worst]})"
     return sources, exact

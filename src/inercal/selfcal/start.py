@@ -35,6 +35,7 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.coefficients import DS, ETA, KA0, KA1, names
 from inercal.selfcal.filtered import Filtered, History, Problem, Start
+from inercal.selfcal.gaps import broken
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.residuals import (
     Readings,
@@ -85,6 +86,12 @@ def estimate_lm(
     began = time.perf_counter()
     measured, arw = readings(recording, problem), problem.noise.angle_random_walk
     fit, at = _fit(recording, problem, measured, first)
+    message = "" if fit.converged else fit.message
+    if loose := broken(recording, problem, start):
+        message = (
+            f"the platform did not turn on as before from t = {recording.t[loose[0]]:.10g} s on, where no rate was "
+            "recorded, and a fit of one path cannot go on behind that: use map or a filter"
+        )
     wander = arw**2 * (recording.t[1:] - recording.t[0])
     unknowns, u = _uncertainty(fit, at, recording, arw)
     covariance = unknowns[3:, 3:] * np.outer(problem.prior, problem.prior)
@@ -110,8 +117,8 @@ def estimate_lm(
         innovations=innovations,
         history=past,
         seconds=time.perf_counter() - began,
-        converged=fit.converged,
-        message="" if fit.converged else fit.message,
+        converged=not message,
+        message=message,
         gimbal_cosine=least_cosine(recording),
     )
 

@@ -136,19 +136,34 @@ def bounds_by_path(designed: Designed) -> Table:
     """Bounds of every path, in units of the field."""
     bounds = [each.seen.bounds for each in designed.compare]
     units, size = of_field(len(bounds[0].names))
+    first = designed.compare[0]
+    to_goal = first.seen.to_goal
+
+    def of_goal(name: str) -> tuple[str, ...]:
+        return (short(to_goal.get(name, np.nan)),) if to_goal else ()
+
     rows = tuple(
         (
             name,
             units[k],
             *(short(float(each.u[k] / size[k])) for each in bounds),
             f"{bounds[0].prior[k] / size[k]:.4g}",
+            *of_goal(name),
         )
         for k, name in enumerate(bounds[0].names)
     )
+    wanted = f" Of goal: the bound of the path {first.name} over the goal, met up to 1." if to_goal else ""
     return Table(
         "Bounds",
-        "Cramér-Rao bounds of the standard uncertainties at the end of each path, with the stated noise and prior.",
-        (("coefficient", ""), ("unit", ""), *((each.name, "") for each in designed.compare), ("prior", "")),
+        "Cramér-Rao bounds of the standard uncertainties at the end of each path, with the stated noise and prior."
+        f"{wanted}",
+        (
+            ("coefficient", ""),
+            ("unit", ""),
+            *((each.name, "") for each in designed.compare),
+            ("prior", ""),
+            *([("of goal", "")] if to_goal else []),
+        ),
         rows,
         2,
     )
@@ -175,7 +190,8 @@ def campaign_table(campaign: Campaign) -> Table:
     return Table(
         "Errors of the coefficients",
         "Estimate less truth over all runs: its mean and root mean square, the Cramér-Rao bound, and the share of "
-        f"runs whose interval for {100.0 * coverage.level:g} % held the truth, by chance {low:.1f} to {high:.1f} %.",
+        f"runs whose interval for {100.0 * coverage.level:g} % held the truth, by chance {low:.1f} to "
+        f"{high:.1f} %. More is harmless: the uncertainties are then rather too large.",
         (
             ("coefficient", ""),
             ("unit", ""),

@@ -15,16 +15,18 @@ from inercal.estimate.result import Estimate, rounded
 from inercal.estimate.status import Status
 from inercal.records.record import Record
 from inercal.selfcal import filtering
+from inercal.selfcal.base_search import heading, is_rough, relative, with_base
 from inercal.selfcal.bounds import Bounds, recorded_bounds
-from inercal.selfcal.coefficients import names
+from inercal.selfcal.coefficients import BETA, names
 from inercal.selfcal.diagnosis import diagnose
 from inercal.selfcal.display import found as found_by
 from inercal.selfcal.filtered import Filtered, Problem, problem
-from inercal.selfcal.heading import with_heading
+from inercal.selfcal.gaps import taken_anew
 from inercal.selfcal.outcome import assemble, verdict
 from inercal.selfcal.reading import recording_of
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.settings import KINDS, SelfcalSettings
+from inercal.selfcal.stated import stated_errors
 
 Array = NDArray[np.float64]
 
@@ -85,20 +87,24 @@ def calibrate(
     Raises
     ------
     InputError
-        The record has not the channels of a platform, or the study does not fit it.
+        The record has not the channels of a platform, the study does not fit it, or it leaves a heading unknown that
+        the record does not tell.
     """
     clock = time.perf_counter()
     recording = recording_of(record, settings)
-    if settings.heading_unknown:
-        progress("looking for the heading")
-        settings = with_heading(recording, settings)
+    stated, rough = settings.base, is_rough(settings)
+    if rough:
+        progress("looking for the heading" if settings.heading_unknown else "looking for the base")
+        settings = with_base(recording, settings)
+        recording = recording_of(record, settings)  # rates over gaps depend on it
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
     found = filtering.estimate(recording, of)
     assert found.history is not None
-    bounds = recorded_bounds(recording, of, found.history.attitude, found.coefficients, contributions=True)
+    along = found.history.attitude, found.coefficients
+    bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=found.restarts)
     progress("looking for faults")
-    faults = diagnose(recording, of, found)
+    faults = [*diagnose(recording, of, found, stated_errors(settings)), *taken_anew(recording, found)]
     compared: dict[str, Filtered] = {}
     for kind in KINDS if compare else ():
         if kind != found.kind:
@@ -108,14 +114,15 @@ def calibrate(
     estimate = assemble(recording, settings, found, bounds, faults)
     told = dict(estimate.result)
     message = estimate.message
-    if settings.heading_unknown and estimate.names:
-        told["heading"] = _heading(settings, estimate)
-        degrees = (math.degrees(told["heading"][key]) for key in ("value", "u"))
-        message += "; heading {} deg, u {} deg".format(*rounded(*degrees))
+    if rough and estimate.names:
+        base, words = _base(settings, estimate)
+        told, message = told | base, message + words
     for name, other in compared.items():
         told["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
     timed = replace(estimate, result=told, message=message, timing={"solve": time.perf_counter() - clock})
-    truth = None if settings.truth is None else settings.truth[: len(of.prior)]
+    truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
+    if truth is not None and rough:
+        truth[BETA] = relative(truth[BETA], stated, settings.base)
     return Calibration(timed, of, recording, found, bounds, compared, truth)
 
 
@@ -130,9 +137,17 @@ def _beside(other: Filtered, status: Status) -> dict[str, Any]:
     }
 
 
-def _heading(settings: SelfcalSettings, estimate: Estimate) -> dict[str, float]:
-    """The heading that was found [rad], from north to east: beta about the upward axis corrects the one taken."""
-    up = int(np.argmax(np.abs(settings.world.up)))
-    beta = estimate[f"beta_{'xyz'[up]}"]
-    found = settings.base.heading + float(np.sign(settings.world.up[up])) * beta.value
-    return {"value": math.remainder(found, 2.0 * math.pi), "u": beta.u}
+def _base(settings: SelfcalSettings, estimate: Estimate) -> tuple[dict[str, Any], str]:
+    """What a result tells of a base that was found [rad], and in words: the one to which beta is relative; of a heading
+    that was unknown, what beta makes of it."""
+    base = settings.base
+    told: dict[str, Any] = {"base": {"heading": base.heading, "tilt": list(base.tilt)}}
+    degrees = np.degrees([base.heading, *base.tilt]).tolist()
+    words = "; beta is relative to the base found, heading {:.5f} deg, tilt {:.5f} and {:.5f} deg".format(
+        *degrees
+    )
+    if settings.heading_unknown:
+        value, u = heading(base, estimate.values[BETA], estimate.covariance[BETA, BETA])
+        told["heading"] = {"value": value, "u": u}
+        words = "; heading {} deg, u {} deg".format(*rounded(math.degrees(value), math.degrees(u))) + words
+    return told, words

@@ -4,7 +4,8 @@ Innovations change linearly with such an error: ``z = z_0 + Z theta``, where col
 recording is corrected by a small theta_i and filtered again. What makes them smallest is least squares, and the sum of
 squares that it takes away is chi-square where there is no error: the filter with theta as further states, without a
 prior, would find the same (Friedland, IEEE Trans. Automatic Control 14 (1969) 359). One kind of error after the other
-is taken in, the one that explains most first, together with those found before.
+is taken in, the one that explains most first, together with those found before. What a study states with an
+uncertainty may be wrong by about that: it is fitted along with all, its uncertainty for a prior.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.rotations import exp, rotate
+from inercal.geometry.rotations import boxminus, exp, rotate
 from inercal.selfcal.coefficients import NAMES
 from inercal.selfcal.faults import RISK
 from inercal.selfcal.filtered import Filtered, Problem
@@ -46,13 +47,14 @@ _FLAT = 1e-12
 @dataclass(frozen=True, eq=False)
 class Cause:
     """A kind of error: ``names`` of its parameters, a small ``step`` of each, the case ``corrected`` by values of
-    them, and of how many alternatives it was picked."""
+    them, of how many alternatives it was picked, and the standard deviation ``prior`` of each parameter about 0."""
 
     kind: str
     names: tuple[str, ...]
     step: float
     corrected: Callable[[Recording, Problem, Array], Case]
     alternatives: int = 1
+    prior: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +79,25 @@ def regular(recording: Recording, found: Filtered) -> Array:
     return innovations
 
 
-def search(recording: Recording, problem: Problem) -> tuple[list[Found], Case]:
-    """Find what the model leaves out.
+def likely(recording: Recording, problem: Problem, stated: Cause | None) -> Problem:
+    """The problem with what is ``stated`` moved, within its uncertainty, to where the recording fits best.
+
+    Where one of it would have to move further than chance takes it, at a risk of `RISK` over all, the recording
+    contradicts what is stated, and nothing is moved.
+    """
+    from scipy.special import ndtri
+
+    if stated is None:
+        return problem
+    fit = _fitted((recording, problem), [_none_of(stated)])[0]
+    limit = -float(ndtri(0.5 * RISK / len(fit.values)))
+    if not np.abs(fit.values).max() <= limit * stated.prior:
+        return problem
+    return _corrected((recording, problem), [fit])[1]
+
+
+def search(recording: Recording, problem: Problem, stated: Cause | None = None) -> tuple[list[Found], Case]:
+    """Find what the model leaves out, and what is ``stated`` does not explain within its uncertainty.
 
     Returns
     -------
@@ -87,27 +106,40 @@ def search(recording: Recording, problem: Problem) -> tuple[list[Found], Case]:
         Corrected by all of it.
     """
     causes, base, taken = _causes(problem), (recording, problem), list[Found]()
-    case, now = base, filtered(base)
+    if stated is not None:
+        taken = _fitted(base, [_none_of(stated)])
+    case = _corrected(base, taken)
+    now = filtered(case)
     for _ in range(_MOST):
         if not now.converged:
             break
         z = regular(case[0], now)
         held = [_slopes(case, each.cause, z) for each in taken]
         kinds = {each.cause.kind for each in taken}
-        tried = [cause for cause in (*causes, *_harmonics(case, z)) if cause.kind not in kinds]
-        gains = [_gain(z, held, _slopes(case, cause, z), len(tried) * cause.alternatives) for cause in tried]
+        tried = [cause for cause in (*causes, *_harmonics(case, now, z)) if cause.kind not in kinds]
+        gains = [_gain(z, taken, held, cause, _slopes(case, cause, z), len(tried)) for cause in tried]
         if not max(gains, default=0.0) > 0.0:
             break
         cause = tried[int(np.argmax(gains))]
-        fitted = _fitted(base, [*taken, Found(cause, np.zeros(len(cause.names)), np.ones(len(cause.names)))])
+        fitted = _fitted(base, [*taken, _none_of(cause)])
         # earlier ones that were taken for a part of this one
         last = fitted.pop()
-        taken = [*(each for each in fitted if np.abs(each.values / each.u).max() > LEAST_SIGMAS), last]
+        taken = [*(each for each in fitted if each.cause is stated or _clear(each)), last]
         if len(taken) <= len(fitted):
             taken = _fitted(base, taken)
         case = _corrected(base, taken)
         now = filtered(case)
-    return taken, case
+    return [each for each in taken if each.cause is not stated], case
+
+
+def _none_of(cause: Cause) -> Found:
+    """An error of which nothing is known yet."""
+    return Found(cause, np.zeros(len(cause.names)), np.ones(len(cause.names)))
+
+
+def _clear(found: Found) -> bool:
+    """Whether a parameter of an error differs from 0."""
+    return bool(np.abs(found.values / found.u).max() > LEAST_SIGMAS)
 
 
 def _fitted(base: Case, taken: Sequence[Found]) -> list[Found]:
@@ -117,7 +149,7 @@ def _fitted(base: Case, taken: Sequence[Found]) -> list[Found]:
         case = _corrected(base, found)
         z = regular(case[0], filtered(case))
         Z = np.concatenate([_slopes(case, each.cause, z) for each in found], axis=-1)
-        fit = _least_squares(Z, z)
+        fit = _least_squares(Z, z, found)
         ends = np.cumsum([len(each.values) for each in found])[:-1]
         parts = zip(found, np.split(fit.change, ends), np.split(fit.u, ends), strict=True)
         found = [Found(each.cause, each.values + by, u) for each, by, u in parts]
@@ -152,10 +184,14 @@ class _Fit(NamedTuple):
     gained: float
 
 
-def _least_squares(Z: Array, z: Array) -> _Fit:
-    """Parameters that make ``z + Z change`` smallest; combinations without effect stay as they are."""
+def _least_squares(Z: Array, z: Array, at: Sequence[Found]) -> _Fit:
+    """Change from the values of errors ``at`` that makes ``z + Z change`` and their misfit to their priors smallest;
+    combinations without effect stay as they are."""
     used = np.isfinite(z) & np.isfinite(Z).all(axis=-1)
-    columns, values = Z[used], z[used]
+    scatter = math.sqrt(max(1.0, float(np.mean(np.square(z[used]))))) if used.any() else 1.0
+    weight = scatter * np.concatenate([np.full(len(each.values), 1.0 / each.cause.prior) for each in at])
+    known = weight * np.concatenate([each.values for each in at])
+    columns, values = np.vstack([Z[used], np.diag(weight)]), np.append(z[used], known)
     size = np.sqrt(np.square(columns).sum(axis=0)) + np.finfo(float).tiny
     columns = columns / size
     strength, ways = np.linalg.eigh(columns.T @ columns)
@@ -163,18 +199,21 @@ def _least_squares(Z: Array, z: Array) -> _Fit:
     along = ways.T @ (columns.T @ values)
     gained = float(along @ (inverse * along))
     # innovations larger than stated, for whatever reason, must not make errors of the model
-    left = max(1.0, (float(values @ values) - gained) / max(len(values), 1))
+    left = max(1.0, (float(values @ values) - gained) / max(int(used.sum()), 1))
     u = np.sqrt(left * (np.square(ways) @ inverse)) / size
     return _Fit(-(ways @ (inverse * along)) / size, u + np.finfo(float).tiny, left, gained)
 
 
-def _gain(z: Array, held: Sequence[Array], slopes: Array, alternatives: int) -> float:
-    """Sum of squares that a cause takes away beyond those held already, above what chance does."""
+def _gain(
+    z: Array, taken: Sequence[Found], held: Sequence[Array], cause: Cause, slopes: Array, tried: int
+) -> float:
+    """Sum of squares that a cause takes away beyond those taken already, above what chance does."""
     from scipy.special import chdtri
 
-    after = _least_squares(np.concatenate([*held, slopes], axis=-1), z)
-    before = _least_squares(np.concatenate(held, axis=-1), z).gained if held else 0.0
-    return (after.gained - before) / after.left - float(chdtri(slopes.shape[-1], RISK / alternatives))
+    after = _least_squares(np.concatenate([*held, slopes], axis=-1), z, [*taken, _none_of(cause)])
+    before = _least_squares(np.concatenate(held, axis=-1), z, taken).gained if held else 0.0
+    chance = float(chdtri(slopes.shape[-1], RISK / (tried * cause.alternatives)))
+    return (after.gained - before) / after.left - chance
 
 
 def _causes(problem: Problem) -> tuple[Cause, ...]:
@@ -237,12 +276,12 @@ def _other_scale(recording: Recording, problem: Problem, values: Array) -> Case:
     return replace(recording, rate=recording.rate * (1.0 + values)), problem
 
 
-def _harmonics(case: Case, z: Array) -> list[Cause]:
+def _harmonics(case: Case, now: Filtered, z: Array) -> list[Cause]:
     """Errors periodic in the angle of a joint: of each joint the order that its innovations show most."""
-    th = case[0].th[1:]
-    _, joints = gimbals(np.nan_to_num(th), case[1].world)
-    size = np.sqrt(np.square(joints).sum(axis=2))
-    by_joint = np.einsum("kij,kj->ki", np.linalg.pinv(joints, rcond=1e-3), z[:, 3:] * size)
+    angles, joints = _found_angles(case, now)
+    th = angles[1:]
+    size = np.sqrt(np.square(joints[1:]).sum(axis=2))
+    by_joint = np.einsum("kij,kj->ki", np.linalg.pinv(joints[1:], rcond=1e-3), z[:, 3:] * size)
     causes = []
     for joint in range(3):
         used = np.isfinite(by_joint[:, joint] + th[:, joint])
@@ -251,17 +290,27 @@ def _harmonics(case: Case, z: Array) -> list[Cause]:
         orders = ORDERS[ORDERS * np.ptp(angle) > math.pi] if used.any() else ORDERS[:0]
         if len(orders):
             powers = np.abs(np.exp(1j * orders[:, None] * angle) @ missed)
-            causes.append(_harmonic(joint, int(orders[np.argmax(powers)])))
+            causes.append(_harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint]))
     return causes
 
 
-def _harmonic(joint: int, order: int) -> Cause:
-    """An error ``a sin(k th) + b cos(k th)`` of an encoder."""
+def _found_angles(case: Case, now: Filtered) -> tuple[Array, Array]:
+    """Gimbal angles (n, 3) [rad] that the filter found, and the axes (n, 3, 3) of the joints: at rest the angles read
+    change with their noise alone, which they would explain."""
+    recording, problem = case
+    assert now.history is not None
+    read, joints = gimbals(np.nan_to_num(recording.th), problem.world)
+    off = boxminus(read, now.history.attitude)
+    return recording.th - np.einsum("kij,kj->ki", np.linalg.pinv(joints, rcond=1e-3), off), joints
+
+
+def _harmonic(joint: int, order: int, angle: Array) -> Cause:
+    """An error ``a sin(k th) + b cos(k th)`` of an encoder at angles th (n,)."""
+    waves = np.stack([np.sin(order * angle), np.cos(order * angle)])
 
     def corrected(recording: Recording, problem: Problem, values: Array) -> Case:
         th = recording.th.copy()
-        angle = order * th[:, joint]
-        th[:, joint] -= values[0] * np.sin(angle) + values[1] * np.cos(angle)
+        th[:, joint] -= values @ waves
         return replace(recording, th=th), problem
 
     return Cause(f"harmonic {order} of {JOINTS[joint]}", ("sin", "cos"), 1e-6, corrected, len(ORDERS))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, NamedTuple
@@ -108,6 +108,9 @@ class Lines:
         self._number = 0
         self._flaws: Counter[tuple[str, str]] = Counter()
         self._t, self._odd = math.nan, ""
+        self._first: Collection[str] = ()
+        self._last: Collection[str] = ()
+        self._waiting: list[tuple[str, Line]] = []
         self._form, self._held = self._begin(record_map)
         self._layout = self._form.layout
 
@@ -138,6 +141,11 @@ class Lines:
             "rate": form.rate,
         }
 
+    def leave_unsaid(self, first: Collection[str], last: Collection[str]) -> None:
+        """Say nothing of values that are missing where nobody needs them: of these channels in the first row of the
+        record, or in the last."""
+        self._first, self._last = first, last
+
     def next(self) -> Line | None:
         """The next line that holds a row, None at the end; waits for it."""
         if self._held:
@@ -150,6 +158,9 @@ class Lines:
     def sample(self, line: Line, row: int) -> Sample:
         """The sample in a line, as row ``row`` of the record."""
         text, form = line.text, self._form
+        for waiting in self._waiting:  # of a row that was not the last
+            self._flaw("nan", *waiting)
+        self._waiting = []
         self._layout = self._layout.settled([text])  # the first row may hold whole numbers alone
         fields = self._layout.fields(text)
         bad = fields is None
@@ -165,7 +176,8 @@ class Lines:
             bad = stamp is None or None in found
             t = self._stamp(form.time, stamp, bad, line) if form.time is not None else t
             values = [
-                self._value(field, value, bad, line) for field, value in zip(form.fields, found, strict=True)
+                self._value(field, value, bad or (row == 0 and field.name in self._first), line)
+                for field, value in zip(form.fields, found, strict=True)
             ]
         if bad:
             self._bad_row(line)
@@ -191,11 +203,14 @@ class Lines:
         self._t, self._odd = t, odd
         return t
 
-    def _value(self, field: _Field, value: float | None, bad: bool, line: Line) -> float:
-        """A value in its unit; NaN where there is none, which is said unless the row is bad anyway."""
+    def _value(self, field: _Field, value: float | None, silent: bool, line: Line) -> float:
+        """A value in its unit; NaN where there is none, which is said unless ``silent``."""
         if value is None or not math.isfinite(value):
-            if not bad:
-                self._flaw("nan", f"{field.name}: missing value", line)
+            text = f"{field.name}: missing value"
+            if field.name in self._last and not silent:
+                self._waiting.append((text, line))
+            elif not silent:
+                self._flaw("nan", text, line)
             return math.nan
         for factor in field.factors:
             value *= factor

@@ -1,9 +1,9 @@
 """A platform calibrated while it turns: rows in, coefficients and their uncertainties out, each at once.
 
 A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file
-(`inercal.selfcal.reading` says how rows are taken): the first row with all angles and a rate is the start; a rate is
-held until the next one is known; what else is missing is not measured. Only time is treated more kindly: a row that is
-not later than the one before is left out.
+(`inercal.selfcal.reading` says how rows are taken): the first row with all angles and a rate is the start; where no
+rate is recorded the platform is taken to turn on as before (`inercal.selfcal.gaps`); what else is missing is not
+measured. Only time is treated more kindly: a row that is not later than the one before is left out.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from inercal.errors import RecordError, StudyError
 from inercal.records.findings import Finding
-from inercal.selfcal.filtered import History, Problem, State, Trace
-from inercal.selfcal.filtering import LOCK, known_in, load_kernels, recursive
+from inercal.selfcal.filtered import History, Problem, State, Trace, known_in
+from inercal.selfcal.filtering import LOCK, load_kernels, recursive
+from inercal.selfcal.gaps import LONG, RECENT, advance, held_rate, usual
 from inercal.selfcal.history import columns, rows
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
@@ -32,9 +33,6 @@ _BAND = 5.0
 _SETTLED = 50
 """Rows before which that is not judged."""
 
-_LONG = 1.5
-"""Steps, as long as the first, beyond which an interval is a gap."""
-
 _SAID = 5
 _PATIENCE = 10
 
@@ -42,18 +40,25 @@ _PATIENCE = 10
 class LiveState(NamedTuple):
     """What is known after a row.
 
-    ``begun``: a start was found; until then the others mean nothing. ``filter`` is the state of the filter; ``rate``
-    (3,) [rad/s] of the platform, held from the last row on; ``t`` [s] of that row, and the first interval ``step`` [s]
-    (NaN before). ``angles`` (3,) [rad] of the estimated attitude. ``nis`` and ``dims``: sums of the normalised
-    innovations squared and of the scalars in them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps``
-    were seen, ``said`` are the alarms given, one bit each; ``slots`` that of the last line.
+    ``begun``: a start was found; until then the others mean nothing. ``filter`` is the state of the filter; ``next``
+    (3,) [rad/s] the rate that the last row has for the step to come (NaN where it has none, or rates of the step
+    before); ``rate`` (3,) [rad/s] the last one known whole and ``rated`` [s] the row that it stands in; ``read`` [s]
+    the row of the last whole angles, which are in ``filter``. ``t`` [s] of the last row, ``steps`` (9,) [s] the last
+    intervals (NaN before). ``doubt``: a rate was held and the encoders have not read since. ``angles`` (3,) [rad]
+    of the estimated attitude. ``nis`` and ``dims``: sums of the normalised innovations squared and of the scalars in
+    them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``said`` are the alarms given,
+    one bit each; ``slots`` that of the last line.
     """
 
     begun: bool
     filter: State
+    next: Array
     rate: Array
+    rated: float
+    read: float
     t: float
-    step: float
+    steps: Array
+    doubt: bool
     angles: Array
     nis: float
     dims: int
@@ -102,6 +107,9 @@ class Selfcal:
         found = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
         for column in found:
             column.si()  # refuses counts
+        rates = {column.name for column in found[:3] if not column.increment}
+        first = {column.name for column in found if column.name not in rates and column.sensor != "th"}
+        lines.leave_unsaid(first, rates)
         names = list(record.columns)
         self._places = [names.index(column.name) for column in found]
         self._factors = [column.unit.factor for column in found]
@@ -125,7 +133,8 @@ class Selfcal:
         """Nothing known."""
         none = np.zeros(3)
         return LiveState(
-            begun=False, filter=self._module.initial(self._problem, none), rate=none.copy(), t=math.nan, step=math.nan,
+            begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
+            rated=math.nan, read=math.nan, t=math.nan, steps=np.full(RECENT, np.nan), doubt=False,
             angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, said=0, slots=Slots(),
         )  # fmt: skip
 
@@ -135,21 +144,28 @@ class Selfcal:
             return state, None
         values = zip(self._places, self._factors, strict=True)
         rate, th, acc = np.array([sample.values[i] * factor for i, factor in values]).reshape(3, 3)
-        known = np.isfinite(rate)
-        gained = np.where(self._gained & known, rate, state.rate)
-        if not state.begun or (math.isnan(state.step) and not np.isfinite(gained).all()):
-            return self._begin(state, sample.t, np.where(self._gained, np.nan, rate), th)
+        over = np.where(self._gained, rate, state.next)
+        following = np.where(self._gained, np.nan, rate)
+        if not state.begun or (math.isnan(state.steps[-1]) and not np.isfinite(over).all()):
+            return self._begin(state, sample.t, following, th)
         dt = sample.t - state.t
         if dt <= 0.0:
             return self._late(state, sample.t), None
         state = self._after(state, sample.t, dt)
-        filter_, trace = self._module.advance(
-            state.filter, self._problem, np.array([dt]), gained[None], acc[None], th[None]
-        )
+        state, over, guessed = self._rate(state, sample.t, over)
+        doubt, seen = guessed or state.doubt, bool(np.isfinite(th).all())
+        filter_, trace = advance(
+            self._module, state.filter, self._problem, np.array([dt]), over[None], acc[None], th[None],
+            (0,) if doubt else (),
+        )  # fmt: skip
+        if trace.restarts:
+            text = "the platform did not turn on as before: its attitude is taken anew from the encoders"
+            state = self._gap(state, sample.t, text)
         nis, dims = float(trace.nis[0]), int(trace.dims[0])
         state = state._replace(
-            filter=filter_, rate=np.where(~self._gained & known, rate, gained), t=sample.t, late=0
-        )
+            filter=filter_, next=following, t=sample.t, late=0, doubt=doubt and not seen,
+            read=sample.t if seen else state.read,
+        )  # fmt: skip
         if math.isfinite(nis):
             state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
         return self._line(self._alarmed(state, trace), trace, nis)
@@ -160,7 +176,7 @@ class Selfcal:
         if not begun:
             return state._replace(begun=False), None
         filter_ = self._module.initial(self._problem, th)
-        state = state._replace(begun=True, filter=filter_, rate=rate, t=t, angles=th)
+        state = state._replace(begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th)
         return self._line(state, known_in(filter_, self._problem), math.nan)
 
     def _late(self, state: LiveState, t: float) -> LiveState:
@@ -175,15 +191,32 @@ class Selfcal:
 
     def _after(self, state: LiveState, t: float, dt: float) -> LiveState:
         """The state with an interval seen; a gap is said."""
-        if math.isnan(state.step):
-            return state._replace(step=dt)
-        if dt <= _LONG * state.step:
+        state = state._replace(steps=np.append(state.steps[1:], dt))
+        if dt <= LONG * usual(state.steps):
             return state
+        return self._gap(state, t, f"{dt:.4g} s without rows, the platform is taken to turn on as before")
+
+    def _gap(self, state: LiveState, t: float, text: str) -> LiveState:
+        """The state with something said of a gap."""
         if state.gaps < _SAID:
             more = "; further gaps are not said" if state.gaps + 1 == _SAID else ""
-            said = f"{dt:.4g} s without rows, the rate before is held{more}"
-            self._say(Finding("gap", said, f"t = {t:.10g} s"))
+            self._say(Finding("gap", f"{text}{more}", f"t = {t:.10g} s"))
         return state._replace(gaps=state.gaps + 1)
+
+    def _rate(self, state: LiveState, t: float, rate: Array) -> tuple[LiveState, Array, bool]:
+        """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and whether it is held."""
+        whole, gained = bool(np.isfinite(rate).all()), bool(self._gained.all())
+        if whole:
+            state = state._replace(rate=rate, rated=t if gained else state.t)
+        dt, step = t - state.t, float(usual(state.steps))
+        long, half = dt > LONG * step, 0.5 * step
+        if whole and not long:
+            return state, rate, False
+        middle = state.rated - half if gained else state.rated + half
+        held = held_rate(
+            state.rate, state.filter.th, self._problem.world, middle - state.read, state.t - state.read, dt
+        )
+        return state, np.where(long | ~np.isfinite(rate), held, rate), True
 
     def _alarmed(self, state: LiveState, trace: Trace) -> LiveState:
         """The state with the alarms that were due now."""

@@ -1,0 +1,98 @@
+"""What a study states of site and base: latitude, gravity, heading, tilt, each with its uncertainty, and what changes
+where one is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.geometry.site import Site
+from inercal.selfcal.filtered import Problem
+from inercal.selfcal.recording import Recording
+from inercal.selfcal.settings import SelfcalSettings
+from inercal.selfcal.unmodelled import Cause
+
+Array = NDArray[np.float64]
+
+_DEG = math.radians(1.0)
+_SECOND = ("arcsec", _DEG / 3600.0)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One thing that is stated: its ``u`` (0 where it is taken as exact), a step for the derivative, the study with it
+    changed, and how errors of it are said."""
+
+    name: str
+    u: float
+    step: float
+    changed: Callable[[float], SelfcalSettings]
+    unit: str
+    size: float
+
+
+def statements(settings: SelfcalSettings) -> list[Statement]:
+    """What is stated; heading and tilt not where beta, with its prior, takes their place."""
+    site, base = settings.site, settings.base
+
+    def with_base(**change: Any) -> SelfcalSettings:
+        return replace(settings, base=replace(base, **change))
+
+    by_gravity = (each for each in site.inputs if each.source != "latitude")
+    gravity_u = math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in by_gravity))
+    of_site = [
+        Statement(
+            "latitude", site.latitude_u, 1e-4, lambda by: replace(settings, site=_moved(site, by)), "deg", _DEG
+        ),
+        Statement(
+            "gravity", gravity_u, 1e-5 * site.gravity,
+            lambda by: replace(settings, site=replace(site, gravity=site.gravity + by)), "m/s^2", 1.0,
+        ),
+    ]  # fmt: skip
+    if settings.filter.extended:
+        return of_site
+    north, east = base.tilt
+    return [
+        *of_site,
+        Statement(
+            "heading", base.heading_u, 1e-4, lambda by: with_base(heading=base.heading + by), "deg", _DEG
+        ),
+        Statement(
+            "tilt about north", base.tilt_u[0], 1e-6, lambda by: with_base(tilt=(north + by, east)), *_SECOND
+        ),
+        Statement(
+            "tilt about east", base.tilt_u[1], 1e-6, lambda by: with_base(tilt=(north, east + by)), *_SECOND
+        ),
+    ]
+
+
+def _moved(site: Site, by: float) -> Site:
+    """The site at another latitude, with gravity as it was computed from it, if it was."""
+    slope = sum(each.sensitivity for each in site.inputs if each.source == "latitude")
+    latitude = min(max((site.latitude or 0.0) + by, -0.5 * math.pi), 0.5 * math.pi)
+    return replace(site, latitude=latitude, gravity=site.gravity + slope * by)
+
+
+def stated_errors(settings: SelfcalSettings) -> Cause | None:
+    """Errors of what is stated with an uncertainty, in units of it; None where nothing is.
+
+    They are small enough for changes of earth rate and gravity to add up.
+    """
+    uncertain = [each for each in statements(settings) if each.u]
+    if not uncertain:
+        return None
+    here = settings.world
+
+    def corrected(recording: Recording, problem: Problem, values: Array) -> tuple[Recording, Problem]:
+        earth, up = problem.world.earth, problem.world.up
+        for statement, value in zip(uncertain, values, strict=True):
+            there = statement.changed(float(value) * statement.u).world
+            earth, up = earth + there.earth - here.earth, up + there.up - here.up
+        return recording, replace(problem, world=replace(problem.world, earth=earth, up=up))
+
+    return Cause("stated", tuple(each.name for each in uncertain), 0.1, corrected, prior=1.0)

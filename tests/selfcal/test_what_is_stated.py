@@ -1,0 +1,136 @@
+"""What a study states with an uncertainty may be wrong by about that, and by no more, without a contradiction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from paper_study import ARCSEC, DEG, TRUTH, study
+
+from inercal.estimate.status import Status
+from inercal.geometry.site import GravityInput
+from inercal.selfcal.bounds import recorded_bounds
+from inercal.selfcal.diagnosis import diagnose
+from inercal.selfcal.filtered import problem
+from inercal.selfcal.filtering import estimate
+from inercal.selfcal.outcome import assemble, verdict
+from inercal.selfcal.rig import Base
+from inercal.selfcal.simulate import experiment, simulate
+from inercal.selfcal.stated import stated_errors
+from inercal.selfcal.unmodelled import filtered, likely, search
+
+PLAIN = study(path="best")
+PLAIN_LIMIT = 6.0 + 5.0 * np.sqrt(12.0 / 2700.0)
+
+
+def recorded(settings, seed=5):
+    return simulate(experiment(settings), np.random.default_rng(seed)).recording
+
+
+def calibrated(settings, made):
+    """Estimate and diagnosis of a recording, as the command makes them."""
+    of = problem(settings)
+    found = estimate(made, of)
+    faults = diagnose(made, of, found, stated_errors(settings))
+    bounds = recorded_bounds(made, of, found.history.attitude, found.coefficients, contributions=True)
+    return assemble(made, settings, found, bounds, faults), [each.code for each in faults]
+
+
+def with_latitude(settings, degrees, u=0.0):
+    return replace(settings, site=replace(settings.site, latitude=degrees * DEG, latitude_u=u * DEG))
+
+
+def with_tilt(settings, north, east, u=0.0):
+    base = Base(tilt=(north * ARCSEC, east * ARCSEC), tilt_u=(u * ARCSEC, u * ARCSEC))
+    return replace(settings, base=base)
+
+
+def test_worlds_drawn_from_what_is_stated_contradict_nothing():
+    """All of it wrong at once. Of 10 worlds one finding would be rare at a risk of 1e-3 a test, and there is none."""
+    rng = np.random.default_rng(31)
+    site = replace(PLAIN.site, inputs=(GravityInput("gravity", 1e-4, "m/s^2", 1.0),), latitude_u=0.2 * DEG)
+    base = Base(heading=0.5, tilt=(5e-5, -1e-4), heading_u=0.5 * DEG, tilt_u=(5 * ARCSEC, 20 * ARCSEC))
+    stated = replace(PLAIN, site=site, base=base)
+    squares = []
+    for seed in range(10):
+        by = rng.standard_normal(5)
+        there = replace(
+            site, latitude=site.latitude + by[0] * site.latitude_u, gravity=site.gravity + 1e-4 * by[1]
+        )
+        tilt = tuple(t + u * x for t, u, x in zip(base.tilt, base.tilt_u, by[3:], strict=True))
+        turned = Base(heading=base.heading + by[2] * base.heading_u, tilt=tilt)
+        result, codes = calibrated(stated, recorded(replace(PLAIN, site=there, base=turned), seed))
+        assert (result.status, codes) == (Status.OK, [])
+        errors = result.values - TRUTH[:18]
+        squares.append(errors @ np.linalg.solve(result.covariance, errors))
+    # chi-square of 18: four standard errors of the mean of 10
+    assert abs(np.mean(squares) - 18.0) < 4.0 * np.sqrt(2.0 * 18.0 / 10.0)
+
+
+def test_the_limit_of_the_verdict_is_raised_by_what_a_stated_tilt_explains():
+    made = recorded(with_tilt(PLAIN, 10.0, -8.0))
+    sure, doubted = with_tilt(PLAIN, 0.0, 0.0, 1.0), with_tilt(PLAIN, 0.0, 0.0, 5.0)
+    contradicted, codes = calibrated(sure, made)
+    assert contradicted.status is Status.INCONSISTENT  # ten u off
+    assert codes == ["unmodelled"]
+    assert contradicted.statistics["nis_limit"] == pytest.approx(PLAIN_LIMIT)
+    agreeing, codes = calibrated(doubted, made)
+    assert (agreeing.status, codes) == (Status.OK, [])
+    assert agreeing.statistics["nis_mean"] == contradicted.statistics["nis_mean"] > PLAIN_LIMIT
+    # what is left is the mean NIS of the tilt that is true
+    true = estimate(made, problem(with_tilt(PLAIN, 10.0, -8.0))).nis_mean
+    left = agreeing.statistics["nis_mean"] - (agreeing.statistics["nis_limit"] - PLAIN_LIMIT)
+    assert left == pytest.approx(true, abs=0.02)
+    other = estimate(made, problem(doubted), "mukf")
+    assert verdict(other, made, doubted)[0] is Status.OK
+
+
+def test_without_anything_uncertain_the_limit_is_that_of_the_contract():
+    assert stated_errors(PLAIN) is None
+    result, _ = calibrated(PLAIN, recorded(PLAIN))
+    assert result.statistics["nis_limit"] == pytest.approx(PLAIN_LIMIT)
+
+
+def test_other_faults_stay_contradictions_beside_what_is_uncertain():
+    made = recorded(with_tilt(PLAIN, 10.0, -8.0))
+    shifted = replace(made, rate=np.roll(made.rate, 1, axis=0))
+    result, codes = calibrated(with_tilt(PLAIN, 0.0, 0.0, 5.0), shifted)
+    assert (result.status, codes) == (Status.INCONSISTENT, ["command_shift"])
+    # an uncertain latitude is no excuse for a tilt
+    result, codes = calibrated(with_latitude(PLAIN, 40.0, 0.2), made)
+    assert (result.status, codes) == (Status.INCONSISTENT, ["unmodelled"])
+
+
+def test_a_world_is_moved_to_where_it_is():
+    """Least squares with a prior: tilt, which the recording tells, is found; an uncertainty too small leaves it."""
+    made = recorded(with_tilt(PLAIN, 10.0, -8.0))
+    stated = with_tilt(PLAIN, 0.0, 0.0, 5.0)
+    moved = likely(made, problem(stated), stated_errors(stated)).world
+    true = with_tilt(PLAIN, 10.0, -8.0).world
+    g = np.linalg.norm(true.up)
+    np.testing.assert_allclose(moved.up / g, true.up / g, atol=1.0 * ARCSEC)
+    assert np.linalg.norm(stated.world.up / g - true.up / g) > 12.0 * ARCSEC
+    sure = with_tilt(PLAIN, 0.0, 0.0, 1.0)
+    np.testing.assert_array_equal(likely(made, problem(sure), stated_errors(sure)).world.up, sure.world.up)
+
+
+def test_what_is_stated_is_fitted_with_its_uncertainty_for_a_prior():
+    """The search for errors has the stated latitude as a parameter: what it corrects agrees with the recording."""
+    made = recorded(with_latitude(PLAIN, 40.3))
+    stated = with_latitude(PLAIN, 40.0, 0.2)
+    errors, corrected = search(made, problem(stated), stated_errors(stated))
+    assert errors == []
+    assert np.degrees(np.arctan2(corrected[1].world.earth[1], corrected[1].world.earth[0])) == pytest.approx(
+        40.3, abs=0.05
+    )
+    assert filtered(corrected).nis.sum() < filtered((made, problem(stated))).nis.sum() - 9.0
+
+
+@pytest.mark.parametrize(("u", "named"), [(0.0, True), (0.01, True), (0.1, False)])
+def test_a_verdict_that_values_can_be_used_names_what_speaks_against_it(u, named):
+    """0.1 deg of latitude are 12 sigma, and the mean NIS shows nothing: the message does."""
+    result, codes = calibrated(with_latitude(PLAIN, 40.0, u), recorded(with_latitude(PLAIN, 40.1)))
+    off = np.abs((result.values - TRUTH[:18]) / result.u).max()
+    assert result.status is Status.OK
+    assert codes == ["site_suspect"] * named
+    assert result.message.endswith("but see site_suspect: values may be off by more than their u") == named
+    assert (off > 5.0) == named
