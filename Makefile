@@ -26,6 +26,7 @@ bench: .venv/dev/installed
 	$(DEV)/python benchmarks/allan.py
 	$(DEV)/python benchmarks/streaming.py
 	$(DEV)/python benchmarks/selfcal_filters.py
+	$(DEV)/python benchmarks/selfcal_command.py
 	$(DEV)/python benchmarks/selfcal_coverage.py --runs 1000
 
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network.
