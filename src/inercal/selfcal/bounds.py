@@ -35,6 +35,10 @@ SOURCES: Final = ("angle random walk", "accelerometer", "encoder", "prior")
 """Where the errors of an estimate come from, in the order of `Bounds.contributions`."""
 
 
+#: parts of accelerometer and encoder; an array, for numba compiles a kernel anew for each literal number
+_PARTS: Final = np.array([2, 3])
+
+
 @dataclass(frozen=True, eq=False)
 class Bounds:
     """What a path can tell.
@@ -257,12 +261,12 @@ def riccati(
                     for i in range(3):
                         for j in range(i + 1):
                             places[j], row[j] = j, roots[i][j]
-                        observe(P, places, row, i + 1, 1.0, 3, work)
+                        observe(P, places, row, i + 1, 1.0, _PARTS[1], work)
                 f = specific_force(at, up_e)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
                         count = accelerometer_row(i, f, c, up_e, at, places, row)
-                        observe(P, places, row, count, sigmas[1] * sigmas[1], 2, work)
+                        observe(P, places, row, count, sigmas[1] * sigmas[1], _PARTS[0], work)
         if len(u) > 0:
             for i in range(p):
                 u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

@@ -36,13 +36,18 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 @kernel
-def turned_by_beta(v: Vector, q: Quaternion, c: Array, k: int) -> Vector:
-    """Change of a vector of the base, in p at attitude ``q``, per change of component ``k`` of beta.
+def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Rows:
+    """Changes of a vector of the base, in p at attitude ``q``, per change of each component of beta.
 
     ``v`` (3,) is the vector in the frame of the encoders, turned by beta already.
     """
     j = right_jacobian((-c[21], -c[22], -c[23]))
-    return rotate((q[0], -q[1], -q[2], -q[3]), cross((j[0][k], j[1][k], j[2][k]), v))
+    back = (q[0], -q[1], -q[2], -q[3])
+    return (
+        rotate(back, cross((j[0][0], j[1][0], j[2][0]), v)),
+        rotate(back, cross((j[0][1], j[1][1], j[2][1]), v)),
+        rotate(back, cross((j[0][2], j[1][2], j[2][2]), v)),
+    )
 
 
 @kernel
@@ -75,14 +80,9 @@ def propagate_covariance(
     back = exp((-rate[0] * dt, -rate[1] * dt, -rate[2] * dt))
     a0, a1, a2 = rotate(back, (1.0, 0.0, 0.0)), rotate(back, (0.0, 1.0, 0.0)), rotate(back, (0.0, 0.0, 1.0))
     extended = n > 21
+    b0 = b1 = b2 = (0.0, 0.0, 0.0)
     if extended:
-        b0, b1, b2 = (
-            turned_by_beta(earth, q, c, 0),
-            turned_by_beta(earth, q, c, 1),
-            turned_by_beta(earth, q, c, 2),
-        )
-    else:
-        b0 = b1 = b2 = (0.0, 0.0, 0.0)
+        b0, b1, b2 = turned_by_beta(earth, q, c)
     for m in range(n):
         # change of the platform's rate, about each axis
         x = P[3, m] + w[1] * P[9, m] - w[2] * P[12, m]
@@ -148,10 +148,10 @@ def accelerometer_row(
         places[6], row[6] = 8, -f[1]
         count = 7
     if len(c) > 18:
+        by_beta = turned_by_beta(up, q, c)
         for k in range(3):
-            by_beta = turned_by_beta(up, q, c, k)
             places[count] = 24 + k
-            row[count] = gx * by_beta[0] + gy * by_beta[1] + gz * by_beta[2]
+            row[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
             count += 1
     return count
 
