@@ -1,0 +1,76 @@
+"""The compiled filters: cached for the next process, and the same as what their source says in plain Python."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import inercal.selfcal
+
+RUN = """
+import json, sys
+import numpy as np
+from paper_study import study
+from inercal.selfcal import bounds, error_state, gimbal, multiplicative, quaternion
+from inercal.selfcal.bounds import recorded_bounds
+from inercal.selfcal.filtered import problem
+from inercal.selfcal.filtering import estimate
+from inercal.selfcal.plan import Plan, Turn
+from inercal.selfcal.settings import Filter
+from inercal.selfcal.simulate import experiment, simulate
+
+found = {}
+for extended in (False, True):
+    settings = study(plan=Plan((Turn("z", 0.05), Turn("x", 0.05))), filter=Filter(extended=extended))
+    recording = simulate(experiment(settings), np.random.default_rng(4)).recording
+    of = problem(settings)
+    for kind in ("error-state", "mukf", "svd-qukf", "gimbal-ukf"):
+        got = estimate(recording, of, kind)
+        u = np.sqrt(np.diag(got.covariance))
+        found[f"{kind} {extended}"] = [*(got.coefficients / of.prior), *(u / of.prior), got.nis_mean]
+    path = recorded_bounds(recording, of, got.history.attitude, got.coefficients, contributions=True)
+    found[f"bounds {extended}"] = [*(path.u / of.prior)]
+kernels = [bounds.riccati, *(each._advance for each in (error_state, gimbal, multiplicative, quaternion))]
+missed = sum(sum(each.stats.cache_misses.values()) for each in kernels) if hasattr(kernels[0], "stats") else None
+print(json.dumps({"found": found, "missed": missed}))
+"""
+
+
+def ran(**environment):
+    """What a new process finds on a short path with all recursive filters and the bounds."""
+    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.selfcal.__file__)))
+    studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
+    paths = os.pathsep.join([package, studies])
+    done = subprocess.run(
+        [sys.executable, "-c", RUN],
+        env=os.environ | {"PYTHONPATH": paths} | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    """The first process compiles what is not yet cached."""
+    return ran()
+
+
+def test_a_second_process_compiles_no_filter(compiled):
+    """A kernel that depends on anything of its process would be compiled in each."""
+    again = ran()
+    assert again["missed"] == 0
+    assert again["found"] == compiled["found"]
+
+
+def test_kernels_say_the_same_as_plain_python(compiled):
+    """Without compiling: apart by rounding alone, 1e-9 of the prior."""
+    plain = ran(NUMBA_DISABLE_JIT="1")
+    assert plain["missed"] is None
+    for name, numbers in compiled["found"].items():
+        np.testing.assert_allclose(numbers, plain["found"][name], rtol=1e-6, atol=1e-9, err_msg=name)
