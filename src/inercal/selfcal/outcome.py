@@ -139,8 +139,9 @@ def assemble(
     of_site, exact = stated(recording, settings, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
     covariance, _, budget = combine(names(p), sources)
-    # all noises are judged by one set of innovations
-    effective = max(dof, 1.0) * np.square(np.diag(covariance) / np.diag(by_filter))
+    # all noises are judged by one set of innovations; their parts add up to them but for rounding
+    more = np.square(np.diag(covariance) / np.diag(by_filter))
+    effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
     u = np.sqrt(np.diag(covariance))
 
     judged = seen(replace(bounds, covariance=by_filter), settings.goal)
