@@ -273,6 +273,36 @@ def test_interrupted(simulated):
     assert not out.exists()
 
 
+@pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
+def test_interrupted_while_a_text_is_executed():
+    """As when a dataclass is made on import: Python may remember the interrupt, and die of it at its end."""
+    program = (
+        "import inercal.cli, inercal.cli.tree as tree\n"
+        "def call(arguments): exec('raise KeyboardInterrupt')\n"
+        "tree.call = call\n"
+        "inercal.cli.main([])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "inercal: interrupted\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
+def test_interrupted_while_a_library_is_loaded():
+    """A library that is interrupted while it is loaded may say that it could not be imported."""
+    program = (
+        "import os, signal, inercal.cli, inercal.cli.tree as tree\n"
+        "def call(arguments):\n"
+        "    try:\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "    except KeyboardInterrupt:\n"
+        "        raise ImportError('initialization failed') from None\n"
+        "tree.call = call\n"
+        "inercal.cli.main([])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "inercal: interrupted\n")
+
+
 def test_an_untouched_template_calibrates(simulated, capsys):
     """The study that `new` writes is a study: gravity then is uncertain by what it is over the Earth."""
     (simulated / "imu.toml").write_text(imu_template(), "utf-8")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 import time
 import warnings
+from types import FrameType
 
 from inercal.errors import InercalError
 
@@ -14,6 +16,8 @@ from inercal.errors import InercalError
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _STARTED = time.perf_counter()
+
+_ASKED: list[bool] = []  # not empty once the user has interrupted
 
 EXIT_BAD_VERDICT = 1
 EXIT_BAD_INPUT = 2
@@ -33,7 +37,19 @@ def process_age() -> float:
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 interrupted."""
     gc.set_threshold(50_000, 20, 20)  # loading and drawing make many objects that stay: a tenth of the time
-    sys.exit(run(arguments))
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
+    code = run(arguments)
+    if code == EXIT_INTERRUPTED and hasattr(signal, "pthread_sigmask"):
+        # an interrupt within `exec` of a text, as in a dataclass being made, is sent once more by Python at its end
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    sys.exit(code)
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> None:
+    """Interrupt as Python does, and remember it."""
+    _ASKED.append(True)
+    raise KeyboardInterrupt
 
 
 def run(arguments: list[str] | None = None) -> int:
@@ -61,6 +77,9 @@ def run(arguments: list[str] | None = None) -> int:
     except OSError as error:
         problem = f"{error.filename or 'standard output'}: {error.strerror or error}"
     except Exception as error:
+        if _ASKED and isinstance(error, ImportError):  # what a library makes of it while loaded
+            _say("interrupted")
+            return EXIT_INTERRUPTED
         if os.environ.get("INERCAL_DEBUG"):
             raise
         problem = (
