@@ -10,7 +10,15 @@ from scipy.linalg import cholesky_banded
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from inercal.geometry.rotations import boxminus, boxplus, exp, log, multiply
+from inercal.geometry.rotations import (
+    boxminus,
+    boxplus,
+    exp,
+    inverse_left_jacobian,
+    log,
+    multiply,
+    right_jacobian,
+)
 from inercal.selfcal.batch import _terms, estimate_map, inverse_diagonal
 from inercal.selfcal.bounds import bounds
 from inercal.selfcal.coefficients import product_slope, to_linear
@@ -19,9 +27,7 @@ from inercal.selfcal.filtering import estimate
 from inercal.selfcal.plan import path
 from inercal.selfcal.residuals import (
     first_reading,
-    inverse_left_jacobian,
     readings,
-    right_jacobian,
     sensed,
     turns,
 )

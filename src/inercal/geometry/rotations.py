@@ -27,6 +27,8 @@ Axis: TypeAlias = Literal["x", "y", "z"]
 SMALL_ANGLE = 1e-3
 # How far C C^T may be from the identity, and still be taken for a rotation.
 ORTHOGONALITY = 1e-6
+# Below it, the series of `right_jacobian` is exact to double precision.
+_SMALL_TURN = 1e-2
 
 
 def multiply(p_ab: ArrayLike, q_bc: ArrayLike) -> Array:
@@ -285,6 +287,24 @@ def boxplus(q_ab: ArrayLike, delta_b: ArrayLike) -> Array:
 def boxminus(p_ab: ArrayLike, q_ab: ArrayLike) -> Array:
     """Shortest ``delta_b`` ``(*batch, 3)`` [rad] with ``boxplus(q_ab, delta_b) == p_ab``."""
     return log(multiply(conjugate(q_ab), p_ab))
+
+
+def right_jacobian(rotvec: ArrayLike) -> Array:
+    """(*batch, 3, 3) J with ``exp(rotvec + d) = exp(rotvec) exp(J d)`` to first order (Sola 2017, eq. (183))."""
+    rotvec = np.asarray(rotvec, dtype=float)
+    angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
+    small = angle < _SMALL_TURN
+    safe = np.where(small, 1.0, angle)
+    cubic = np.where(
+        small, 1.0 / 6.0 - angle**2 * (1.0 / 120.0 - angle**2 / 5040.0), (safe - np.sin(safe)) / safe**3
+    )
+    cross = skew(rotvec)
+    return np.asarray(np.eye(3) - 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * cross + cubic * cross @ cross)
+
+
+def inverse_left_jacobian(rotvec: ArrayLike) -> Array:
+    """(*batch, 3, 3) K with ``log(exp(d) exp(rotvec)) = rotvec + K d`` to first order; K^T if d stands to the right."""
+    return np.asarray(np.linalg.inv(right_jacobian(-np.asarray(rotvec, dtype=float))))
 
 
 def step(q_nb: ArrayLike, omega_b: ArrayLike, dt: ArrayLike) -> Array:

@@ -21,7 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
-from inercal.geometry.rotations import boxminus, boxplus, conjugate, exp, multiply, normalize, to_matrix
+from inercal.geometry.rotations import (
+    boxminus,
+    boxplus,
+    conjugate,
+    exp,
+    inverse_left_jacobian,
+    multiply,
+    normalize,
+    right_jacobian,
+    to_matrix,
+)
 from inercal.selfcal.filtered import Filtered, History, Problem, Start
 from inercal.selfcal.gaps import broken
 from inercal.selfcal.recording import Recording
@@ -30,12 +40,10 @@ from inercal.selfcal.residuals import (
     Sensed,
     first_reading,
     followed,
-    inverse_left_jacobian,
     least_cosine,
     normalised,
     on_base,
     readings,
-    right_jacobian,
     sensed,
     turns,
 )

@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.estimate.factor import NEGATIVE
 from inercal.selfcal.filtered import Filtered, History, Problem, Start, State, Trace, attitude_of, known_in
 from inercal.selfcal.gaps import advance
 from inercal.selfcal.recording import Recording
@@ -19,9 +20,6 @@ Array = NDArray[np.float64]
 
 LOCK = 0.01
 """Least |cos thy| at which the gimbal angles of a model can still be used."""
-
-LOST = -1e-9
-"""Eigenvalue of a correlation matrix below which a covariance has lost its sign by more than rounding."""
 
 
 def recursive(kind: FilterKind) -> ModuleType | None:
@@ -126,7 +124,7 @@ def _fault(found: Filtered) -> str:
     if not all(np.isfinite(each).all() for each in numbers):
         at = " where the gimbals lock" if found.gimbal_cosine < LOCK else ""
         return f"the filter diverged{at}: coefficients or covariance are not finite"
-    if not (variances > 0.0).all() or found.lowest_eigenvalue < LOST:
+    if not (variances > 0.0).all() or found.lowest_eigenvalue < NEGATIVE:
         return (
             "the covariance lost its positive sign (lowest eigenvalue of the correlation matrix "
             f"{found.lowest_eigenvalue:.1e}): use another filter or factor"

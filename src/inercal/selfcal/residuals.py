@@ -13,7 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.geometry.kernels import integrate
-from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate, skew, to_matrix
+from inercal.geometry.rotations import (
+    boxminus,
+    conjugate,
+    exp,
+    inverse_left_jacobian,
+    multiply,
+    right_jacobian,
+    rotate,
+    skew,
+    to_matrix,
+)
 from inercal.selfcal.coefficients import BETA, KA0, KA1, KG0, KG1
 from inercal.selfcal.filtered import Problem, Start
 from inercal.selfcal.gating import admitted, gate_of, updating, watch
@@ -22,9 +32,6 @@ from inercal.selfcal.recording import Recording
 from inercal.selfcal.rig import World
 
 Array = NDArray[np.float64]
-
-# Below it the series used here is exact to double precision.
-_SMALL_ANGLE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,20 +205,3 @@ def followed(q0: Array, turn: Array) -> Array:
     out = np.empty((len(turn) + 1, 4))
     integrate(q0, turn, np.ones(len(turn)), out)
     return out
-
-
-def right_jacobian(rotvec: Array) -> Array:
-    """(*batch, 3, 3) J with ``exp(rotvec + d) = exp(rotvec) exp(J d)`` to first order (Sola 2017, eq. (183))."""
-    angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
-    small = angle < _SMALL_ANGLE
-    safe = np.where(small, 1.0, angle)
-    cubic = np.where(
-        small, 1.0 / 6.0 - angle**2 * (1.0 / 120.0 - angle**2 / 5040.0), (safe - np.sin(safe)) / safe**3
-    )
-    cross = skew(rotvec)
-    return np.asarray(np.eye(3) - 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * cross + cubic * cross @ cross)
-
-
-def inverse_left_jacobian(rotvec: Array) -> Array:
-    """(*batch, 3, 3) K with ``log(exp(d) exp(rotvec)) = rotvec + K d`` to first order; K^T if d stands to the right."""
-    return np.asarray(np.linalg.inv(right_jacobian(-rotvec)))

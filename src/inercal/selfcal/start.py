@@ -29,7 +29,9 @@ from inercal.geometry.rotations import (
     conjugate,
     exp,
     from_matrix,
+    inverse_left_jacobian,
     multiply,
+    right_jacobian,
     rotate,
     to_matrix,
 )
@@ -42,12 +44,10 @@ from inercal.selfcal.residuals import (
     Sensed,
     first_reading,
     followed,
-    inverse_left_jacobian,
     least_cosine,
     normalised,
     on_base,
     readings,
-    right_jacobian,
     sensed,
     turns,
 )
