@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, PRIOR, TRUTH, study
 
+from inercal.estimate.factor import NEGATIVE
 from inercal.geometry.rotations import boxminus, boxplus
 from inercal.selfcal import quaternion
 from inercal.selfcal.bounds import bounds
 from inercal.selfcal.campaign import campaign
 from inercal.selfcal.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import LOST, estimate
+from inercal.selfcal.filtering import estimate
 from inercal.selfcal.kinematics import attitude
 from inercal.selfcal.observability import gating_costs
 from inercal.selfcal.pathdesign import at_rest, with_stops
@@ -322,7 +323,7 @@ def test_an_indefinite_covariance():
     assert of_end.nis.mean() == pytest.approx(of_sound.nis.mean(), abs=0.01)
     u = np.sqrt(np.diag(sound.covariance)[4:])
     assert 1.5 < np.max(np.abs(end.coefficients - sound.coefficients) / u) < 2.2
-    assert ends["told"][1].lowest_eigenvalue < LOST
+    assert ends["told"][1].lowest_eigenvalue < NEGATIVE
 
 
 # Times
