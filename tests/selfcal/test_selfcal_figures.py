@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from paper_study import ARCSEC, MICRO_G, PER_HOUR, PRIOR, TRUTH, study
 
@@ -373,6 +373,8 @@ def test_nothing_measured_has_no_nis():
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e9))
+@example(0.5, 999999999.0)
+@example(0.0, 2.0 * np.nextafter(0.1, 0.0))
 def test_ticks_are_few_and_inside(low, span):
     cell = Cell(0.0, 0.0, 1.0, 1.0, (0.0, 1.0), (low, low + span))
     if cell.y[1] - cell.y[0] < 1e-9 * abs(low):

@@ -81,7 +81,8 @@ def _round_numbers(low: float, high: float, fewest: int) -> list[float]:
         return [low]
     finest = (high - low) / fewest
     power = 10.0 ** np.floor(np.log10(finest))
-    step = power * max(size for size in (1.0, 2.0, 5.0) if size * power <= finest * (1.0 + 1e-9))
+    # half of a power that the logarithm rounded up to
+    step = power * max((size for size in (1.0, 2.0, 5.0) if size * power <= finest), default=0.5)
     return [float(k * step) + 0.0 for k in np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)]
 
 
