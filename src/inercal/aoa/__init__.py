@@ -1,0 +1,1 @@
+"""Inertial angle of attack: three accelerometers and a gyro in a wind-tunnel model."""

@@ -1,0 +1,108 @@
+"""The fusion of a whole recording: angles with their uncertainties, what was learned of the sensors, innovations."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.clock import later
+from inercal.aoa.fusion import State, advance, initial
+from inercal.aoa.problem import Problem
+from inercal.aoa.recording import Recording
+from inercal.aoa.recursion import OUTPUTS
+from inercal.aoa.smoother import smooth
+
+Array = NDArray[np.float64]
+
+SETTLED = 2.0
+"""Time [s] after the first row from which innovations are judged."""
+
+KEPT = 2000
+"""Rows, about, of which all states are kept for pictures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """What the fusion found.
+
+    Attributes
+    ----------
+    theta, u, rate, rate_u, acceleration : (n,)
+        Angle, its standard uncertainty [rad], rate, its standard uncertainty [rad/s], and acceleration [rad/s^2], at
+        each row of the recording, causal or ``smoothed``; NaN in rows that were left out.
+    innovations : (n, N + 1)
+        Of accelerometers and gyro, of the causal filter, each over its standard deviation before the gate; NaN where
+        not measured.
+    kept_t : (k,) s
+        Times at which all states were kept, ``states`` (k, m) and their standard deviations ``states_u`` (k, m), in the
+        order of the problem's names; causal or smoothed as the angles.
+    state : State
+        Of the causal filter at the end: what it learned of the sensors.
+    nis_mean : float
+        Mean of the squared innovations after the first 2 s; NaN without any.
+    starts : tuple of int
+        Rows at which the filter started: one, and more where the angle was lost.
+    seconds : float
+        Time of the computation alone.
+    """
+
+    theta: Array
+    u: Array
+    rate: Array
+    rate_u: Array
+    acceleration: Array
+    innovations: Array
+    kept_t: Array
+    states: Array
+    states_u: Array
+    state: State
+    nis_mean: float
+    starts: tuple[int, ...]
+    smoothed: bool
+    seconds: float
+
+
+def estimate(recording: Recording, problem: Problem, smoothed: bool = False, where: object = "t") -> Filtered:
+    """Angles of a recording, causal or from all of it.
+
+    Raises
+    ------
+    RecordError
+        Time does not go on.
+    """
+    clock = time.perf_counter()
+    taken = later(recording.t, where=where)
+    t, rows = recording.t[taken], recording.rows[taken]
+    every = max(1, len(t) // KEPT)
+    kept = np.full(((len(t) + every - 1) // every, 2 * problem.size), np.nan)
+    state, trace = advance(initial(problem), problem, t, rows, kept, every, last=True)
+    angles = trace.out[:, :OUTPUTS]
+    if smoothed:
+        kept[:] = np.nan
+        angles = smooth(problem, t, rows, trace.starts, kept, every)
+    n = len(recording.t)
+    told, innovations = np.full((n, OUTPUTS), np.nan), np.full((n, problem.count + 1), np.nan)
+    told[taken], innovations[taken] = angles, trace.out[:, OUTPUTS:]
+    seconds = time.perf_counter() - clock
+    judged = innovations[taken][t - t[0] >= SETTLED] if len(t) else innovations
+    squared = np.square(judged[np.isfinite(judged)])
+    m = problem.size
+    return Filtered(
+        theta=told[:, 0],
+        u=told[:, 1],
+        rate=told[:, 2],
+        rate_u=told[:, 3],
+        acceleration=told[:, 4],
+        innovations=innovations,
+        kept_t=t[::every],
+        states=kept[:, :m],
+        states_u=kept[:, m:],
+        state=state,
+        nis_mean=float(squared.mean()) if squared.size else float("nan"),
+        starts=tuple(int(taken[each.row]) for each in trace.starts),
+        smoothed=smoothed,
+        seconds=seconds,
+    )

@@ -1,0 +1,203 @@
+"""The causal fusion, row by row or in blocks: the same digits either way.
+
+The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
+as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors.
+Rows must be later than those before them: `inercal.aoa.clock` leaves out those that are not.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa import recursion
+from inercal.aoa.model import GRAVITY, GYRO_BIAS, RESONATORS, ROLL, ROLL_COSINE
+from inercal.aoa.problem import START, Problem
+from inercal.aoa.recursion import BESIDE, OUTPUTS
+
+Array = NDArray[np.float64]
+
+HELD = 20
+"""Rows from which the filter starts."""
+
+_ACROSS = 0.1
+"""Cosine of the roll below which the accelerometers across the body and the gyro do not show pitch."""
+
+_NO_ARM = 1e-3
+"""Lever arm [m] below which accelerometers do not show angular acceleration."""
+
+
+class State(NamedTuple):
+    """What the filter knows between two rows.
+
+    ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (2,) [rad/s] the last roll and yaw rates; ``t``
+    [s] of the last row, -inf before the first; ``started``: the filter runs. Until it does ``held`` (k, N + 6) are the
+    rows that wait, time first.
+    """
+
+    x: Array
+    P: Array
+    turns: Array
+    t: float
+    started: bool
+    held: Array
+
+
+class Start(NamedTuple):
+    """Where the filter started: the row, counted in the trace, and its state before that row's update."""
+
+    row: int
+    x: Array
+    P: Array
+    turns: Array
+
+
+class Trace(NamedTuple):
+    """What the filter says of m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.recursion.advance`, and where it
+    ``starts`` in them."""
+
+    out: Array
+    starts: tuple[Start, ...]
+
+
+def initial(problem: Problem) -> State:
+    """Before the first row."""
+    none = np.empty((0, problem.count + BESIDE + 1))
+    return State(problem.mean.copy(), problem.covariance.copy(), np.zeros(2), -math.inf, False, none)
+
+
+def advance(
+    state: State,
+    problem: Problem,
+    t: Array,
+    rows: Array,
+    kept: Array | None = None,
+    every: int = 1,
+    last: bool = False,
+) -> tuple[State, Trace]:
+    """Go on by rows at the times ``t`` (m,) [s], increasing; ``rows`` (m, N + 5) as of `inercal.aoa.recursion.advance`.
+
+    The state handed in is used up. Rows that are held have no row in the trace yet: it comes with a later block, or at
+    the end, which ``last`` says. ``kept`` receives states and their standard deviations at each ``every``-th row of the
+    trace.
+    """
+    if kept is None:
+        kept = np.empty((0, 2 * problem.size))
+    if len(state.held):
+        t, rows = np.append(state.held[:, 0], t), np.vstack([state.held[:, 1:], rows])
+    rows = np.ascontiguousarray(rows)
+    m, at = len(t), 0
+    out = np.full((m, OUTPUTS + problem.count + 1), np.nan)
+    x, P, turns, before, running, _ = state
+    starts = []
+    while at < m:
+        if not running:
+            end = min(at + HELD, m)
+            if end - at < HELD and not last:
+                break
+            running = start(x, P, turns, problem, t[at:end], rows[at:end])
+            if not running:
+                at, before = end, float(t[end - 1])
+                continue
+            starts.append(Start(at, x.copy(), P.copy(), turns.copy()))
+            before = float(t[at])
+        dt = np.diff(t[at:], prepend=before)
+        at += recursion.advance(
+            x,
+            P,
+            turns,
+            dt,
+            rows[at:],
+            problem.geometry,
+            problem.places,
+            problem.constants,
+            out[at:],
+            kept,
+            every,
+            at,
+        )
+        running = at == m
+        before = float(t[at - 1]) if at else before
+    held = np.column_stack([t[at:], rows[at:]])
+    return State(x, P, turns, before, running, held), Trace(out[:at], tuple(starts))
+
+
+def moving_states(problem: Problem) -> list[int]:
+    """Places of the states that a start knows nothing of: motion, and flexure of the sting."""
+    flexure = problem.places[RESONATORS]
+    return [0, 1, 2, 3, *(range(flexure, flexure + 4) if flexure >= 0 else ())]
+
+
+def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array) -> bool:
+    """Put motion into ``x`` and ``P`` as a few rows tell it at the first of them; False where they tell no angle.
+
+    Theta is that which fits the medians of the accelerometers best, the rate the gyro's or, without one, that at which
+    theta changes, and the acceleration what is left over (Tan et al. with three axes: atan2(A2, (A3 - A1)/2) and
+    (A1 + A3)/(r3 - r1)). What else is known stays.
+    """
+    n, spatial = problem.count, problem.spatial
+    level = math.cos(x[problem.places[ROLL]]) if spatial else problem.constants[ROLL_COSINE]
+    middle = _medians(rows)
+    seen = np.flatnonzero(np.isfinite(middle[:n]))
+    if not problem.layout.of(*seen).spans:
+        return False
+    cosine, sine, r, z = problem.geometry[seen].T
+    axes = np.stack([cosine, -sine], axis=-1)
+    if math.isfinite(middle[n]) and abs(level) > _ACROSS:
+        rate = (middle[n] - x[GYRO_BIAS]) / level
+    else:
+        rate = _slope(
+            t, np.array([_angle(_fit(axes, row), level, problem) for row in rows[:, seen] - x[5 + seen]])
+        )
+    # A = (g sin theta - r w^2) cos lambda - level (g cos theta - level z w^2) sin lambda + arm al
+    read = middle[seen] - x[5 + seen] + rate**2 * (cosine * r - sine * level**2 * z)
+    arms = -level * (z * cosine + r * sine)
+    arms = arms - axes @ _fit(axes, arms)
+    power = float(arms @ arms)
+    acceleration = float(arms @ read) / power if power > _NO_ARM**2 else 0.0
+    x[:4] = _angle(_fit(axes, read), level, problem), rate, acceleration, 0.0
+    x[0] -= 0.5 * rate * (t[-1] - t[0])
+    moving = moving_states(problem)
+    P[moving, :] = 0.0
+    P[:, moving] = 0.0
+    P[[0, 1, 2, 3], [0, 1, 2, 3]] = START**2
+    for k in moving[4:]:
+        x[k], P[k, k] = 0.0, problem.covariance[k, k]
+    for k in range(2):
+        if math.isfinite(middle[n + 3 + k]):
+            turns[k] = middle[n + 3 + k]
+    return True
+
+
+def _medians(rows: Array) -> Array:
+    """Medians of the columns; NaN of those without a number."""
+    known = np.isfinite(rows)
+    return np.array([np.median(c[k]) if k.any() else math.nan for c, k in zip(rows.T, known.T, strict=True)])
+
+
+def _fit(axes: Array, read: Array) -> Array:
+    """Forward and upward specific force (2,) that fit readings along axes best; NaN where one is missing."""
+    if not np.isfinite(read).all():
+        return np.full(2, np.nan)
+    return np.asarray(np.linalg.lstsq(axes, read, rcond=None)[0])
+
+
+def _angle(force: Array, level: float, problem: Problem) -> float:
+    """Theta that forward and upward specific force (2,) show at rest."""
+    forward, up = force.tolist()
+    if abs(level) > _ACROSS:
+        return math.atan2(forward, up / level)
+    g = problem.constants[GRAVITY]
+    return math.asin(min(1.0, max(-1.0, forward / g)))
+
+
+def _slope(t: Array, angles: Array) -> float:
+    """Rate [rad/s] of angles, 0 where there are not three."""
+    known = np.isfinite(angles)
+    if known.sum() < 3:
+        return 0.0
+    t, angles = t[known] - t[known].mean(), np.unwrap(angles[known])
+    return float(t @ angles / (t @ t))

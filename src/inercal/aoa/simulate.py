@@ -1,0 +1,177 @@
+"""A simulated recording of a wind-tunnel model on its sting, with what real ones add."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.motion import course, duration, oscillation, point_numbers, shaking
+from inercal.aoa.recording import Recording
+from inercal.aoa.settings import AoaSettings, Disturbances, Noise
+from inercal.errors import StudyError
+from inercal.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+_MARGIN = 1.0
+"""Time [s] before the first sample from which sensors of limited bandwidth follow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A ``recording`` and its truth: the angle ``theta`` (n,) [rad], its ``rate`` [rad/s] and ``acceleration``
+    [rad/s^2] at the stamps, and the ``errors`` of the sensors by name, as `inercal.aoa.problem` names them."""
+
+    recording: Recording
+    theta: Array
+    rate: Array
+    acceleration: Array
+    errors: Mapping[str, float]
+
+
+def drawn(noise: Noise, count: int, rng: np.random.Generator) -> dict[str, float]:
+    """Biases of ``count`` accelerometers and of the gyros: half the variance of the former in common."""
+    common, *own = math.sqrt(0.5) * noise.accelerometer_bias * rng.standard_normal(count + 1)
+    biases = {f"b_{k}": float(common + each) for k, each in enumerate(own, start=1)}
+    of_gyros = noise.gyro_bias * rng.standard_normal(3)
+    return biases | dict(zip(("b_g", "b_roll", "b_yaw"), map(float, of_gyros), strict=True))
+
+
+def simulate(
+    settings: AoaSettings, rng: np.random.Generator, errors: Mapping[str, float] | None = None
+) -> Simulated:
+    """Move the model once as the study plans.
+
+    ``errors`` of the sensors by name are drawn from the study's noise where they are not given; those of the study's
+    disturbances (pivot, heights, gyro scale and delay) are added to them.
+
+    Raises
+    ------
+    StudyError
+        The study has no motion.
+    """
+    plan, other, layout = settings.motion, settings.disturbances, settings.layout
+    if plan is None:
+        raise StudyError("motion", "missing, expected the motion to be simulated")
+    n = len(layout.names)
+    truth = drawn(settings.noise, n, rng) if errors is None else dict(errors)
+    for k in range(n):
+        truth[f"dr_{k + 1}"] = truth.get(f"dr_{k + 1}", 0.0) + other.pivot
+        height = other.heights[k] if k < len(other.heights) else 0.0
+        truth[f"zo_{k + 1}"] = truth.get(f"zo_{k + 1}", 0.0) + height
+    truth["k_g"] = truth.get("k_g", 0.0) + other.gyro_scale
+    truth["tau_g"] = truth.get("tau_g", 0.0) + other.gyro_delay
+    pitch = course(plan, rng)
+    flexure = [shaking(each, rng) for each in (other.pitch, other.heave, other.axial)]
+    step = 1.0 / plan.sample_rate
+    t = step * np.arange(round(duration(plan) / step), dtype=float)
+    before = round(_MARGIN / step) if math.isfinite(other.bandwidth) else 0
+    longer = step * np.arange(-before, len(t), dtype=float)
+
+    def moved(at: Array) -> tuple[Array, Array, Array]:
+        parts = (pitch(at), flexure[0](at))
+        theta, rate, acceleration = (a + b for a, b in zip(*parts, strict=True))
+        return theta, rate, acceleration
+
+    body = _Body(settings, truth)
+    late = longer - other.common_delay
+    read = body.accelerometers(late, *moved(late), flexure[1](late)[0], flexure[2](late)[0])
+    later = late - truth["tau_g"]
+    gyros = body.gyros(later, *moved(later))
+    values = np.column_stack([read, *gyros])
+    values = _limited(values, other, step)[before:]
+    noise = np.array([settings.noise.accelerometer] * n + [settings.noise.gyro] * 3)
+    values += noise * rng.standard_normal(values.shape)
+    values = _spoiled(values, settings, rng)
+    theta, rate, acceleration = moved(t)
+    spatial = other.roll is not None or other.yaw is not None
+    turns = values[:, n + 1 :] if spatial else np.full((len(t), 2), np.nan)
+    recording = Recording(
+        t=t,
+        acc=values[:, :n].copy(),
+        gyro=values[:, n].copy(),
+        turns=turns.copy(),
+        stated=np.full((len(t), 2), np.nan),
+        point=point_numbers(plan, t),
+        reference=theta,
+    )
+    return Simulated(recording, theta, rate, acceleration, truth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """The rigid model with its sensors, as they truly are."""
+
+    settings: AoaSettings
+    errors: Mapping[str, float]
+
+    def turning(self, t: Array, theta: Array, rate: Array, acceleration: Array) -> tuple[Array, ...]:
+        """Roll phi, body rates about x, nose-up, and about z, and the nose-up acceleration.
+
+        Yaw psi about the vertical first, then pitch, then roll:
+
+            p = phi' + psi' sin theta
+            w = theta' cos phi - psi' cos theta sin phi
+            y = theta' sin phi + psi' cos theta cos phi
+        """
+        other, stated = self.settings.disturbances, self.settings.attitude.roll
+        phi, phi1, _ = oscillation(other.roll)(t)
+        phi = phi + (0.0 if stated is None else stated.value)
+        _, psi1, psi2 = oscillation(other.yaw)(t)
+        s, c, sp, cp = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)
+        p, w, y = phi1 + psi1 * s, rate * cp - psi1 * c * sp, rate * sp + psi1 * c * cp
+        al = acceleration * cp - rate * sp * phi1 - psi2 * c * sp + psi1 * (s * rate * sp - c * cp * phi1)
+        return phi, p, w, y, al
+
+    def accelerometers(
+        self, t: Array, theta: Array, rate: Array, acceleration: Array, heave: Array, axial: Array
+    ) -> Array:
+        """(n, N) m/s^2, without noise."""
+        g, layout, errors = self.settings.site.gravity, self.settings.layout, self.errors
+        phi, p, w, y, al = self.turning(t, theta, rate, acceleration)
+        found = np.empty((len(t), len(layout.names)))
+        for k, angle in enumerate(layout.angle):
+            r, z = layout.r[k] + errors[f"dr_{k + 1}"], layout.z[k] + errors[f"zo_{k + 1}"]
+            fx = g * np.sin(theta) - r * (w**2 + y**2) - z * (al - p * y) + axial
+            fz = g * np.cos(theta) * np.cos(phi) + r * (al + p * y) - z * (w**2 + p**2) + heave
+            found[:, k] = fx * math.cos(angle) - fz * math.sin(angle) + errors.get(f"b_{k + 1}", 0.0)
+        return found
+
+    def gyros(self, t: Array, theta: Array, rate: Array, acceleration: Array) -> tuple[Array, Array, Array]:
+        """Nose-up, roll and yaw gyro, (n,) rad/s each, without noise."""
+        _, p, w, y, _ = self.turning(t, theta, rate, acceleration)
+        errors = self.errors
+        nose_up = (1.0 + errors["k_g"]) * w + errors.get("b_g", 0.0)
+        return nose_up, p + errors.get("b_roll", 0.0), y + errors.get("b_yaw", 0.0)
+
+
+def _limited(values: Array, other: Disturbances, step: float) -> Array:
+    """What sensors of limited bandwidth make of it."""
+    if math.isinf(other.bandwidth):
+        return values
+    from scipy.signal import lfilter
+
+    decay = math.exp(-2.0 * math.pi * other.bandwidth * step)
+    start = values[:1] * decay
+    return np.asarray(lfilter([1.0 - decay], [1.0, -decay], values, axis=0, zi=start)[0])
+
+
+def _spoiled(values: Array, settings: AoaSettings, rng: np.random.Generator) -> Array:
+    """Spikes, limited ranges and lost rows; the columns are accelerometers and three gyros."""
+    other, n = settings.disturbances, len(settings.layout.names)
+    if other.spikes > 0.0:
+        size = np.array([other.spike] * n + [other.spike / STANDARD_GRAVITY] * 3)
+        hit = rng.random(values.shape) < other.spikes
+        values = values + hit * size * rng.choice([-1.0, 1.0], values.shape)
+    if other.clip:
+        for k, name in enumerate((*settings.layout.names, "gyro", "gyro_roll", "gyro_yaw")):
+            limit = settings.calibration(name).range
+            if limit is not None:
+                values[:, k] = np.clip(values[:, k], -limit, limit)
+    if other.dropouts > 0.0:
+        values[rng.random(len(values)) < other.dropouts] = np.nan
+    return values
