@@ -28,6 +28,12 @@ Self-calibration: what a platform finds out about itself (`inercal.selfcal.coeff
     rate           w_Ip^p = w_c + M w_c + kg0, M from ds, do (kg1); w_c commanded, kg0 gyro bias
     accelerometers ka0 bias, ka1 scale error, eta misalignments pz, oy, oz; beta base against encoders
 
+Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.model`)
+    body           x forward, y left, z up, about the pivot; theta nose-up pitch, w = theta', phi roll right wing down
+    accelerometer  at (r, 0, z), lambda from +x towards -z: reads g sin(theta - lambda) at rest; gyro nose-up positive
+    errors         b_i, b_g biases; dr_i, zo_i of the positions; k_g gyro scale; tau_g gyro delay
+    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.aoa.flow`)
+
 Records: labelled columns (`inercal.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
     turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's; rate in a rate test
@@ -53,6 +59,9 @@ Map, lower floors first; each imports only from those above its own line
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     selfcal                    rig, plan, model, simulate; filters: error_state, multiplicative, quaternion, gimbal,
                                batch, start (behind filtering); bounds, pathdesign, diagnosis, outcome, campaign, task
+    aoa                        layout, motion, model, simulate; the fusion: recursion, smoother (behind filtered);
+                               the paper's ways: static, lever, frequency (behind methods); delay, points, flow,
+                               verification, diagnosis, outcome, task
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     study, report, examples    files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
@@ -62,6 +71,7 @@ Map, lower floors first; each imports only from those above its own line
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from inercal.aoa.task import measure as measure_angle_of_attack
     from inercal.estimate.exchange import load as load
     from inercal.estimate.result import Estimate as Estimate
     from inercal.imu.task import calibrate as calibrate_imu
@@ -82,6 +92,7 @@ _WHERE = {
     "calibrate_turntable": ("inercal.turntable.task", "calibrate"),
     "exact_sobol": ("inercal.sensitivity.exact", "analyse"),
     "load": ("inercal.estimate.exchange", "load"),
+    "measure_angle_of_attack": ("inercal.aoa.task", "measure"),
     "read": ("inercal.records.read", "read"),
 }
 
@@ -93,6 +104,7 @@ __all__ = [
     "calibrate_turntable",
     "exact_sobol",
     "load",
+    "measure_angle_of_attack",
     "read",
 ]
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.filtered import Filtered
+from inercal.aoa.flow import theta_u
+from inercal.aoa.settings import Attitude
 
 Array = NDArray[np.float64]
 
@@ -16,7 +18,9 @@ Array = NDArray[np.float64]
 class Angles:
     """What a ``method`` says at each of n rows, NaN where it says nothing.
 
-    ``theta`` pitch and its standard uncertainty ``u`` [rad]; ``rate`` and ``rate_u`` [rad/s].
+    ``theta`` pitch and its standard uncertainty ``u`` [rad]; ``rate`` and ``rate_u`` [rad/s]. ``roll`` and ``roll_u``
+    [rad] where gyros for roll and yaw track it. ``own_u`` is u without the part of a roll that is stated, where there
+    is such a part (`stated_roll`): what `inercal.aoa.flow.alpha_beta` takes.
     """
 
     method: str
@@ -24,9 +28,25 @@ class Angles:
     u: Array
     rate: Array
     rate_u: Array
+    roll: Array | None = None
+    roll_u: Array | None = None
+    own_u: Array | None = None
+
+    @property
+    def known_u(self) -> Array:
+        """(n,) rad, standard uncertainty of theta, were the stated roll exact."""
+        return self.u if self.own_u is None else self.own_u
 
 
 def of_fusion(filtered: Filtered, states: int) -> Angles:
     """The angles of the fusion with so many ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
     way = "smoothed" if filtered.smoothed else "fusion"
     return Angles(f"{way} {states}", filtered.theta, filtered.u, filtered.rate, filtered.rate_u)
+
+
+def stated_roll(angles: Angles, attitude: Attitude) -> Angles:
+    """The angles with the uncertainty of the roll that the study states in that of theta; as they are where none is
+    stated, it is exact, or gyros track it: then it is in u already."""
+    if attitude.roll is None or attitude.roll.u == 0.0 or angles.roll is not None:
+        return angles
+    return replace(angles, u=theta_u(angles.theta, angles.known_u, attitude), own_u=angles.known_u)

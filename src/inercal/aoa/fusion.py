@@ -47,12 +47,14 @@ class State(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where the filter started: the row, counted in the trace, and its state before that row's update."""
+    """Where the filter started: the row, counted in the trace, its state before that row's update, and the places of
+    states that are ``new`` then: they have nothing in common with those before."""
 
     row: int
     x: Array
     P: Array
     turns: Array
+    new: tuple[int, ...]
 
 
 class Trace(NamedTuple):
@@ -92,24 +94,23 @@ def advance(
     m, at = len(t), 0
     out = np.full((m, OUTPUTS + problem.count + 1), np.nan)
     x, P, turns, before, running, _ = state
-    starts = []
+    dt, starts = np.diff(t, prepend=before), []
     while at < m:
         if not running:
             end = min(at + HELD, m)
             if end - at < HELD and not last:
                 break
-            running = start(x, P, turns, problem, t[at:end], rows[at:end])
-            if not running:
-                at, before = end, float(t[end - 1])
+            new = unknown(P, problem)
+            if not start(x, P, turns, problem, t[at:end], rows[at:end], new):
+                at = end
                 continue
-            starts.append(Start(at, x.copy(), P.copy(), turns.copy()))
-            before = float(t[at])
-        dt = np.diff(t[at:], prepend=before)
-        at += recursion.advance(
+            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), new))
+            dt[at] = 0.0
+        done = recursion.advance(
             x,
             P,
             turns,
-            dt,
+            dt[at:],
             rows[at:],
             problem.geometry,
             problem.places,
@@ -119,26 +120,35 @@ def advance(
             every,
             at,
         )
-        running = at == m
-        before = float(t[at - 1]) if at else before
+        # what is lost in the row in which it started is no angle
+        at, running = (at + done, at + done == m) if done or running else (end, False)
+    before = float(t[at - 1]) if at else before
     held = np.column_stack([t[at:], rows[at:]])
     return State(x, P, turns, before, running, held), Trace(out[:at], tuple(starts))
 
 
-def moving_states(problem: Problem) -> list[int]:
-    """Places of the states that a start knows nothing of: motion, and flexure of the sting."""
-    flexure = problem.places[RESONATORS]
-    return [0, 1, 2, 3, *(range(flexure, flexure + 4) if flexure >= 0 else ())]
+def unknown(P: Array, problem: Problem) -> tuple[int, ...]:
+    """Places of the states that a start knows nothing of: motion, flexure of the sting, and roll if it is lost too."""
+    flexure, roll = problem.places[RESONATORS], problem.places[ROLL]
+    of_flexure = range(flexure, flexure + 4) if flexure >= 0 else ()
+    of_roll = (int(roll),) if roll >= 0 and not P[roll, roll] < recursion.LOST else ()
+    return (0, 1, 2, 3, *of_flexure, *of_roll)
 
 
-def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array) -> bool:
+def start(
+    x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array, new: tuple[int, ...]
+) -> bool:  # fmt: skip
     """Put motion into ``x`` and ``P`` as a few rows tell it at the first of them; False where they tell no angle.
 
     Theta is that which fits the medians of the accelerometers best, the rate the gyro's or, without one, that at which
     theta changes, and the acceleration what is left over (Tan et al. with three axes: atan2(A2, (A3 - A1)/2) and
-    (A1 + A3)/(r3 - r1)). What else is known stays.
+    (A1 + A3)/(r3 - r1)). Other states that are ``new`` are as in the prior. What else is known stays.
     """
     n, spatial = problem.count, problem.spatial
+    fresh = list(new[4:])
+    x[fresh] = problem.mean[fresh]
+    together = t - t[0] <= 3.0 * HELD * np.median(np.diff(t, prepend=t[0]))
+    t, rows = t[together], rows[together]
     level = math.cos(x[problem.places[ROLL]]) if spatial else problem.constants[ROLL_COSINE]
     middle = _medians(rows)
     seen = np.flatnonzero(np.isfinite(middle[:n]))
@@ -160,12 +170,10 @@ def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Ar
     acceleration = float(arms @ read) / power if power > _NO_ARM**2 else 0.0
     x[:4] = _angle(_fit(axes, read), level, problem), rate, acceleration, 0.0
     x[0] -= 0.5 * rate * (t[-1] - t[0])
-    moving = moving_states(problem)
-    P[moving, :] = 0.0
-    P[:, moving] = 0.0
+    P[new, :] = 0.0
+    P[:, new] = 0.0
     P[[0, 1, 2, 3], [0, 1, 2, 3]] = START**2
-    for k in moving[4:]:
-        x[k], P[k, k] = 0.0, problem.covariance[k, k]
+    P[fresh, fresh] = problem.covariance[fresh, fresh]
     for k in range(2):
         if math.isfinite(middle[n + 3 + k]):
             turns[k] = middle[n + 3 + k]

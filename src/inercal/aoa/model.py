@@ -35,11 +35,11 @@ from inercal._jit import kernel
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
 
-#: what `places` (11,) holds: number of accelerometers, of states, of those that move; then where a part of the state
-#: begins, -1 where it is not estimated
-COUNT, STATES, MOVING, LEVERS, RESONATORS, HEIGHTS, SCALE, DELAY, ROLL = range(9)
+#: what `places` holds: number of accelerometers, of states, of those that move, d; where a part of the state begins, -1
+#: where it is not estimated; and from `ROWS` on the places (d,) of the states that move, in their order
+COUNT, STATES, MOVING, LEVERS, RESONATORS, HEIGHTS, SCALE, DELAY, ROLL, ROWS = range(10)
 
-#: what `constants` (20,) holds
+#: what `constants` (16,) holds
 (
     GRAVITY, SNAP, NOISE, GYRO_NOISE, TURN_NOISE, GYRO_DELAY, COMMON_DELAY, COMMON_DELAY_U, ROLL_COSINE, GATE,
     Z_RATE, Z_DAMPING, Z_LEVEL, X_RATE, X_DAMPING, X_LEVEL,
@@ -48,8 +48,10 @@ COUNT, STATES, MOVING, LEVERS, RESONATORS, HEIGHTS, SCALE, DELAY, ROLL = range(9
 GYRO_BIAS = 4
 BIASES = 5
 
-WIDEST = 10
+WIDEST = 11
 """Most entries that a row of the model has."""
+
+_FACTORIAL = (1.0, 1.0, 2.0, 6.0)
 
 _NEAR_VERTICAL = 1e-4
 """What is added to cos^2 theta, so that roll stays finite where it is not defined."""
@@ -147,15 +149,14 @@ def gyro(x: Array, places: Indices, constants: Array, at: Indices, row: Array) -
 
 
 @kernel
-def transition(dt: float, places: Indices, constants: Array, rows: Indices, F: Array, Q: Array) -> None:
+def transition(dt: float, places: Indices, constants: Array, F: Array, Q: Array) -> None:
     """How the states that move go on in ``dt`` [s]: theta to jerk under white snap, resonators under white noise.
 
-    ``rows`` (d,) receives their places, ``F`` (d, d) their transition, ``Q`` (d, d) its noise. Exact (Van Loan's
-    integrals in closed form). Those of a state of roll depend on the motion: `turning`.
+    ``F`` (d, d) receives their transition, ``Q`` (d, d) its noise. Exact (Van Loan's integrals in closed form). Those
+    of a state of roll depend on the motion: `turning`.
     """
     d = places[MOVING]
     for i in range(d):
-        rows[i] = i
         for j in range(d):
             F[i, j], Q[i, j] = 0.0, 0.0
         F[i, i] = 1.0
@@ -164,15 +165,9 @@ def transition(dt: float, places: Indices, constants: Array, rows: Indices, F: A
     F[0, 3] = dt * dt * dt / 6.0
     for i in range(4):
         for j in range(4):
-            of = 1.0 / (7.0 - i - j)
-            for m in range(1, 4 - i):
-                of /= m
-            for m in range(1, 4 - j):
-                of /= m
-            Q[i, j] = constants[SNAP] * of * dt ** (7 - i - j)
-    a = 4
+            power = dt ** (7 - i - j)
+            Q[i, j] = constants[SNAP] * power / ((7 - i - j) * _FACTORIAL[3 - i] * _FACTORIAL[3 - j])
     if places[RESONATORS] >= 0:
-        a = 8
         for b in range(2):
             w0, zeta, level = (
                 constants[Z_RATE + 3 * b],
@@ -180,7 +175,6 @@ def transition(dt: float, places: Indices, constants: Array, rows: Indices, F: A
                 constants[Z_LEVEL + 3 * b],
             )
             i, k = 4 + 2 * b, 5 + 2 * b
-            rows[i], rows[k] = places[RESONATORS] + 2 * b, places[RESONATORS] + 2 * b + 1
             wd = w0 * math.sqrt(1.0 - zeta * zeta)
             e, s, c = math.exp(-zeta * w0 * dt), math.sin(wd * dt), math.cos(wd * dt)
             F[i, i], F[i, k] = e * (c + zeta * w0 / wd * s), e * s / wd
@@ -191,9 +185,6 @@ def transition(dt: float, places: Indices, constants: Array, rows: Indices, F: A
             Q[k, k] = vk - F[k, i] * F[k, i] * vi - F[k, k] * F[k, k] * vk
             Q[i, k] = -F[i, i] * F[k, i] * vi - F[i, k] * F[k, k] * vk
             Q[k, i] = Q[i, k]
-    if places[ROLL] >= 0:
-        for b in range(3):
-            rows[a + b] = places[ROLL] + b
 
 
 @kernel

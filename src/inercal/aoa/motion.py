@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.settings import MotionPlan, Oscillation, Shaking
-from inercal.errors import StudyError
+from inercal.errors import InputError, StudyError
 
 Array = NDArray[np.float64]
 
@@ -65,10 +65,19 @@ def oscillation(of: Oscillation | None) -> Sines:
 
 
 def duration(plan: MotionPlan) -> float:
-    """Length [s] of a motion: as stated, or that of all pauses and moves."""
-    if plan.kind != "pitch-pause":
-        return plan.duration
-    return plan.pause + moves(plan) * (plan.move + plan.pause)
+    """Length [s] of a motion: as stated, that of all pauses and moves, or no more than that of a file.
+
+    Raises
+    ------
+    StudyError
+        A file of motion that cannot be used.
+    """
+    if plan.kind == "pitch-pause":
+        return plan.pause + moves(plan) * (plan.move + plan.pause)
+    if plan.kind == "file":
+        t, _ = _measured(plan)
+        return min(plan.duration, float(t[-1] - t[0]))
+    return plan.duration
 
 
 def moves(plan: MotionPlan) -> int:
@@ -163,19 +172,31 @@ def _chirp(plan: MotionPlan) -> Course:
     return chirp
 
 
-def _from_file(plan: MotionPlan) -> Course:
-    """The columns t and theta of a file, through a spline with a continuous acceleration."""
-    from scipy.interpolate import make_interp_spline
-
+def _measured(plan: MotionPlan) -> tuple[Array, Array]:
+    """Times (n,) [s] and angles (n,) [rad] of a file."""
     from inercal.records.read import read
 
     assert plan.path is not None
-    column = read(plan.path)["theta"]
-    t, theta = column.t, column.si()
+    try:
+        column = read(plan.path)["theta_ref"]
+        t, theta = column.t, column.si()
+    except InputError as error:
+        raise StudyError(
+            "motion.file", f"{error} (a CSV with the header t [s],theta_ref [deg] holds a motion)"
+        ) from error
     if len(t) < 6 or not (np.diff(t) > 0.0).all() or not np.isfinite(theta).all():
         raise StudyError(
-            plan.path, "found no motion, expected 6 rows or more with t increasing and a number in theta"
+            "motion.file",
+            f"found no motion in {plan.path}, expected 6 rows or more with t increasing and a number in theta_ref",
         )
+    return t, theta
+
+
+def _from_file(plan: MotionPlan) -> Course:
+    """The motion in a file, through a spline with a continuous acceleration."""
+    from scipy.interpolate import make_interp_spline
+
+    t, theta = _measured(plan)
     spline = make_interp_spline(t - t[0], theta, k=5)
     rate, acceleration = spline.derivative(1), spline.derivative(2)
 

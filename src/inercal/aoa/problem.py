@@ -53,7 +53,8 @@ class Problem:
     @cached_property
     def nuisances(self) -> dict[str, int]:
         """Place of each coefficient that stays constant, by its name."""
-        return {name: k for k, name in enumerate(self.names) if k >= 4 and name not in _MOVING}
+        changing = (*_MOTION, *_FLEXURE, "phi")
+        return {name: k for k, name in enumerate(self.names) if name not in changing}
 
     @property
     def spatial(self) -> bool:
@@ -63,7 +64,8 @@ class Problem:
 
 _MOTION = ("theta", "rate", "acceleration", "jerk")
 _FLEXURE = ("s_z", "flexure_z", "s_x", "flexure_x")
-_MOVING = (*_FLEXURE, "phi")
+_TURNING = ("phi", "b_roll", "b_yaw")
+_MOVING = (*_MOTION, *_FLEXURE, *_TURNING)
 
 
 def problem(
@@ -82,7 +84,7 @@ def problem(
     names: list[str] = [*_MOTION, "b_g", *(f"b_{k}" for k in each)]
     half = 0.5 * noise.accelerometer_bias**2
     blocks = [np.zeros((4, 4)), np.array([[noise.gyro_bias**2]]), half + half * np.eye(n)]
-    places = np.full(9, -1, dtype=np.int64)
+    places = np.full(model.ROWS + 11, -1, dtype=np.int64)
 
     def add(place: int, block: Array, *of: str) -> None:
         places[place] = len(names)
@@ -103,7 +105,7 @@ def problem(
     if spatial:
         of_roll = _ROLL_U if roll is None or roll.u == 0.0 else roll.u
         variances = [of_roll**2, noise.gyro_bias**2, noise.gyro_bias**2]
-        add(model.ROLL, np.diag(variances), "phi", "b_roll", "b_yaw")
+        add(model.ROLL, np.diag(variances), *_TURNING)
     size = len(names)
     mean, covariance = np.zeros(size), np.zeros((size, size))
     a = 0
@@ -113,7 +115,9 @@ def problem(
     if spatial and roll is not None:
         mean[places[model.ROLL]] = roll.value
     places[model.COUNT], places[model.STATES] = n, size
-    places[model.MOVING] = 4 + 4 * (states >= 15) + 3 * spatial
+    moving = [k for k, name in enumerate(names) if name in _MOVING]
+    places[model.MOVING] = len(moving)
+    places[model.ROWS : model.ROWS + len(moving)] = moving
     if posterior is not None:
         _known_before(names, mean, covariance, posterior)
     return Problem(layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry)

@@ -9,7 +9,7 @@ deviations, while a gate that shuts would lock the filter out for good once it i
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ from inercal.aoa.model import (
     COUNT,
     GATE,
     MOVING,
-    RESONATORS,
     ROLL,
+    ROWS,
     STATES,
     WIDEST,
     accelerometer,
@@ -37,13 +37,44 @@ Indices: TypeAlias = NDArray[np.int64]
 LOST = 0.09
 """Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
 
+_TURNS = 1e3
+"""An angle [rad] that is no model's."""
+
 OUTPUTS = 5
 """Columns of a row of output before the innovations: theta, its u, rate, its u, acceleration."""
 
 BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, an angle that is stated and its u, roll and yaw."""
 
+_READING = 1e100
+"""What no sensor reads: from here on it counts as missing, as what is no number does."""
+
 _EVEN = 1e-9
+
+
+class Memory(NamedTuple):
+    """What a filter remembers of the rows of a block (b,) for a smoother; of none for b = 0.
+
+    ``steps`` (b, d, d) the transposed transition of the states that move to each row, and to one in which theta is
+    lost; ``known`` (b, n + 1, n) the state after the row, and its covariance; ``scalars`` (b, N + 2, 2 n + 2) of each
+    scalar its row h, P h^T, the innovation v and the variance S used, 0 where it was left out.
+    """
+
+    steps: Array
+    known: Array
+    scalars: Array
+
+
+def memory(block: int, states: int, moving: int, count: int) -> Memory:
+    """A memory of ``block`` rows, of so many states, of those that move, and of accelerometers."""
+    return Memory(
+        np.empty((block, moving, moving)),
+        np.empty((block, states + 1, states)),
+        np.empty((block, count + 2, 2 * states + 2)),
+    )
+
+
+NONE = memory(0, 0, 0, 0)
 
 
 @kernel
@@ -53,55 +84,54 @@ def step_of(dt: float) -> float:
 
 
 @kernel
-def predict(P: Array, rows: Indices, F: Array, Q: Array, d: int, work: Array) -> None:
-    """Covariance of one step on, in place; symmetric to the last digit. ``work`` (d, n) is used up."""
-    n = len(P)
+def congruent(P: Array, places: Indices, F: Array, Q: Array, work: Array) -> None:
+    """F P F^T + Q in the place of P (n, n), symmetric to the last digit; ``work`` (d, n) is used up.
+
+    ``F`` and ``Q`` (d, d) are of the states that move alone; the others stay as they are.
+    """
+    n, d = len(P), len(F)
     for i in range(d):
+        f, a = F[i, i], places[ROWS + i]
         for k in range(n):
-            work[i, k] = 0.0
+            work[i, k] = f * P[a, k]
         for j in range(d):
-            f = F[i, j]
-            if f != 0.0:
-                a = rows[j]
+            f, a = F[i, j], places[ROWS + j]
+            if f != 0.0 and j != i:
                 for k in range(n):
                     work[i, k] += f * P[a, k]
     for i in range(d):
-        a = rows[i]
+        a = places[ROWS + i]
         for k in range(n):
             P[a, k] = work[i, k]
             P[k, a] = work[i, k]
     # the columns of the moving states among themselves
     for i in range(d):
-        for j in range(d):
+        for j in range(i + 1):
             total = Q[i, j]
             for k in range(d):
-                total += work[i, rows[k]] * F[j, k]
-            P[rows[i], rows[j]] = total
-    for i in range(d):
-        for j in range(i):
-            P[rows[i], rows[j]] = P[rows[j], rows[i]]
+                total += work[i, places[ROWS + k]] * F[j, k]
+            a, b = places[ROWS + i], places[ROWS + j]
+            P[a, b], P[b, a] = total, total
 
 
 @kernel
 def go_on(
-    x: Array, P: Array, dt: float, p: float, y: float, places: Indices, constants: Array,
-    rows: Indices, F: Array, Q: Array, base: float, work: Array,
+    x: Array, P: Array, dt: float, p: float, y: float, places: Indices, constants: Array, F: Array, Q: Array,
+    base: float, work: Array,
 ) -> None:  # fmt: skip
     """The state and its covariance after ``dt``."""
-    d = places[MOVING]
+    d, theta, phi = len(F), 0.0, 0.0
     if places[ROLL] >= 0:
         theta, phi = turning(x, dt, p, y, places, constants, F, Q, base)
-        x[places[ROLL]] = phi
-    else:
-        theta = x[0] + x[1] * dt + 0.5 * x[2] * dt * dt + x[3] * dt * dt * dt / 6.0
-    predict(P, rows, F, Q, d, work)
-    x[0] = theta
-    x[1] += x[2] * dt + 0.5 * x[3] * dt * dt
-    x[2] += x[3] * dt
-    for b in range(4, 8 if places[RESONATORS] >= 0 else 4, 2):
-        s, v = x[rows[b]], x[rows[b + 1]]
-        x[rows[b]] = F[b, b] * s + F[b, b + 1] * v
-        x[rows[b + 1]] = F[b + 1, b] * s + F[b + 1, b + 1] * v
+    congruent(P, places, F, Q, work)
+    for i in range(d):
+        work[0, i] = 0.0
+        for j in range(d):
+            work[0, i] += F[i, j] * x[places[ROWS + j]]
+    for i in range(d):
+        x[places[ROWS + i]] = work[0, i]
+    if places[ROLL] >= 0:
+        x[0], x[places[ROLL]] = theta, phi
 
 
 @kernel
@@ -141,35 +171,34 @@ def update(
 
 @kernel
 def row_of(
-    i: int, x: Array, z: Array, geometry: Array, places: Indices, constants: Array, p: float, y: float,
+    i: int, x: Array, z: Array, k: int, geometry: Array, places: Indices, constants: Array, p: float, y: float,
     at: Indices, row: Array,
 ) -> tuple[float, int, float]:  # fmt: skip
-    """Scalar ``i`` of a row of measurements: what it should read, entries of its row, its variance."""
+    """Scalar ``i`` of row ``k`` of measurements: what it should read, entries of its row, its variance."""
     n = places[COUNT]
     if i < n:
         return accelerometer(x, i, geometry, places, constants, p, y, at, row)
     if i == n:
         return gyro(x, places, constants, at, row)
     at[0], row[0] = 0, 1.0
-    return x[0], 1, z[n + 2] * z[n + 2]
+    return x[0], 1, z[k, n + 2] * z[k, n + 2]
 
 
 @kernel
-def write(x: Array, P: Array, constants: Array, out: Array) -> None:
-    """Theta, u, rate, u, acceleration at the stamp: by a common delay later than what the sensors read."""
+def write(x: Array, P: Array, constants: Array, out: Array, k: int) -> None:
+    """Put theta, u, rate, u, acceleration at the stamp into row ``k``: later by a common delay than the sensors."""
     tau, u = constants[COMMON_DELAY], constants[COMMON_DELAY_U]
-    out[0] = x[0] + tau * x[1] + 0.5 * tau * tau * x[2]
-    out[2] = x[1] + tau * x[2]
-    out[4] = x[2]
-    theta = P[0, 0] + 2.0 * tau * P[0, 1] + tau * tau * P[1, 1] + x[1] * x[1] * u * u
+    out[k, 0] = x[0] + tau * x[1] + 0.5 * tau * tau * x[2]
+    out[k, 2] = x[1] + tau * x[2]
+    out[k, 4] = x[2]
+    theta = P[0, 0] + 2.0 * tau * P[0, 1] + tau * tau * P[1, 1] + out[k, 2] * out[k, 2] * u * u
     rate = P[1, 1] + 2.0 * tau * P[1, 2] + tau * tau * P[2, 2] + x[2] * x[2] * u * u
-    out[1], out[3] = math.sqrt(max(theta, 0.0)), math.sqrt(max(rate, 0.0))
+    out[k, 1], out[k, 3] = math.sqrt(max(theta, 0.0)), math.sqrt(max(rate, 0.0))
 
 
-@kernel
 def advance(
     x: Array, P: Array, turns: Array, dt: Array, z: Array, geometry: Array, places: Indices, constants: Array,
-    out: Array, kept: Array, every: int, first: int,
+    out: Array, kept: Array, every: int, first: int, remembered: Memory = NONE,
 ) -> int:  # fmt: skip
     """Go on by the rows of ``dt`` (m,) [s] and ``z`` (m, N + 5); the number of rows done.
 
@@ -177,39 +206,66 @@ def advance(
     row of ``z`` holds the accelerometers [m/s^2], the gyro [rad/s], an angle stated and its standard uncertainty [rad],
     roll and yaw gyros [rad/s]; NaN where not measured. ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and
     the innovations over their standard deviations. ``kept`` (k, 2 n) receives x and its standard deviations at each
-    ``every``-th row, counted from ``first``; none for 0 rows.
+    ``every``-th row, counted from ``first``; none for 0 rows. ``remembered`` is filled if it has room for m rows.
 
-    Ends before a row in which theta is lost, its variance over `LOST` or no number.
+    Ends before a row in which theta is lost: it or its variance, which is over `LOST`, are no angle's any more.
     """
-    n, m, count = places[STATES], len(dt), places[COUNT]
-    rows, work, line = np.empty(places[MOVING], np.int64), np.empty((places[MOVING], n)), np.empty(n)
-    F, Q = np.empty((places[MOVING], places[MOVING])), np.empty((places[MOVING], places[MOVING]))
+    steps, known, scalars = remembered
+    done: int = _advance(
+        x, P, turns, dt, z, geometry, places, constants, out, kept, every, first, steps, known, scalars
+    )
+    return done
+
+
+@kernel
+def _advance(
+    x: Array, P: Array, turns: Array, dt: Array, z: Array, geometry: Array, places: Indices, constants: Array,
+    out: Array, kept: Array, every: int, first: int, steps: Array, known: Array, scalars: Array,
+) -> int:  # fmt: skip
+    """The loop of `advance`."""
+    n, d, m, count = places[STATES], places[MOVING], len(dt), places[COUNT]
+    work, line = np.empty((d, n)), np.empty(n)
+    F, Q = np.empty((d, d)), np.empty((d, d))
     at, row = np.empty(WIDEST, np.int64), np.empty(WIDEST)
-    last, base, spatial = -1.0, 0.0, places[ROLL] >= 0
+    last, base, spatial, remember = -1.0, 0.0, places[ROLL] >= 0, len(steps) > 0
     for k in range(m):
         step = step_of(dt[k])
         p, y = 0.0, 0.0
         if spatial:
             p, y = turned(turns, z, k, count)
         if step != last:
-            transition(step, places, constants, rows, F, Q)
+            transition(step, places, constants, F, Q)
             last, base = step, Q[0, 0]
         if step > 0.0:
-            go_on(x, P, step, p, y, places, constants, rows, F, Q, base, work)
-        if not P[0, 0] < LOST:
+            go_on(x, P, step, p, y, places, constants, F, Q, base, work)
+        if remember:
+            for i in range(d):
+                for j in range(d):
+                    steps[k, i, j] = F[j, i]
+        if not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
             return k
         if spatial:
             p, y = turns[0], turns[1]
         for i in range(count + 2):
-            if i <= count:
-                out[k, OUTPUTS + i] = math.nan
-            if math.isnan(z[k, i]):
-                continue
-            expected, entries, noise = row_of(i, x, z[k], geometry, places, constants, p, y, at, row)
-            surprise, _ = update(P, x, z[k, i] - expected, entries, at, row, noise, constants[GATE], line)
+            surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
+            if abs(z[k, i]) < _READING:
+                expected, entries, noise = row_of(i, x, z, k, geometry, places, constants, p, y, at, row)
+                v = z[k, i] - expected
+                surprise, variance = update(P, x, v, entries, at, row, noise, constants[GATE], line)
             if i <= count:
                 out[k, OUTPUTS + i] = surprise
-        write(x, P, constants, out[k])
+            if remember:
+                for j in range(n):
+                    scalars[k, i, j], scalars[k, i, n + j] = 0.0, line[j]
+                for j in range(entries):
+                    scalars[k, i, at[j]] = row[j]
+                scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
+        write(x, P, constants, out, k)
+        if remember:
+            for i in range(n):
+                known[k, 0, i] = x[i]
+                for j in range(n):
+                    known[k, i + 1, j] = P[i, j]
         if len(kept) > 0 and (first + k) % every == 0:
             for i in range(n):
                 kept[(first + k) // every, i] = x[i]

@@ -8,14 +8,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from inercal.aoa.layout import Layout
 from inercal.geometry.site import Site
 from inercal.units import STANDARD_GRAVITY, Quantity
+
+Array = NDArray[np.float64]
 
 States = Literal[8, 11, 15, 19]
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
 Tangential = Literal["none", "differentiated", "dual"]
+Per = Literal["1", "V", "count"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 
 STATES: tuple[States, ...] = (8, 11, 15, 19)
@@ -67,9 +73,9 @@ class Prior:
 class Calibration:
     """A sensor's calibration: what it measures is ``(indication x scale - bias)``, each with temperature terms.
 
-    ``scale`` SI per SI unit of the record's column (or per count, per volt), ``bias`` [SI]; ``scale_slope`` [1/K] and
-    ``bias_slope`` [SI/K] about ``temperature`` [degC]; ``range`` [SI], at or beyond which it is saturated, None where
-    not known.
+    ``scale`` SI per SI unit of the record's column, or ``per`` volt or count of it; ``bias`` [SI]; ``scale_slope``
+    [1/K] and ``bias_slope`` [SI/K] about ``temperature`` [degC]; ``range`` [SI] of what it measures, at or beyond
+    which it is saturated, None where not known.
     """
 
     scale: float = 1.0
@@ -78,6 +84,22 @@ class Calibration:
     scale_slope: float = 0.0
     bias_slope: float = 0.0
     temperature: float = 20.0
+    per: Per = "1"
+
+    def measured(self, indication: Array, temperature: Array | float | None = None) -> Array:
+        """What indications (n,) mean [SI]; at the calibration's own temperature where ``temperature`` is None."""
+        scale, bias = self._at(temperature)
+        return np.asarray(indication * scale - bias)
+
+    def indicated(self, value: Array, temperature: Array | float | None = None) -> Array:
+        """The inverse of `measured`: what the record's column holds, in SI, volts or counts."""
+        scale, bias = self._at(temperature)
+        return np.asarray((value + bias) / scale)
+
+    def _at(self, temperature: Array | float | None) -> tuple[Array | float, Array | float]:
+        """Scale and bias at a temperature [degC]."""
+        off = 0.0 if temperature is None else temperature - self.temperature
+        return self.scale * (1.0 + self.scale_slope * off), self.bias + self.bias_slope * off
 
 
 @dataclass(frozen=True)
@@ -149,7 +171,7 @@ class MotionPlan:
     ``low`` to ``high`` (its duration follows). ``sine``: ``mean`` + ``amplitude`` sin 2 pi ``frequency`` t.
     ``two-tone``: with a second sine. ``chirp``: about ``mean``, from ``low`` to ``high``. ``buffet``: about ``mean``,
     150 equal sines of random frequency and phase from ``low`` to ``high``, ``rms`` in all. ``file``: the columns t and
-    theta of ``path``.
+    theta_ref of ``path``, for ``duration`` at most.
     """
 
     kind: MotionKind = "sine"
@@ -221,7 +243,8 @@ class AoaSettings:
     """A study of inertial angle of attack, in SI.
 
     ``sensors`` holds the calibrations by name: those of the layout, and ``gyro``, ``gyro_roll``, ``gyro_yaw``.
-    ``traceability``, ``temperature``, ``given`` as in `inercal.imu.settings.ImuSettings`.
+    ``traceability``, ``temperature``, ``given`` as in `inercal.imu.settings.ImuSettings`. ``corrections`` are scale and
+    axis angle [rad] by which an earlier run changed accelerometers, by name (`inercal.aoa.corrections`).
     """
 
     site: Site
@@ -239,6 +262,7 @@ class AoaSettings:
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
+    corrections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def calibration(self, name: str) -> Calibration:
         """The calibration of a sensor; that of one which needs none where the study has none."""

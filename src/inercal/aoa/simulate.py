@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.motion import course, duration, oscillation, point_numbers, shaking
 from inercal.aoa.recording import Recording
-from inercal.aoa.settings import AoaSettings, Disturbances, Noise
+from inercal.aoa.settings import GYROS, AoaSettings, Disturbances, Noise
 from inercal.errors import StudyError
 from inercal.units import STANDARD_GRAVITY
 
@@ -168,7 +168,7 @@ def _spoiled(values: Array, settings: AoaSettings, rng: np.random.Generator) -> 
         hit = rng.random(values.shape) < other.spikes
         values = values + hit * size * rng.choice([-1.0, 1.0], values.shape)
     if other.clip:
-        for k, name in enumerate((*settings.layout.names, "gyro", "gyro_roll", "gyro_yaw")):
+        for k, name in enumerate((*settings.layout.names, *GYROS)):
             limit = settings.calibration(name).range
             if limit is not None:
                 values[:, k] = np.clip(values[:, k], -limit, limit)

@@ -54,6 +54,17 @@ def new_selfcal(files: Recordings = None, /, *, output: FileOutput = FileOutput(
     _new("selfcal", files or [], output, selfcal_template, column_map)
 
 
+def new_aoa(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -> None:  # noqa: B008
+    """Write a study of an angle of attack, and a map guessed from recordings that do not say what they hold."""
+    from inercal.records.guess import guess_map
+    from inercal.records.read import canonical_units
+    from inercal.study.template import aoa_template
+
+    channels = (canonical_units(files) if files else None) or {}
+    column_map = guess_map(files, of_model=True) if files and "a1" not in channels else None
+    _new("aoa", files or [], output, aoa_template, column_map)
+
+
 def _mapped(column_map: str) -> list[str]:
     """The channels of a map."""
     import tomllib

@@ -74,6 +74,31 @@ def simulate_selfcal(
     return 0
 
 
+def simulate_aoa(
+    study: Study,
+    /,
+    *,
+    seed: Seed = 1,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Simulate a wind-tunnel model that moves as its study plans."""
+    from inercal.aoa.record import to_record
+    from inercal.aoa.simulate import simulate as simulate_run
+    from inercal.study.load import load_aoa_study
+
+    _check(study, seed, output)
+    settings = load_aoa_study(study, overrides or ())
+    plan = settings.motion
+    inputs = (study,) if plan is None or plan.path is None else (study, plan.path)
+    output.spare(inputs)
+
+    def simulate(rng: Generator) -> Record:
+        return to_record(simulate_run(settings, rng).recording, settings)
+
+    _write("aoa", simulate, study, inputs, seed, output)
+
+
 def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._files import write_text

@@ -34,6 +34,13 @@ COMMANDS = {
         "to --out (selfcal.toml if absent), the map beside it (selfcal-map.toml). Nothing that exists is overwritten.",
         "inercal new selfcal --out selfcal.toml",
     ),
+    ("new", "aoa"): (
+        "inercal.cli.new:new_aoa",
+        "Write a commented study of an angle of attack: of its simulation and its measurement.\n\nGiven a recording "
+        "whose header does not say quantities and units, also a column map guessed from it. The study goes to --out "
+        "(aoa.toml if absent), the map beside it (aoa-map.toml). Nothing that exists is overwritten.",
+        "inercal new aoa --out aoa.toml",
+    ),
     ("inspect", ""): (
         "inercal.cli.inspect:inspect",
         "Look at a recording before it is used.\n\nChannels, units, rates, and everything suspicious about it; "
@@ -66,6 +73,17 @@ COMMANDS = {
         "lines of that history go out, live; with --checkpoint the same command goes on where it was stopped. Exit "
         "code 1: done, but the verdict is not ok.",
         "inercal selfcal platform.csv --study selfcal.toml --report selfcal.html",
+    ),
+    ("aoa", ""): (
+        "inercal.cli.aoa:aoa",
+        "Measure the angle of attack of a wind-tunnel model from accelerometers and a gyro inside it.\n\nA filter that "
+        "fuses all sensors gives the pitch angle with its uncertainty, causal or, with --smooth, from the whole "
+        "recording; any of --static, --centrifugal and --tangential asks for the classical way. --out saves the result "
+        "(.json or .toml, the prior of a next run) or the samples (.csv, .npz, .h5, .parquet or .nc), with --points "
+        "the angle of each pause. --report writes a page to hand over. With --stream CSV lines come in, from FILE or "
+        "standard input, and the lines of the samples go out, live; with --checkpoint the same command goes on where "
+        "it was stopped. Exit code 1: done, but the verdict is not ok.",
+        "inercal aoa model.csv --study aoa.toml --report aoa.html",
     ),
     ("allan", ""): (
         "inercal.cli.allan:allan",
@@ -111,6 +129,14 @@ COMMANDS = {
         "is simulated and calibrated N times, and errors are judged by the stated uncertainties and the bound; --out "
         "then writes the figures (.json), --report a page. Exit code 1: the uncertainties are too small.",
         "inercal simulate selfcal selfcal.toml --seed 1 --out platform.csv",
+    ),
+    ("simulate", "aoa"): (
+        "inercal.cli.simulate:simulate_aoa",
+        "Simulate a wind-tunnel model that moves as its study plans.\n\nThe study states the motion under [motion], "
+        "and under [disturbances] what real models add. The recording goes to --out (.csv, .npz, .h5, .parquet or "
+        ".nc): accelerometers and gyro, in volts or counts where the study has a scale for these, point numbers of a "
+        "pitch-pause, and the true angle as theta_ref.",
+        "inercal simulate aoa aoa.toml --seed 1 --out model.csv",
     ),
     ("temperature", ""): (
         "inercal.cli.temperature:temperature",

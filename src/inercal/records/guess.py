@@ -17,7 +17,7 @@ from inercal.records.read import format_of
 from inercal.records.read.canonical import bare
 from inercal.records.read.table import Sample
 from inercal.records.record import Array
-from inercal.records.titles import fits, titled
+from inercal.records.titles import fits, numbered, titled
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
@@ -48,7 +48,9 @@ class _File:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) -> str:
+def guess_map(
+    paths: str | Path | Sequence[str | Path], on_table: bool = False, of_model: bool = False
+) -> str:
     """Guess a column map from the files themselves.
 
     Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``) and units, arrays without a
@@ -61,6 +63,9 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
         The files of one record; of repeat runs the first is looked at.
     on_table : bool
         A test on a table: columns without names are not guessed, for angles and outputs look alike.
+    of_model : bool
+        A model that pitches: accelerometers go by their numbers, ``a1`` to ``an``, and columns without names are not
+        guessed.
 
     Returns
     -------
@@ -75,7 +80,7 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
     """
     files: list[_File] = []
     for path in [paths] if isinstance(paths, str | Path) else paths:
-        looked = _look(Path(path), on_table)
+        looked = _look(Path(path), on_table, of_model)
         if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
             files += looked
     if not any(_MEASURED.fullmatch(name) for file in files for name in file.guesses):
@@ -99,7 +104,7 @@ def guess_map(paths: str | Path | Sequence[str | Path], on_table: bool = False) 
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path, on_table: bool) -> list[_File]:
+def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
     """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
     try:
         samples = sorted(format_of(path).peek(path), key=lambda sample: -len(sample.values))
@@ -108,7 +113,8 @@ def _look(path: Path, on_table: bool) -> list[_File]:
     lengths: dict[int, dict[str, _Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
-        for guess in _by_header(sample) if sample.names or on_table else _by_shape(sample, path):
+        named = sample.names or on_table or of_model
+        for guess in _by_header(sample, of_model) if named else _by_shape(sample, path):
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
@@ -161,11 +167,12 @@ def _skeleton(files: Sequence[_File]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _by_header(sample: Sample) -> list[_Guess]:
+def _by_header(sample: Sample, of_model: bool) -> list[_Guess]:
     """Channels by the names in the header."""
     guesses = []
     for index, title in enumerate(sample.names):
         name, unit = titled(title, sample.units[index] if sample.units else None)
+        name = (numbered(title) if of_model else None) or name
         values = sample.values[:, index]
         # what is no number, as dates, can be a label alone; a time by its unit alone may be some interval
         if name is None or (name != "label" and np.isnan(values).all()):
@@ -255,6 +262,8 @@ def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
             units[name] = _time_unit(guess.values)
         elif name.startswith("acc_"):
             units[name] = acc
+        elif name[1:].isdigit():
+            units[name] = _axes_unit(guesses)
         elif name.startswith("gyro"):
             units[name] = _gyro_unit(guesses, acc[0])
         else:
@@ -274,6 +283,16 @@ def _acc_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
         if low < norm < high and not (unit == "mg" and _whole(axes)):
             return unit, f"the median norm is {norm:.4g}, gravity in {unit}"
     return "count", f"the median norm is {norm:.5g}, gravity in neither m/s^2 nor g"
+
+
+def _axes_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
+    """Unit of accelerometers around a model: of axes at right angles one always reads 0.7 of gravity or more."""
+    axes = [np.abs(guess.values) for name, guess in guesses.items() if name[1:].isdigit()]
+    largest = _median(np.max(axes, axis=0))
+    for unit, low, high in (("m/s^2", 6.0, 11.0), ("g", 0.6, 1.1), ("mg", 600.0, 1100.0)):
+        if low < largest < high and not _whole(axes):
+            return unit, f"the largest of all is {largest:.4g} in the median, gravity in {unit}"
+    return "count", f"the largest of all is {largest:.4g} in the median, gravity in neither m/s^2 nor g"
 
 
 def _gyro_unit(guesses: Mapping[str, _Guess], acc_unit: str) -> tuple[str, str]:

@@ -16,6 +16,18 @@ _SENSORS = {
     "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega|drehrate",
 }
 _TIME = r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds"
+#: channels of a model that pitches -> names
+_OF_A_MODEL = (
+    (
+        "theta_ref",
+        r"(?:theta|alpha|ao ?a|pitch|angle|incidence) (?:ref|reference)|(?:ref|reference) (?:angle|theta|alpha)",
+    ),
+    ("gyro_roll", r"roll (?:rate|gyro)|gyro roll"),
+    ("gyro_yaw", r"yaw (?:rate|gyro)|gyro yaw"),
+    ("gyro", r"pitch (?:rate|gyro)|gyro(?: pitch)?"),
+    ("point", r"(?:test )?point(?: (?:no|nr|number|id))?"),
+    ("trigger", r"trig|trigger"),
+)
 _LABEL = r"label|part|section|pose"
 _SPELLED = {
     "m/s^2": "m_s2|mps2|ms2|m_s_2",
@@ -54,6 +66,14 @@ def titled(title: str, stated: str | None = None) -> tuple[str | None, str | Non
     return _by_unit(plain, measured), unit
 
 
+def numbered(title: str) -> str | None:
+    """``a2`` of titles such as ``Accel 2 [g]`` or ``acc_2``, of a model whose accelerometers have numbers."""
+    match = re.fullmatch(
+        rf"(?:.* )?(?:{_SENSORS['acc']}) ?([1-9]\d*)", _words(re.sub(r"\s*[\[(].*", "", title))
+    )
+    return f"a{match[1]}" if match else None
+
+
 def fits(name: str, unit: str) -> bool:
     """True if there is such a unit and the channel may have it."""
     known = _known(unit)
@@ -88,7 +108,10 @@ def _named(title: str) -> str | None:
         match = re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz])(?: (?:{names})|{sensor})", words)
         if match:
             return f"{sensor}_{match[1] or match[2]}"
+    if axis := re.fullmatch(r"(?:.* )?a([1-9]\d*)|a ([1-9]\d*)", words):
+        return f"a{axis[1] or axis[2]}"
     for channel, names in (
+        *_OF_A_MODEL,
         ("t", _TIME),
         ("label", _LABEL),
         ("temperature", r"temp|temperature|temperatur"),

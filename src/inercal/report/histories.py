@@ -42,7 +42,8 @@ _BAND = 200
 @dataclass(frozen=True, eq=False)
 class Course:
     """A coefficient over time: ``values`` (n,) and their ``u`` (n,) in ``unit``; ``prior`` standard deviation at the
-    start, ``truth`` where known, ``bound`` the smallest u at the end that the path allows, where known."""
+    start about ``centre``, ``truth`` where known, ``bound`` the smallest u at the end that the path allows, where
+    known."""
 
     name: str
     unit: str
@@ -51,6 +52,7 @@ class Course:
     prior: float
     truth: float | None = None
     bound: float | None = None
+    centre: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) ->
     Each panel spans what is left in the last 45 % of the time; the prior is a bar at the start.
     """
     shown = few(len(t), _BAND)
-    with grid(t, -(-len(courses) // 3), 3, 0.85) as (page, axes, places):
+    with grid(t, len(courses), 3, 0.85) as (page, axes, places):
         for k, course in enumerate(courses):
             values, u = (np.where(np.abs(x) < 1e100, x, np.nan) for x in (course.values, course.u))
             cell = replace(places[k], y=_span(course, values, u))
@@ -87,7 +89,7 @@ def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) ->
             low, high = (values - 2.0 * u)[shown], (values + 2.0 * u)[shown]
             band(axes, cell, t[shown], low, high, color=COLOURS[0], alpha=0.2)
             line(axes, cell, *envelope(t, values, _PIECES), color=COLOURS[0], lw=0.9)
-            bar = 2.0 * course.prior * np.array([-1.0, 1.0])
+            bar = course.centre + 2.0 * course.prior * np.array([-1.0, 1.0])
             line(axes, cell, np.full(2, t[0] + 0.012 * (t[-1] - t[0])), bar, color=INK, lw=1.6)
             if course.truth is not None:
                 line(axes, cell, t[[0, -1]], np.full(2, course.truth), color=ALARM, lw=0.9, ls=":")
@@ -103,7 +105,7 @@ def _span(course: Course, values: Array, u: Array) -> tuple[float, float]:
     if course.truth is not None:
         apart = np.append(apart, abs(course.truth - middle))
     widest = float(np.nanmax(apart)) if np.isfinite(apart).any() else 0.0
-    half = 1.15 * min(widest, 4.0 * course.prior + abs(middle)) or 1.0
+    half = 1.15 * min(widest, 4.0 * course.prior + abs(middle - course.centre)) or 1.0
     return middle - half, middle + half
 
 
@@ -117,7 +119,7 @@ def falling(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Pi
     left = [np.where(course.u > 0.0, course.u, np.nan) / course.prior for course in courses]
     last = [x[np.isfinite(x)].min() for x in left if np.isfinite(x).any()]
     lowest = 10.0 ** np.floor(np.log10(max(min(last, default=0.1), 1e-12)))
-    with grid(t, -(-len(groups) // 3), 3, 1.45) as (page, axes, places):
+    with grid(t, len(groups), 3, 1.45) as (page, axes, places):
         for k, group in enumerate(groups):
             cell = replace(places[k], y=(float(lowest), 2.0), scale="log")
             frame(axes, cell, times=k >= len(groups) - 3, label="u / prior" if k % 3 == 0 else "")
@@ -147,11 +149,11 @@ def falling(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Pi
 
 @contextmanager
 def grid(
-    t: Array, rows: int, columns: int, height: float, head: float = 0.28
+    t: Array, count: int, columns: int, height: float, head: float = 0.28
 ) -> Iterator[tuple[Figure, Axes, list[Cell]]]:
-    """A drawing with rows of panels of that ``height`` [inch] over ``t`` (n,) [s], from left to right and downwards."""
+    """A drawing with ``count`` panels of that ``height`` [inch] over ``t`` (n,) [s], row by row."""
     gap, margin, foot = 0.62, 0.62, 0.42
-    wide = (WIDTH - 0.12 - margin * columns) / columns
+    wide, rows = (WIDTH - 0.12 - margin * columns) / columns, -(-count // columns)
     total = foot + rows * (height + head)
     with canvas(WIDTH, total) as (page, axes):
         span = float(t[0]), float(t[-1])
@@ -166,9 +168,10 @@ def grid(
             )
             for row in range(rows)
             for column in range(columns)
-        ]
+        ][:count]
         for cell in cells[-columns:]:
-            axes.text(cell.left + 0.5 * cell.width, 0.06, "time [s]", fontsize=7.5, ha="center", va="bottom")
+            below = cell.bottom - foot + 0.06
+            axes.text(cell.left + 0.5 * cell.width, below, "time [s]", fontsize=7.5, ha="center", va="bottom")
         yield page, axes, cells
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -56,11 +56,15 @@ class Apply:
         """Nothing: a sample knows nothing of those before."""
         return {}
 
-    def step(self, state: State, sample: Sample) -> tuple[State, Output]:
+    def step(self, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
         """The corrected sample."""
         values = sample.values.copy()
         triads = {sensor: np.array([values[i] for i in places]) for sensor, places in self._places.items()}
         for sensor, found in self._correct(triads).items():
             for i, value in zip(self._places[sensor], found.tolist(), strict=True):
                 values[i] = value
-        return state, [sample.t, *values, *([quoted(sample.label)] if self._labelled else [])]
+        return state, [[sample.t, *values, *([quoted(sample.label)] if self._labelled else [])]]
+
+    def finish(self, state: State) -> Sequence[Output]:
+        """Nothing."""
+        return ()

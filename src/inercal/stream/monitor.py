@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -110,14 +110,18 @@ class Monitor:
             extremes=_no_extremes(groups), still=math.nan, t=math.nan, slots=Slots(),
         )  # fmt: skip
 
-    def step(self, state: MonitorState, sample: Sample) -> tuple[MonitorState, Output | None]:
+    def step(self, state: MonitorState, sample: Sample) -> tuple[MonitorState, Sequence[Output]]:
         """The state after a sample, and a line where one is due."""
         timed = state.interval > 0.0
         state = self._watched(state, sample) if timed else self._timed(state, sample.t)
         slots = state.slots.at(sample.t, self._every)
         if slots is None:
-            return state, None
-        return state._replace(slots=slots), self._line(state, sample.t)
+            return state, ()
+        return state._replace(slots=slots), [self._line(state, sample.t)]
+
+    def finish(self, state: MonitorState) -> Sequence[Output]:
+        """Nothing."""
+        return ()
 
     def _timed(self, state: MonitorState, t: float) -> MonitorState:
         """Find the sample interval from the first stamps; the window then has its length."""

@@ -1,4 +1,4 @@
-"""A recursive estimator on a stream: sample in, line out, the state saved now and then and resumed.
+"""A recursive estimator on a stream: samples in, lines out, the state saved now and then and resumed.
 
 What is saved says which rows the state has seen. A stream that begins with the row that the saved one began
 with is that stream again: the rows seen are passed over, without output, and must be the same ones. Any other
@@ -11,6 +11,9 @@ saved stream, and wait for each other; where these were all alike, nothing can t
 A state is saved only after the lines of all rows in it have been taken by the reader, so none is lost: those
 since the last save are given once more after the run has been killed. A last row whose line has not ended is
 answered, but not kept in the state, for it may not have been whole.
+
+An estimator may hold rows, which then are in its state, until it knows more. Their lines are given at the end of the
+stream; a run that goes on from there gives them once more, as they are where rows follow.
 """
 
 from __future__ import annotations
@@ -86,11 +89,14 @@ class Recursive(Protocol[S]):
     def initial(self) -> S:
         """The state before the first sample."""
 
-    def step(self, state: S, sample: Sample) -> tuple[S, Output | None]:
-        """The state after a sample, and the line it gives, if any.
+    def step(self, state: S, sample: Sample) -> tuple[S, Sequence[Output]]:
+        """The state after a sample, and the lines it gives, if any.
 
         The state handed in may be used up: its arrays may be those of the new one.
         """
+
+    def finish(self, state: S) -> Sequence[Output]:
+        """The lines of rows that were held, where the stream ends with that state."""
 
 
 @dataclass(frozen=True)
@@ -181,15 +187,18 @@ def _run(
             save(saving.path, estimator.kind, mark, _Whole(position, state))
             saved = position.rows
 
-    write(",".join(estimator.columns))
+    def give(outputs: Sequence[Output]) -> None:
+        for output in outputs:
+            write(",".join(each if isinstance(each, str) else number(each) for each in output))
+
+    give([estimator.columns])
     with _interrupts() as interrupts:
         try:
             for line, sample in _new_samples(lines, position, interrupts, say):
                 if not line.whole:
                     keep()
-                state, output = estimator.step(state, sample)
-                if output is not None:
-                    write(",".join(each if isinstance(each, str) else number(each) for each in output))
+                state, outputs = estimator.step(state, sample)
+                give(outputs)
                 if line.whole:
                     position = position.after(line, sample.t)
                     keep(1 if saving is None else saving.every)
@@ -198,6 +207,7 @@ def _run(
                 keep()
             raise
     keep()
+    give(estimator.finish(state))
     lines.close()
     return position.rows
 

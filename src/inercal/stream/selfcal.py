@@ -9,7 +9,7 @@ measured. Only time is treated more kindly: a row that is not later than the one
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import NamedTuple
 
@@ -138,10 +138,10 @@ class Selfcal:
             angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, said=0, slots=Slots(),
         )  # fmt: skip
 
-    def step(self, state: LiveState, sample: Sample) -> tuple[LiveState, Output | None]:
+    def step(self, state: LiveState, sample: Sample) -> tuple[LiveState, Sequence[Output]]:
         """The state after a row, and a line where one is due."""
         if math.isnan(sample.t):
-            return state, None
+            return state, ()
         values = zip(self._places, self._factors, strict=True)
         rate, th, acc = np.array([sample.values[i] * factor for i, factor in values]).reshape(3, 3)
         over = np.where(self._gained, rate, state.next)
@@ -150,7 +150,7 @@ class Selfcal:
             return self._begin(state, sample.t, following, th)
         dt = sample.t - state.t
         if dt <= 0.0:
-            return self._late(state, sample.t), None
+            return self._late(state, sample.t), ()
         state = self._after(state, sample.t, dt)
         state, over, guessed = self._rate(state, sample.t, over)
         doubt, seen = guessed or state.doubt, bool(np.isfinite(th).all())
@@ -170,11 +170,17 @@ class Selfcal:
             state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
         return self._line(self._alarmed(state, trace), trace, nis)
 
-    def _begin(self, state: LiveState, t: float, rate: Array, th: Array) -> tuple[LiveState, Output | None]:
+    def finish(self, state: LiveState) -> Sequence[Output]:
+        """Nothing."""
+        return ()
+
+    def _begin(
+        self, state: LiveState, t: float, rate: Array, th: Array
+    ) -> tuple[LiveState, Sequence[Output]]:
         """The start, where all angles and the rate from here on are known; else it is waited for."""
         begun = bool(np.isfinite(th).all() and (np.isfinite(rate) | self._gained).all())
         if not begun:
-            return state._replace(begun=False), None
+            return state._replace(begun=False), ()
         filter_ = self._module.initial(self._problem, th)
         state = state._replace(begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th)
         return self._line(state, known_in(filter_, self._problem), math.nan)
@@ -245,7 +251,9 @@ class Selfcal:
                 state = state._replace(said=state.said | 1 << k)
         return state
 
-    def _line(self, state: LiveState, known: History | Trace, nis: float) -> tuple[LiveState, Output | None]:
+    def _line(
+        self, state: LiveState, known: History | Trace, nis: float
+    ) -> tuple[LiveState, Sequence[Output]]:
         """The state with its angles, and the line where one is due."""
         (row,) = rows(
             known.attitude, known.attitude_u, known.coefficients, known.u, state.angles, self._problem.world
@@ -253,9 +261,9 @@ class Selfcal:
         state = state._replace(angles=row[:3].copy())
         slots = state.slots.at(state.t, self._every)
         if slots is None:
-            return state, None
+            return state, ()
         mean = state.nis / state.rows if state.rows else math.nan
-        return state._replace(slots=slots), [state.t, *row.tolist(), nis, mean]
+        return state._replace(slots=slots), [[state.t, *row.tolist(), nis, mean]]
 
 
 def filter_of(problem: Problem) -> ModuleType:

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from inercal._toml import read_toml
+from inercal.aoa.settings import AoaSettings
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
 from inercal.selfcal.settings import SelfcalSettings
+from inercal.study.aoa import aoa_study
 from inercal.study.imu import imu_study
 from inercal.study.positions import WAYS
 from inercal.study.rig import DISTRIBUTIONS
@@ -29,10 +31,20 @@ _COMMANDS = {
     "sting": "aoa",
 }
 
-_EXPECTED = {"calibrate turntable": "one of a turntable", "selfcal": "one for `inercal selfcal`"}
+_EXPECTED = {
+    "calibrate turntable": "one of a turntable",
+    "selfcal": "one for `inercal selfcal`",
+    "aoa": "one for `inercal aoa`",
+}
 
 #: tables (a regular expression) that hold one of these keys: setting one takes the place of the others
-_ONE_OF = ((r"positions", WAYS), (r"plan", PLAN_WAYS), (r"rig\.errors\.\w+", DISTRIBUTIONS))
+_ONE_OF = (
+    (r"positions", WAYS),
+    (r"plan", PLAN_WAYS),
+    (r"rig\.errors\.\w+", DISTRIBUTIONS),
+    (r"sensors\.\w+", ("axis", "angle")),
+    (r"sensors\.\w+", ("calibration", "scale")),
+)
 
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
@@ -89,6 +101,24 @@ def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> Selfc
         One sentence: file and key, what was found, what was expected.
     """
     return selfcal_study(_read(path, overrides, "selfcal"), path)
+
+
+def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettings:
+    """Read the study of ``inercal aoa`` and ``inercal simulate aoa``.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file.
+    overrides : iterable of str
+        As for `load_imu_study`.
+
+    Raises
+    ------
+    StudyError
+        One sentence: file and key, what was found, what was expected.
+    """
+    return aoa_study(_read(path, overrides, "aoa"), path)
 
 
 def files_of(path: Path, given: Mapping[str, Any]) -> tuple[Path, ...]:

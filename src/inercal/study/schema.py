@@ -8,12 +8,13 @@ from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 from pydantic_core import core_schema
 
 from inercal._toml import Strict
+from inercal.study.aoa import AoaStudyFile
 from inercal.study.imu import ImuStudyFile
 from inercal.study.selfcal import SelfcalStudyFile
 from inercal.study.turntable import TurntableStudyFile
 
 #: a study is one of these
-STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile, SelfcalStudyFile)
+STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile, SelfcalStudyFile, AoaStudyFile)
 
 
 class _TomlSchema(GenerateJsonSchema):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from inercal.rigs.plans import NAMED
 from inercal.rigs.tables import Slot, slots
+from inercal.study.template_aoa import AOA
 from inercal.study.template_instrument import instrument_lines
 from inercal.study.template_selfcal import SELFCAL
 from inercal.units import Unit
@@ -181,6 +182,21 @@ def selfcal_template(
     if record_paths:
         following = f"selfcal {_files(record_paths, study_path, map_path)}"
     return _HEAD.format(what="of a self-calibration", next=following) + SELFCAL + _COMMON
+
+
+def aoa_template(
+    record_paths: Sequence[str | Path] = (),
+    study_path: str | Path = "STUDY.toml",
+    map_path: str | Path | None = None,
+) -> str:
+    """A study of an angle of attack with every key in it, each explained; arguments as for `imu_template`.
+
+    It loads as it is: the paper's three axes, pitching by 10 deg, at a latitude that stands for anywhere on Earth.
+    """
+    following = f"simulate aoa {_words([study_path])} --out simulated.csv"
+    if record_paths:
+        following = f"aoa {_files(record_paths, study_path, map_path)}"
+    return _HEAD.format(what="of an angle of attack", next=following) + AOA + _COMMON
 
 
 def _error_line(slot: Slot) -> str:

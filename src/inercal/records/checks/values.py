@@ -62,7 +62,16 @@ def saturated(values: Array) -> NDArray[np.int64]:
 
 
 def outliers(values: Array, name: str) -> list[Finding]:
-    """``outlier``: single samples off both neighbours, to the same side, by more than 12 times the noise.
+    """``outlier``: single samples far from their neighbours."""
+    rows = outlying(values)
+    if rows.size == 0:
+        return []
+    text = f"{name}: {counted(rows.size, 'sample')} far from both neighbours, knocks or wrong bits"
+    return [Finding("outlier", text, places("row", rows + 1))]
+
+
+def outlying(values: Array) -> NDArray[np.int64]:
+    """Rows of single samples off both neighbours, to the same side, by more than 12 times the noise.
 
     The noise is the standard deviation of the steps from sample to sample, the larger of two: from their
     median over the recording, and from the fifth largest of the 42 around the sample (two of them its own),
@@ -70,7 +79,7 @@ def outliers(values: Array, name: str) -> list[Finding]:
     """
     signal, rows = known(values)
     if signal.size <= _AROUND:
-        return []
+        return rows[:0]
     step = np.diff(signal)
     size = np.abs(step)
     height = np.minimum(size[:-1], size[1:])
@@ -84,11 +93,7 @@ def outliers(values: Array, name: str) -> list[Finding]:
         near = windows[np.clip(some - _AROUND // 2, 0, len(windows) - 1)]
         moved = np.partition(near, _AROUND - 5, axis=1)[:, _AROUND - 5] / 1.645
         found.append(some[height[some] > 12.0 * moved])
-    single = np.concatenate(found) + 1
-    if single.size == 0:
-        return []
-    text = f"{name}: {counted(single.size, 'sample')} far from both neighbours, knocks or wrong bits"
-    return [Finding("outlier", text, places("row", rows[single] + 1))]
+    return np.asarray(rows[np.concatenate(found) + 1], dtype=np.int64)
 
 
 def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:

@@ -1,0 +1,104 @@
+"""Lever arms of the accelerometers of a model, and which of them together show its angular acceleration.
+
+At a fixed roll of cosine c an accelerometer at angle lambda and position (r, 0, z) reads, with w the rate of pitch and
+al its acceleration (`inercal.aoa.model`),
+
+    A = g (sin theta cos lambda - c cos theta sin lambda) - q w^2 + p al
+    q = r cos lambda - c^2 z sin lambda,    p = -c (z cos lambda + r sin lambda)
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.layout import Layout
+from inercal.aoa.settings import AoaSettings
+from inercal.errors import StudyError
+
+Array = NDArray[np.float64]
+
+_NO_ARM = 1e-3
+"""Lever arm [m] below which accelerometers do not show angular acceleration."""
+
+_ROUNDING = 1e-12
+
+_ACROSS = 0.1
+"""Cosine of the roll below which axes across the body do not show pitch."""
+
+
+def level_of(settings: AoaSettings) -> float:
+    """Cosine of the roll that a study states, 1 without one.
+
+    Raises
+    ------
+    StudyError
+        The model lies on its side: the paper's methods have nothing to go by.
+    """
+    roll = settings.attitude.roll
+    level = 1.0 if roll is None else math.cos(roll.value)
+    if abs(level) < _ACROSS:
+        found = 0.0 if roll is None else math.degrees(roll.value)
+        raise StudyError(
+            "attitude.roll",
+            f"found {found:.6g} deg, expected one further from +-90 deg, at which pitch shows",
+        )
+    return level
+
+
+def axes(layout: Layout, level: float = 1.0) -> Array:
+    """(N, 2): what each axis reads of (sin theta, cos theta) at rest, over g."""
+    return np.stack([np.cos(layout.angle), -level * np.sin(layout.angle)], axis=-1)
+
+
+def centrifugal_arms(layout: Layout, level: float = 1.0) -> Array:
+    """(N,) q [m]: each axis reads -q w^2."""
+    return _arms(layout.r * np.cos(layout.angle) - level**2 * layout.z * np.sin(layout.angle))
+
+
+def tangential_arms(layout: Layout, level: float = 1.0) -> Array:
+    """(N,) p [m]: each axis reads p al."""
+    return _arms(-level * (layout.z * np.cos(layout.angle) + layout.r * np.sin(layout.angle)))
+
+
+def _arms(length: Array) -> Array:
+    """Arms, 0 where they are but rounding: such an axis does without a gyro."""
+    return np.where(np.abs(length) < _ROUNDING, 0.0, length)
+
+
+def pair_weights(layout: Layout, level: float = 1.0) -> Array | None:
+    """(N,) d [1/m] for the paper's dual accelerometer, al = d . A with A free of w^2; None without such a pair.
+
+    Of all pairs of antiparallel or parallel axes, in which gravity cancels, that with the longest arm L: (A_i + A_j)/L,
+    L = p_i + p_j, for antiparallel axes, (A_i - A_j)/L, L = p_i - p_j, for parallel ones. For the three axes -z, +x, +z
+    L = r_3 - r_1. What is left of gravity where calibrated axes are not quite parallel is taken off by a third, the
+    one nearest to square with them.
+    """
+    p, h = tangential_arms(layout, level), axes(layout, level)
+    pairs = [(p[i] + p[j], i, j, 1.0) for i, j in layout.opposed()]
+    pairs += [(p[i] - p[j], i, j, -1.0) for i, j in layout.aligned()]
+    arm, i, j, sign = max(pairs, key=lambda pair: abs(pair[0]), default=(0.0, 0, 0, 1.0))
+    if abs(arm) < _NO_ARM:
+        return None
+    weights = np.zeros(len(p))
+    weights[i], weights[j] = 1.0, sign
+    k = int(np.argmax(np.abs(np.sin(layout.turned[i]))))
+    if layout.spans:
+        three = [i, j, k]
+        weights[three] = np.cross(h[three, 0], h[three, 1])
+        weights = np.where(np.abs(weights) < _ROUNDING * np.abs(weights).max(), 0.0, weights)
+    return np.asarray(weights / (weights @ p))
+
+
+def all_weights(layout: Layout) -> Array | None:
+    """(N,) d [1/m] for the angular acceleration d . A by least squares from all axes; None where they do not show it.
+
+    Gravity cancels whatever the axes: d is what is left of the arms p outside of the plane that gravity moves the
+    readings in. At a roll of cosine c it is c al that comes out, as the gyro reads c w.
+    """
+    p, of_gravity = tangential_arms(layout), axes(layout)
+    beside = p - of_gravity @ np.linalg.lstsq(of_gravity, p, rcond=None)[0]
+    power = float(beside @ beside)
+    return beside / power if power > _NO_ARM**2 else None

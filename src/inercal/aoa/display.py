@@ -1,0 +1,165 @@
+"""An angle of attack for people: units of the field, names and delays in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.estimate.result import Estimate, rounded
+from inercal.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+#: SI unit -> that of the field, and how many of the old it is
+_OF_FIELD = {
+    "rad/s": ("deg/h", np.radians(1.0 / 3600.0)),
+    "rad": ("deg", np.radians(1.0)),
+    "m/s^2": ("ug", 1e-6 * STANDARD_GRAVITY),
+    "m": ("mm", 1e-3),
+    "s": ("ms", 1e-3),
+    "1": ("ppm", 1e-6),
+}
+
+#: unit -> that of larger things, how many of the former it is, and from where on it is taken
+_LARGE = {"deg/h": ("deg/s", 3600.0, 0.01), "ug": ("mg", 1000.0, 1.0)}
+
+#: how the name of a coefficient begins -> what it is
+_WORDS = {
+    "b_g": "bias of the gyro",
+    "b_roll": "bias of the roll gyro",
+    "b_yaw": "bias of the yaw gyro",
+    "b_": "bias of accelerometer {}",
+    "dr_": "position of accelerometer {}, forward",
+    "zo_": "position of accelerometer {}, up",
+    "k_g": "scale of the gyro",
+    "tau_g": "delay of the gyro",
+}
+
+_STATISTICS = {
+    "residual_rms": "root-mean-square normalised innovation",
+    "nis_mean": "normalised innovation squared (NIS), mean after 2 s",
+    "samples": "rows",
+    "angles": "rows with an angle",
+    "starts": "starts of the filter",
+}
+
+
+def shown_unit(si: str) -> tuple[str, float]:
+    """A unit for people, and how many of the old it is: ug, mm, deg/h, ppm, ms, deg; others stay."""
+    return _OF_FIELD.get(si, (si, 1.0))
+
+
+def sized(u: float, si: str) -> tuple[float, str]:
+    """An uncertainty of a budget for people: a large rate in deg/s, a large acceleration in mg, a whole as it is."""
+    unit, size = shown_unit(si)
+    if si == "1" and u == 1.0:
+        return u, si
+    larger, many, least = _LARGE.get(unit, (unit, 1.0, 0.0))
+    return (u / size / many, larger) if u / size / many >= least else (u / size, unit)
+
+
+def in_words(name: str) -> str:
+    """What a coefficient is: ``b_2`` the bias of accelerometer 2."""
+    begun, words = next((begun, words) for begun, words in _WORDS.items() if name.startswith(begun))
+    return words.format(name.removeprefix(begun))
+
+
+def displayed(estimate: Estimate) -> Estimate:
+    """The estimate with coefficients and budget in units of the field, angles of the conditions in degrees, and keys
+    of the statistics in words.
+
+    All of ``result`` stays as it is.
+    """
+    shown = [shown_unit(unit) for unit in estimate.units]
+    size = np.array([size for _, size in shown])
+    return replace(
+        estimate,
+        units=tuple(unit for unit, _ in shown),
+        values=estimate.values / size,
+        covariance=estimate.covariance / np.outer(size, size),
+        common=None if estimate.common is None else estimate.common / np.outer(size, size),
+        conditions=_in_degrees(estimate.conditions),
+        statistics={_STATISTICS.get(key, key): value for key, value in estimate.statistics.items()},
+        budget=tuple(
+            replace(item, u=u, unit=unit)
+            for item in estimate.budget
+            for u, unit in [sized(item.u, item.unit)]
+        ),
+    )
+
+
+def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested values whose keys say rad or rad/s, in degrees, which the keys then say."""
+    shown: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            shown[key] = _in_degrees(value)
+        elif key.endswith(("_rad", "_rad_s")) and value is not None:
+            shown[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
+        else:
+            shown[key] = value
+    return shown
+
+
+def delays(estimate: Estimate) -> str:
+    """Sentences on delays: that of the gyro, and what one common to all sensors costs."""
+    timing = estimate.result["timing"]
+    sentences = [_of_gyro(estimate, timing["gyro_delay"]), _in_common(timing)]
+    return " ".join(each for each in sentences if each)
+
+
+def _of_gyro(estimate: Estimate, known: Mapping[str, Any]) -> str:
+    """What is known of the delay of the gyro."""
+    told = []
+    if "tau_g" in estimate.names:
+        told.append(f"{_ms(estimate['tau_g'].value, estimate['tau_g'].u)} by the fusion")
+    elif known["stated"]:
+        told.append(f"{1e3 * known['stated']:.4g} ms as stated")
+    if known["spectra"] is not None:
+        told.append(f"{_ms(known['spectra']['value'], known['spectra']['u'])} by the spectra")
+    return f"The gyro is later than the accelerometers by {', '.join(told)}." if told else ""
+
+
+def _in_common(timing: Mapping[str, Any]) -> str:
+    """What a delay of all sensors does to the angle."""
+    delay, each = timing["common_delay"], timing["cost_per_ms"]
+    if each["max"] is None:
+        return ""
+    costs = f"{_deg(each['max'])} at most and {_deg(each['rms'])} rms for each millisecond"
+    if not delay["value"] and not delay["u"]:
+        return (
+            f"A delay that all sensors have in common is not stated, and no sensor sees it: it costs {costs} "
+            "(the rate of the angle times the delay)."
+        )
+    value, left = timing["cost"], timing["cost_u"]
+    return (
+        f"The stated common delay of {_ms(delay['value'], delay['u'])} is put right: it moves the angle by "
+        f"{_deg(value['max'])} at most, {_deg(value['rms'])} rms (the rate of the angle times the delay); its "
+        f"uncertainty leaves {_deg(left['max'])} at most, {_deg(left['rms'])} rms."
+    )
+
+
+def _ms(value: float, u: float) -> str:
+    """A time with its standard uncertainty."""
+    if not u:
+        return f"{1e3 * value:.4g} ms"
+    shown, spread = rounded(1e3 * value, 1e3 * u)
+    return f"{shown} ms (u {spread} ms)"
+
+
+def _deg(value: float) -> str:
+    """An angle [rad] in degrees."""
+    return f"{np.degrees(value):.2g} deg"
+
+
+def short(value: float | None, digits: int = 2) -> str:
+    """A number to so many digits after the first; a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    if value and not 1e-5 <= abs(value) < 1e5:
+        return f"{value:.1e}"
+    return f"{value:.{digits + 1}g}" if abs(value) < 10 ** (digits + 1) else f"{value:.0f}"

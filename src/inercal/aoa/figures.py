@@ -1,0 +1,368 @@
+"""Pictures and the page of an angle of attack: the angle and its band, and what speaks for it or against it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
+from inercal.aoa.clock import later
+from inercal.aoa.display import delays, displayed, shown_unit
+from inercal.aoa.outcome import unit_of
+from inercal.aoa.pauses import at_rest
+from inercal.aoa.tables import all_tables
+from inercal.aoa.verification import REFERENCE_U
+from inercal.report import sting
+from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches
+from inercal.report.aoa_innovations import innovations
+from inercal.report.figures import correlation
+from inercal.report.histories import Course, converging, falling
+from inercal.report.html import Picture, render
+from inercal.report.numbers import SETTLED, known, largest, middle, rms, settled, span
+from inercal.report.spectra import of_angle
+from inercal.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from inercal.aoa.filtered import Filtered
+    from inercal.aoa.settings import AoaSettings
+    from inercal.aoa.task import Measurement
+
+Array = NDArray[np.float64]
+
+_MG = 1e-3 * STANDARD_GRAVITY
+
+_CLOSE = 4.0
+"""Time [s] of the close-up."""
+
+_NO_FORCE = 1e-3
+"""Specific force [mg] that is none."""
+
+
+def angle_page(measurement: Measurement, settings: AoaSettings) -> str:
+    """The report of a measurement as one self-contained HTML page, with or without other methods and a reference."""
+    estimate = measurement.estimate
+    tables = all_tables(estimate, measurement.points, settings)
+    return render(
+        displayed(estimate), pictures(measurement, settings), "Angle of a wind-tunnel model", tables
+    )
+
+
+def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
+    """Draw what there is to see of a measurement of whatever method, status and length."""
+    layout, gyro = settings.layout, measurement.recording.gyro
+    map_of_sensors = sting.side_view(
+        layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any())
+    )
+    seen = _in_order(measurement)
+    recording, found = seen.recording, seen.filtered
+    t = recording.t
+    if len(t) < 2:
+        return [map_of_sensors]
+    names = (*layout.names, "gyro")
+    missing = np.isnan(np.column_stack([recording.acc, recording.gyro]))
+    masked = recording.masked if recording.masked is not None else np.zeros(missing.shape, dtype=bool)
+    restarts = np.empty(0) if found is None else t[list(found.starts[1:])]
+    marks = Marks(stretches(t, np.asarray(masked.any(axis=1))), gaps(t), restarts=restarts)
+    drawn = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
+    if missing.any() or len(marks.gaps):
+        drawn.append(measured(t, names, missing, masked, marks))
+    drawn += _against_reference(seen, marks) + _points(measurement) + _compared(seen, marks)
+    drawn += _lever_arms(seen, settings, marks)
+    if found is not None:
+        drawn += _flexure(seen, found, settings, marks) + _learned(seen, found)
+        drawn += innovations(t, found.innovations, names, found.nis_mean, marks)
+    reference = recording.reference
+    drawn += of_angle(
+        t,
+        np.degrees(seen.angles.theta),
+        None if reference is None else np.degrees(_apart(seen.angles.theta, reference)),
+        {} if found is None else dict(zip(names, found.innovations.T, strict=True)),
+    )
+    return drawn + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
+
+
+def _in_order(measurement: Measurement) -> Measurement:
+    """The measurement without the rows that are not later than those before them."""
+    t = measurement.recording.t
+    taken = later(t)
+    if len(taken) == len(t):
+        return measurement
+
+    def rows(of: Any, *names: str) -> Any:
+        """A part of the measurement, with those of its fields cut."""
+        return replace(
+            of, **{name: getattr(of, name)[taken] for name in names if getattr(of, name) is not None}
+        )
+
+    each = ("theta", "u", "rate", "rate_u")
+    found = measurement.filtered
+    if found is not None:
+        starts = tuple(int(k) for k in np.searchsorted(taken, found.starts))
+        found = replace(rows(found, *each, "acceleration", "innovations"), starts=starts)
+    kept = ("t", "acc", "gyro", "turns", "stated", "point", "trigger", "reference", "masked")
+    return replace(
+        measurement,
+        recording=rows(measurement.recording, *kept),
+        angles=rows(measurement.angles, *each),
+        filtered=found,
+        compared={name: rows(other, *each) for name, other in measurement.compared.items()},
+    )
+
+
+def _angle(seen: Measurement, marks: Marks) -> Picture:
+    """Angle, its uncertainty, and its rate."""
+    angles, t = seen.angles, seen.recording.t
+    theta, u, rate = np.degrees(angles.theta), np.degrees(angles.u), np.degrees(angles.rate)
+    learning = (
+        " It falls while the sensors are learned, and rises where they are saturated or silent."
+        if seen.filtered is not None
+        else ""
+    )
+    told = f"u: median {middle(u):.2g}°, largest after the start {largest(u[settled(t)]):.2g}°"
+    panels = [
+        Panel(
+            "theta [°]", {"": theta}, f"{angles.method}: {span(theta)}°", (theta - 2.0 * u, theta + 2.0 * u)
+        ),
+        Panel("u of theta [°]", {"": u}, told, scale="log"),
+    ]
+    if np.isfinite(rate).any():
+        panels.append(Panel("rate [°/s]", {"": rate}, f"rate: {span(rate)} °/s", zero=True))
+    return over_time(
+        "Angle, its uncertainty, and its rate",
+        "Least and greatest value of pieces of the record, so that none is hidden. The band of ± two standard "
+        "uncertainties about the angle is mostly thinner than its line; below, the standard uncertainty u on a scale "
+        f"of its own.{learning}{marks.words} {delays(seen.estimate)}".rstrip(),
+        t,
+        panels,
+        marks,
+    )
+
+
+def _close_up(seen: Measurement) -> list[Picture]:
+    """A few seconds in which the model moves most; nothing of a short record."""
+    t, angles = seen.recording.t, seen.angles
+    if not t[-1] - t[0] > 4.0 * _CLOSE or not np.isfinite(angles.theta).any():
+        return []
+    edges = np.searchsorted(t, np.arange(t[0] + SETTLED, t[-1] - _CLOSE, _CLOSE))
+    theta = np.degrees(angles.theta)
+    spans = [float(np.ptp(known(theta[a:b]))) if len(known(theta[a:b])) else 0.0 for a, b in pairwise(edges)]
+    if not spans:
+        return []
+    k = int(np.argmax(spans))
+    part = slice(int(edges[k]), int(edges[k + 1]))
+    lines = {"angle": theta[part]}
+    if seen.recording.reference is not None:
+        lines["reference"] = np.degrees(seen.recording.reference[part])
+    panels = [Panel("theta [°]", lines), Panel("rate [°/s]", {"": np.degrees(angles.rate[part])}, zero=True)]
+    return [
+        over_time(
+            "Close-up",
+            f"The {_CLOSE:g} seconds in which the angle moves most. Steps and needles that no model can follow are "
+            "faults of sensors or of time stamps.",
+            t[part],
+            panels,
+        )
+    ]
+
+
+def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
+    """The error against a reference angle with the band that it should lie in; nothing without one."""
+    t, angles, reference = seen.recording.t, seen.angles, seen.recording.reference
+    if reference is None or not np.isfinite(angles.theta - reference).any():
+        return []
+    told = np.isfinite(reference)
+    moving = np.zeros(len(t), dtype=bool)
+    still, _ = at_rest(t[told], np.unwrap(reference[told]), np.full(int(told.sum()), REFERENCE_U))
+    moving[told] = ~still
+    error, half = np.degrees(_apart(angles.theta, reference)), 2.0 * np.degrees(angles.u)
+    late = settled(t) & np.isfinite(error) & np.isfinite(half)
+    outside = 100.0 * float(np.mean(np.abs(error[late]) > half[late])) if late.any() else 0.0
+    parts = ", ".join(
+        f"{rms(error[late & chosen]):.2g}° rms {what}"
+        for what, chosen in (("at rest", ~moving), ("moving", moving))
+        if (late & chosen).any()
+    )
+    return [
+        over_time(
+            "Error against the reference",
+            "Angle less the reference angle of the record, with the band of ± two standard uncertainties; yellow: the "
+            f"reference moves. After the first 2 s {parts}; {outside:.2g} % of the rows lie outside the band, about "
+            "5 % would by chance. An error that stays when the model stops is a bias or an axis that is off; one that "
+            f"goes with the rate is a delay.{marks.words}",
+            t,
+            [Panel("error [°]", {"": error}, f"error: {span(error[late])}°", (-half, half), zero=True)],
+            replace(marks, moving=stretches(t, moving)),
+            1.5,
+        )
+    ]
+
+
+def _points(measurement: Measurement) -> list[Picture]:
+    """Means of the points at rest, and against the reference where there is one; nothing without any."""
+    found, reference = measurement.points, measurement.recording.reference
+    if not found:
+        return []
+    theta, u, left, scatter = np.degrees(
+        [[each.theta, each.u, each.u_scatter, each.scatter] for each in found]
+    ).T
+    error = None
+    if reference is not None:
+        true = [known(reference[each.start : each.stop]) for each in found]
+        means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
+        error = np.degrees(_apart(np.radians(theta), means))
+    return [sting.points(theta, u, left, scatter, error)]
+
+
+def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
+    """Errors of all methods against the reference, or their differences from the one asked for."""
+    if not seen.compared:
+        return []
+    t, reference = seen.recording.t, seen.recording.reference
+    true = reference is not None and bool(np.isfinite(reference).any())
+    others = {name: each.theta for name, each in seen.compared.items()}
+    shown = {seen.angles.method: seen.angles.theta} | others if true else others
+    base = reference if true and reference is not None else seen.angles.theta
+    what = "error against the reference" if true else f"difference from {seen.angles.method}"
+    apart = {name: _apart(theta, base) for name, theta in shown.items()}
+    late = settled(t)
+    sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
+    panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
+    return [
+        sting.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
+        over_time(
+            "Methods over time",
+            f"The {what}, a panel for each method, each on a scale of its own: that which it spans after the first "
+            f"2 s. The scales are the news.{marks.words}",
+            t,
+            panels,
+            marks,
+            0.5,
+        ),
+    ]
+
+
+def _lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[Picture]:
+    """What lever arms add to the reading of each accelerometer."""
+    t, found, layout, roll = seen.recording.t, seen.filtered, settings.layout, settings.attitude.roll
+    rate = seen.angles.rate if np.isfinite(seen.angles.rate).any() else seen.recording.gyro
+    weights = all_weights(layout)
+    if found is not None:
+        acceleration = found.acceleration
+    else:
+        acceleration = np.full(len(t), np.nan) if weights is None else seen.recording.acc @ weights
+    level = 1.0 if roll is None else math.cos(roll.value)
+    degrees, late = math.degrees(_MG / settings.site.gravity), settled(t)
+    panels = []
+    for name, q, p in zip(
+        layout.names, centrifugal_arms(layout, level), tangential_arms(layout, level), strict=True
+    ):
+        terms = {"centrifugal": -q * rate**2 / _MG, "tangential": p * acceleration / _MG}
+        sizes = {word: largest(x[late]) for word, x in terms.items()}
+        most = ", ".join(
+            f"{word} {size:.3g} mg = {degrees * size:.2g}°"
+            for word, size in sizes.items()
+            if size > _NO_FORCE
+        )
+        title = f"{name}, at most: {most}" if most else f"{name}: none"
+        panels.append(Panel(f"{name} [mg]", terms, title, zero=True))
+    return [
+        over_time(
+            "What lever arms add to the readings",
+            "Specific force that each accelerometer feels because it sits away from the pivot, by the positions that "
+            "the study states: centrifugal with the square of the rate, tangential with the angular acceleration. "
+            f"Taken for gravity, each mg costs {degrees:.2g}° or more. What is small against the biases needs no "
+            f"compensation; what is large shows any error of a position.{marks.words}",
+            t,
+            panels,
+            marks,
+            0.75,
+        )
+    ]
+
+
+def _flexure(seen: Measurement, found: Filtered, settings: AoaSettings, marks: Marks) -> list[Picture]:
+    """The sting's flexure as it was estimated; nothing where it is not."""
+    names, prior = seen.problem.names, settings.prior
+    if "flexure_z" not in names or len(found.kept_t) < 2:
+        return []
+    panels = []
+    for axis, word, of in (("z", "across", prior.vertical), ("x", "along", prior.axial)):
+        k = names.index(f"flexure_{axis}")
+        value, u, level = found.states[:, k] / _MG, found.states_u[:, k] / _MG, 2.0 * of.level / _MG
+        title = f"{word} the model: {rms(value):.2g} mg rms, u {middle(u):.2g} mg; prior {0.5 * level:.2g} mg"
+        band = value - 2.0 * u, value + 2.0 * u
+        panels.append(Panel(f"{axis} [mg]", {"": value}, title, band, {"": level, " ": -level}, zero=True))
+    return [
+        over_time(
+            "Flexure of the sting",
+            "Specific force of the model's vibration on its sting, as the fusion estimates it beside the pitch, with "
+            "bands of ± two standard uncertainties; dashes: ± two standard deviations of the prior. Within its band "
+            "there is none to be seen. Beyond the dashes the prior is too small, and so is the uncertainty of theta; "
+            f"even where they hold it can be too small by up to 2.5 times while the sting vibrates.{marks.words}",
+            found.kept_t,
+            panels,
+            marks,
+        )
+    ]
+
+
+def _learned(seen: Measurement, found: Filtered) -> list[Picture]:
+    """Biases, lever arms, heights and scale: at the end against their priors, and over time."""
+    problem, t = seen.problem, found.kept_t
+    if len(t) < 2:
+        return []
+    places = [*problem.nuisances.values()]
+    prior, sizes = (
+        np.sqrt(np.diag(problem.covariance)),
+        np.array([shown_unit(unit_of(name))[1] for name in problem.nuisances]),
+    )
+    units = [shown_unit(unit_of(name))[0] for name in problem.nuisances]
+    told = np.flatnonzero(np.isfinite(found.states_u[:, places]).all(axis=1))
+    if not len(told):
+        return []
+    courses = [
+        Course(
+            name,
+            unit,
+            found.states[:, k] / size,
+            found.states_u[:, k] / size,
+            float(prior[k] / size),
+            centre=float(problem.mean[k] / size),
+        )
+        for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True)
+    ]
+    last = found.states[told[-1], places] / sizes, found.states_u[told[-1], places] / sizes
+    at_end = sting.learned(
+        tuple(problem.nuisances), units, *last, problem.mean[places] / sizes, prior[places] / sizes
+    )
+    if found.smoothed:
+        return [at_end]  # constants are the same all along
+    return [
+        at_end,
+        converging(
+            "What was learned, over time",
+            "Biases b, lever arms dr, heights zo and scale k of the gyro as the record goes on, with bands of ± two "
+            "standard uncertainties; above each its last value with its u. Bar at the start: the prior, ± two standard "
+            "deviations. Each panel spans what the last 45 % of the time leave open. A value that keeps moving "
+            "by more than its band is no constant: temperature, or an error of another kind.",
+            t,
+            courses,
+        ),
+        falling(
+            "How the uncertainties fall",
+            "Standard uncertainty of each over that of its prior. A line falls when the motion tells the coefficients "
+            "apart, and stays level while it does not: biases need a sweep of the angle, lever arms fast motion.",
+            t,
+            courses,
+        ),
+    ]
+
+
+def _apart(theta: Array, other: Array) -> Array:
+    """Difference of angles [rad], within half a turn."""
+    return np.asarray(np.remainder(theta - other + math.pi, 2.0 * math.pi) - math.pi)

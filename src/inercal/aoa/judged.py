@@ -1,0 +1,130 @@
+"""How well a recording fits a study: what the fusion with all its nuisances makes of the liveliest stretch of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.clock import later
+from inercal.aoa.fusion import advance, initial
+from inercal.aoa.problem import Problem, problem
+from inercal.aoa.recording import Recording
+from inercal.aoa.recursion import OUTPUTS
+from inercal.aoa.settings import AoaSettings, States
+from inercal.records.checks.values import outlying
+
+Array = NDArray[np.float64]
+
+STRETCH = 6000
+"""Rows that are judged."""
+
+WIDE = 3.0
+"""Standard deviations of its prior by which a coefficient may be off and still be as expected."""
+
+WIDE_SCALE = 10.0
+"""The same of the gyro's scale, which a filter that linearises also moves where a buffet is fast and small."""
+
+WHITE = 0.53
+"""Mean of log(1 + v^2) of white innovations of variance 1."""
+
+_LARGE = 0.75
+_FAR = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What the fusion found in a stretch.
+
+    ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` how far
+    each coefficient ended from its prior, in standard deviations of it, by name; ``misfit`` of all in one number.
+    """
+
+    innovations: Array
+    theta: Array
+    rate: Array
+    off: dict[str, float]
+    problem: Problem
+
+    @property
+    def by_sensor(self) -> Array:
+        """(N + 1,) mean of log(1 + v^2) of each sensor: 0.53 for white innovations, and little moved by single wild
+        ones; 0 of one that is not there."""
+        return np.array([_logarithm(v[np.isfinite(v)]) for v in self.innovations.T])
+
+    @property
+    def misfit(self) -> float:
+        """Sum over the sensors, and over the coefficients of log(1 + (off / 3)^2); a gyro without noise misfits too."""
+        of_gyro = float(self.by_sensor[-1])
+        silent = max(0.0, WHITE - of_gyro) if np.isfinite(self.innovations[:, -1]).any() else 0.0
+        return float(self.by_sensor.sum() + silent + np.log1p(self._far**2).sum())
+
+    @property
+    def fits(self) -> bool:
+        """True where no sensor and no coefficient is beyond what its noise and its prior explain."""
+        return bool(self.by_sensor.max() < _LARGE and np.abs(self._far).max() < _FAR)
+
+    @property
+    def _far(self) -> Array:
+        """How far the coefficients are off, over what is expected at most."""
+        return np.array([v / (WIDE_SCALE if k == "k_g" else WIDE) for k, v in self.off.items()])
+
+
+def _logarithm(v: Array) -> float:
+    """Mean of log(1 + v^2), 0 without any."""
+    with np.errstate(over="ignore"):
+        return float(np.minimum(np.log1p(v**2), 700.0).mean()) if v.size else 0.0
+
+
+def stretch(recording: Recording) -> Recording:
+    """Up to `STRETCH` rows that go on in time, those in which the sensors vary most, without single wild samples."""
+    taken = later(recording.t)
+    if len(taken) > STRETCH:
+        read = np.column_stack([recording.acc, recording.gyro])[taken]
+        scale = _scatter(read)
+        starts = np.arange(0, len(taken) - STRETCH + 1, STRETCH // 2)
+        lively = [float((_scatter(read[k : k + STRETCH]) / scale).sum()) for k in starts]
+        first = int(starts[int(np.argmax(lively))])
+        taken = taken[first : first + STRETCH]
+    part = of_rows(recording, taken)
+    for column in (*part.acc.T, part.gyro, *part.turns.T):
+        # mirrored at the ends, where a sample has one neighbour
+        wild = outlying(np.concatenate([column[1:2], column, column[-2:-1]])) - 1
+        column[wild[(wild >= 0) & (wild < len(column))]] = np.nan
+    return part
+
+
+def _scatter(read: Array) -> Array:
+    """Standard deviation of each column, 1 of one that is not there."""
+    known = np.isfinite(read)
+    each = [float(c[k].std()) if k.any() else 0.0 for c, k in zip(read.T, known.T, strict=True)]
+    return np.array([one or 1.0 for one in each])
+
+
+def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
+    """The sensors' part of some rows."""
+    return Recording(
+        recording.t[rows],
+        recording.acc[rows],
+        recording.gyro[rows],
+        recording.turns[rows],
+        recording.stated[rows],
+    )
+
+
+def judge(
+    recording: Recording, settings: AoaSettings, states: States = 19, free_delay: bool = False
+) -> Judged:
+    """Filter a stretch whose time goes on."""
+    asked = replace(settings, estimator=replace(settings.estimator, states=states))
+    posed = problem(asked, recording.spatial)
+    with np.errstate(all="ignore"):
+        state, trace = advance(initial(posed), posed, recording.t, recording.rows, last=True)
+        at = [*posed.nuisances.values()]
+        off = (state.x[at] - posed.mean[at]) / np.sqrt(np.diag(posed.covariance)[at])
+    told = trace.out
+    named = {
+        name: float(np.nan_to_num(each, nan=1e6)) for name, each in zip(posed.nuisances, off, strict=True)
+    }
+    return Judged(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)

@@ -1,0 +1,198 @@
+"""What the angle and the coefficients of the sensors are uncertain by: noise, prior, and what is stated.
+
+The covariance P of the best filter is homogeneous in the variances q_s of all its sources, and to first order no change
+of its gains changes it. So the part of a source is its slope, and the parts add up to the whole (Euler's theorem on
+homogeneous functions):
+
+    P_s = q_s dP/dq_s        sum_s P_s = P
+
+The filter is run again with each variance a little larger, over the beginning of a long recording: it costs as many
+runs as there are sources.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa import model
+from inercal.aoa.clock import later
+from inercal.aoa.filtered import SETTLED
+from inercal.aoa.fusion import advance, initial
+from inercal.aoa.problem import Problem
+from inercal.aoa.problem import problem as stated_problem
+from inercal.aoa.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.aoa.smoother import smooth
+from inercal.estimate.budget import BudgetItem
+
+Array = NDArray[np.float64]
+
+ANGLE = "theta"
+"""Name of the angle among the shares of a budget."""
+
+_STEP = 1e-3
+"""Relative change of a variance, for its slope."""
+
+_GRAVITY_STEP = 1e-5
+"""That of gravity."""
+
+MOST = 20_000
+"""Rows that are looked at, from the first on; half of them where they are smoothed."""
+
+_NOTHING = 1e-5
+"""Share of a variance below which a source does nothing."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One source, ``u`` in ``unit``, and where a problem holds it: in ``constants`` of the model that are variances, in
+    those that are standard deviations (``levels``), in the prior of ``states``, or in the angle that is stated."""
+
+    name: str
+    type: str
+    u: float
+    unit: str
+    constants: tuple[int, ...] = ()
+    levels: tuple[int, ...] = ()
+    states: tuple[str, ...] = ()
+    stated: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Variances by source.
+
+    Attributes
+    ----------
+    budget : tuple of BudgetItem
+        With the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first 2 s.
+    gravity : (p,)
+        Change of each coefficient with gravity [SI unit s^2/m].
+    """
+
+    budget: tuple[BudgetItem, ...]
+    gravity: Array
+
+
+def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool) -> Parts:
+    """Split what the fusion says of its uncertainty by where it comes from.
+
+    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same.
+    """
+    taken = later(recording.t)[: MOST // 2 if smoothed else MOST]
+    t, rows = recording.t[taken], recording.rows[taken]
+    at = list(problem.nuisances.values())
+    of = sources(problem, settings)
+    changed = [_enlarged(problem, rows, each) for each in of]
+    g = problem.constants[model.GRAVITY]
+    heavier = problem.constants.copy()
+    heavier[model.GRAVITY] = g * (1.0 + _GRAVITY_STEP)
+    runs = [(problem, rows), *changed, (replace(problem, constants=heavier), rows)]
+    with ThreadPoolExecutor() as pool:
+        (angle, P, x, theta), *others, (_, _, moved, turned) = pool.map(
+            lambda run: _run(run[0], t, run[1], smoothed), runs
+        )
+    found: list[tuple[Source, Array]] = []
+    for source, (by, spread, *_) in zip(of, others, strict=True):
+        slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
+        found.append((source, np.maximum(slope, 0.0)))
+    # gravity is no state of the filter: its error moves the estimate
+    by_gravity = (moved - x)[at] / (g * _GRAVITY_STEP)
+    apart = (turned - theta)[np.isfinite(turned - theta)]
+    of_angle = float(np.sqrt(np.mean(np.square(apart)))) / (g * _GRAVITY_STEP)
+    for each in settings.site.inputs:
+        shift = each.sensitivity * each.u * np.append(of_angle, by_gravity)
+        found.append((Source(each.source, "B", each.u, each.unit), np.square(shift)))
+    return Parts(_items(found, (ANGLE, *problem.nuisances)), by_gravity)
+
+
+def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:
+    """All sources that a problem has, but for gravity."""
+    noise, prior, timing = settings.noise, settings.prior, settings.timing
+    before = _known_before(problem, settings)
+    roll, zero = settings.attitude.roll, settings.zero
+    lever = float(np.hypot(prior.lever_common, prior.lever))
+    flexure = max(prior.vertical.level, prior.axial.level)
+    accelerometers = tuple(f"b_{k + 1}" for k in range(problem.count))
+
+    def of_prior(name: str, u: float, unit: str, *begin: str) -> Source:
+        states = tuple(each for each in problem.names if each.startswith(begin) and each not in before)
+        levels = (model.Z_LEVEL, model.X_LEVEL) if begin == ("s_", "flexure_") else ()
+        return Source(name, "B", u, unit, levels=levels, states=states)
+
+    of_states = (
+        of_prior("accelerometer bias", noise.accelerometer_bias, "m/s^2", *accelerometers),
+        of_prior("gyro bias", noise.gyro_bias, "rad/s", "b_g", "b_roll", "b_yaw"),
+        of_prior("lever arms", lever, "m", "dr_"),
+        of_prior("heights", prior.height, "m", "zo_"),
+        of_prior("gyro scale", prior.gyro_scale, "1", "k_g"),
+        of_prior("gyro delay", prior.gyro_delay, "s", "tau_g"),
+        of_prior("roll", 0.0 if roll is None else roll.u, "rad", "phi"),
+        of_prior("flexure of the sting", flexure, "m/s^2", "s_", "flexure_"),
+        Source("earlier run", "B", 1.0, "1", states=before),
+    )
+    delay, motion = (model.COMMON_DELAY_U,), (model.SNAP,)
+    return (
+        Source("accelerometer noise", "A", noise.accelerometer, "m/s^2", (model.NOISE,)),
+        Source("gyro noise", "A", noise.gyro, "rad/s", (model.GYRO_NOISE, model.TURN_NOISE)),
+        *(each for each in of_states if each.states),
+        *([Source("common delay", "B", timing.common_delay_u, "s", levels=delay)] if timing.common_delay_u else []),
+        *([Source("stated zero", "B", zero.u, "rad", stated=True)] if zero is not None else []),
+        Source("motion between samples", "B", 1.0, "1", motion),
+    )  # fmt: skip
+
+
+def _known_before(problem: Problem, settings: AoaSettings) -> tuple[str, ...]:
+    """States whose prior is not that of the study."""
+    usual = stated_problem(settings, problem.spatial).covariance
+    return tuple(
+        name
+        for name, own, other in zip(problem.names, problem.covariance, usual, strict=True)
+        if not np.array_equal(own, other)
+    )
+
+
+def _run(problem: Problem, t: Array, rows: Array, smoothed: bool) -> tuple[float, Array, Array, Array]:
+    """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are judged."""
+    state, trace = advance(initial(problem), problem, t, rows, last=True)
+    out = smooth(problem, t, rows, trace.starts) if smoothed else trace.out
+    judged = out[t - t[0] >= SETTLED] if len(t) and t[-1] - t[0] > SETTLED else out
+    u = judged[np.isfinite(judged[:, 1]), 1]
+    return float(np.mean(np.square(u))), state.P, state.x, judged[:, 0]
+
+
+def _enlarged(problem: Problem, rows: Array, source: Source) -> tuple[Problem, Array]:
+    """The problem and its rows with the variance of a source larger by `_STEP`."""
+    by = 1.0 + _STEP
+    constants, covariance = problem.constants.copy(), problem.covariance.copy()
+    constants[list(source.constants)] *= by
+    constants[list(source.levels)] *= by**0.5
+    at = [problem.names.index(name) for name in source.states]
+    covariance[np.ix_(at, at)] *= by
+    if source.stated:
+        rows = rows.copy()
+        rows[:, problem.count + 2] *= by**0.5
+    return replace(problem, constants=constants, covariance=covariance), rows
+
+
+def _items(found: list[tuple[Source, Array]], names: tuple[str, ...]) -> tuple[BudgetItem, ...]:
+    """Lines of a budget from parts (1 + p,) of variances."""
+    whole = np.sum([part for _, part in found], axis=0)
+    return tuple(
+        BudgetItem(
+            source.name,
+            source.type,
+            source.u,
+            source.unit,
+            {
+                name: float(own / total)
+                for name, own, total in zip(names, part, whole, strict=True)
+                if own > _NOTHING * total
+            },
+        )
+        for source, part in found
+    )

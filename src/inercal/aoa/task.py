@@ -1,0 +1,181 @@
+"""What the command runs on a study of inertial angle of attack: angles from a record, by one method or by many."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa import filtered, recursion, smoother
+from inercal.aoa.angles import Angles, of_fusion
+from inercal.aoa.delay import Delay, relative_delay
+from inercal.aoa.diagnosis import diagnose
+from inercal.aoa.filtered import Filtered
+from inercal.aoa.methods import MEASURED, label, low_passed
+from inercal.aoa.methods import measure as by_methods
+from inercal.aoa.outcome import assemble, assemble_paper
+from inercal.aoa.plausibility import implausible
+from inercal.aoa.points import Point, points
+from inercal.aoa.posterior import corrected
+from inercal.aoa.posterior import load as load_posterior
+from inercal.aoa.problem import Problem, problem
+from inercal.aoa.reading import recording_of
+from inercal.aoa.recording import Recording, plain
+from inercal.aoa.sensor_fit import Verified, fit
+from inercal.aoa.settings import AoaSettings, Methods
+from inercal.aoa.verification import Errors, errors
+from inercal.aoa.zero import tare, with_zero
+from inercal.errors import InputError, RecordError
+from inercal.estimate.result import Estimate
+from inercal.records.record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """An ``estimate``, and what is behind it for files and pictures.
+
+    ``settings`` are those of the study, put right by an earlier result; ``angles`` of the method asked for;
+    ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest; ``delay`` of the gyro as the spectra
+    have it; with a reference angle its ``errors`` by method and the sensors fitted to it, ``verified``; ``compared``
+    the angles of other methods, by name.
+    """
+
+    estimate: Estimate
+    settings: AoaSettings
+    problem: Problem
+    recording: Recording
+    angles: Angles
+    filtered: Filtered | None
+    points: tuple[Point, ...]
+    delay: Delay | None
+    errors: Mapping[str, Errors] = field(default_factory=dict)
+    verified: Verified | None = None
+    compared: Mapping[str, Angles] = field(default_factory=dict)
+
+
+def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare: bool = False) -> None:
+    """Load, or compile, the kernels that `measure` uses, so that they do not count in its time."""
+    if methods is not None and not compare:
+        return
+    of, t = problem(settings), np.arange(2.0)
+    rows = plain(t, np.full((2, of.count), np.nan), np.full(2, np.nan)).rows
+    out, none = np.empty((0, recursion.OUTPUTS + of.count + 1)), np.empty((0, 2 * of.size))
+    x, P, turns = of.mean.copy(), of.covariance.copy(), np.zeros(2)
+    recursion.advance(x, P, turns, t[:0], rows[:0], of.geometry, of.places, of.constants, out, none, 1, 0)
+    if settings.estimator.smooth or compare:
+        smoother.load(of)
+
+
+def measure(
+    record: Record,
+    settings: AoaSettings,
+    methods: Methods | None = None,
+    compare: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Measurement:
+    """Measure the angle of attack of a model from what its sensors recorded.
+
+    Parameters
+    ----------
+    record : Record
+        ``t``, ``a1`` .., ``gyro``; ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` where there are
+        any.
+    settings : AoaSettings
+        Site, sensors, noise, prior, timing, estimator.
+    methods : Methods or None
+        The paper's way with these choices; None for the fusion.
+    compare : bool
+        Also by the fusion of 8 and 19 states, causal and smoothed, and by the paper's methods.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    Measurement
+        Its estimate's status says whether the angles can be used; nothing is raised for poor ones.
+
+    Raises
+    ------
+    InputError
+        The record has not the channels of a model, the study does not fit it, or an earlier result cannot be used.
+    """
+    clock = time.perf_counter()
+    prior = settings.estimator.prior
+    posterior = None
+    if prior is not None:
+        posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
+    recording = recording_of(record, settings)
+    findings = implausible(recording, settings)
+    zeroed = recording if settings.zero is None else with_zero(recording, settings)
+    of = problem(settings, recording.spatial, posterior)
+    delay = relative_delay(recording, settings.layout)
+    found: Filtered | None = None
+    if methods is None:
+        progress("smoothing" if settings.estimator.smooth else "filtering")
+        found = filtered.estimate(zeroed, of, settings.estimator.smooth)
+        angles = of_fusion(found, settings.estimator.states)
+        progress("looking for faults")
+        findings = [*findings, *diagnose(zeroed, settings, of, found)]
+    else:
+        progress(label(methods))
+        angles = by_methods(tare(recording, settings), settings, methods)
+    compared = _compared(zeroed, settings, angles, progress) if compare else {}
+    progress("assembling")
+    judged: dict[str, Errors] = {}
+    verified = None
+    if recording.reference is not None and np.isfinite(recording.reference).any():
+        progress("fitting the sensors to the reference angle")
+        judged = {each.method: errors(recording, each) for each in (angles, *compared.values())}
+        verified = _fitted(recording, settings)
+    at_rest = points(recording, angles, settings)
+    behind = (findings, delay, at_rest, judged, compared, verified)
+    if found is None:
+        estimate = assemble_paper(recording, settings, angles, *behind)
+    else:
+        estimate = assemble(zeroed, settings, of, found, *behind)
+    estimate = replace(estimate, timing={"solve": time.perf_counter() - clock})
+    return Measurement(
+        estimate, settings, of, recording, angles, found, at_rest, delay, judged, verified, compared
+    )
+
+
+def _fitted(recording: Recording, settings: AoaSettings) -> Verified | None:
+    """The sensors fitted to the reference angle; None where there is too little of it."""
+    try:
+        return fit(recording, settings)
+    except RecordError:
+        return None
+
+
+def _compared(
+    recording: Recording, settings: AoaSettings, done: Angles, progress: Callable[[str], None]
+) -> dict[str, Angles]:
+    """The angles of other methods by name: the fusion large and small, causal and smoothed, and the paper's ways."""
+    others: dict[str, Angles] = {}
+    for states in (8, 19):
+        for smoothed in (False, True):
+            estimator = replace(settings.estimator, states=states, smooth=smoothed, prior=None)
+            chosen = replace(settings, estimator=estimator)
+            name = f"{'smoothed' if smoothed else 'fusion'} {states}"
+            if name != done.method:
+                progress(name)
+                found = filtered.estimate(recording, problem(chosen, recording.spatial), smoothed)
+                others[name] = of_fusion(found, states)
+    tared = tare(recording, settings)
+    for methods in MEASURED:
+        if label(methods) == done.method:
+            continue
+        progress(label(methods))
+        try:
+            others[label(methods)] = by_methods(tared, settings, methods)
+        except InputError:  # two axes, or no gyro: not for every method
+            continue
+    if (paper := others.get(label(MEASURED[0]))) is not None:
+        filtered_after = low_passed(paper, recording.t)
+        others[filtered_after.method] = filtered_after
+    return others

@@ -1,0 +1,261 @@
+"""A wind-tunnel model measured while it moves: rows in, angles and their uncertainties out, each at once.
+
+The causal fusion of `inercal.aoa` goes on by one row at a time, to the digits that it gives on the whole file, and
+answers each row with one line: the first ones, and those after the angle was lost, are held until the filter can start
+(`inercal.aoa.live`). Sensors are calibrated, and samples at a range left out, as `inercal.aoa.reading` does it. What
+only a whole recording shows is not seen here: sensors that are flat at an extreme below their range, or stuck, and
+whether the model rests in the stretch that the study calls its zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.calibrated import at_range, check_axes, check_unit, indication
+from inercal.aoa.filtered import SETTLED
+from inercal.aoa.history import columns, rows
+from inercal.aoa.live import Live, LiveState, Told
+from inercal.aoa.model import GATE
+from inercal.aoa.posterior import load as load_posterior
+from inercal.aoa.problem import problem
+from inercal.aoa.reading import missing
+from inercal.aoa.settings import GYROS, AoaSettings
+from inercal.aoa.zero import middle_of
+from inercal.records.findings import Finding
+from inercal.records.record import Column
+from inercal.stream.lines import Lines, Sample
+from inercal.stream.run import Output, Slots
+
+Array = NDArray[np.float64]
+
+_CONTRADICTED = 2.0
+"""Mean of the squared innovations in a window, each over its variance, from which rows contradict the model."""
+
+_WINDOW = 2.0
+"""Length [s] of such a window."""
+
+_FEWEST = 50
+"""Innovations in a window below which it is not judged."""
+
+_SILENT = 1.0
+"""Time [s] without a number after which a gyro is said to be silent."""
+
+# bits of `AoaState.said`; from the last on one for each sensor
+_BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
+
+
+class AoaState(NamedTuple):
+    """What is known after a row.
+
+    ``live`` is the state of the fusion; ``t`` [s] the latest stamp, ``begun`` [s] the first one (NaN before);
+    ``zeroed``: the study's zero has been used; ``temperature`` [degC] the last one known; ``heard`` [s] the last row in
+    which the gyro spoke. ``nis`` and ``scalars``: sum of the squared innovations since ``window`` [s], and their
+    number. ``said`` are the alarms given, one bit each; ``slots`` that of the last line.
+    """
+
+    live: LiveState
+    t: float
+    begun: float
+    zeroed: bool
+    temperature: float
+    heard: float
+    nis: float
+    scalars: int
+    window: float
+    said: int
+    slots: Slots
+
+
+class Aoa:
+    """Measures angles row by row (`inercal.stream.run.Recursive`); columns as `inercal.aoa.history` has them.
+
+    Parameters
+    ----------
+    lines : Lines
+        With the columns of a recording: ``t`` or a rate, accelerometers, gyros.
+    settings : AoaSettings
+    every : float
+        Interval [s] of the lines, in the time of the record: of the first row with an angle in each; 0 for a line each
+        row.
+    say : callable
+        Told, once each, of sensors that are missing, at their range or silent, and when the innovations contradict the
+        model.
+
+    Raises
+    ------
+    RecordError
+        Columns that are missing, or volts or counts without a scale; or, later, time that stays behind.
+    InputError
+        An earlier result that cannot be used as a prior.
+    """
+
+    kind = "aoa"
+
+    def __init__(
+        self,
+        lines: Lines,
+        settings: AoaSettings,
+        every: float = 0.0,
+        say: Callable[[Finding], None] = lambda _: None,
+    ) -> None:
+        self._settings, self._every, self._say, self._where = settings, every, say, lines.where
+        record, names = lines.record, settings.layout.names
+        there = [name for name in names if name in record]
+        check_axes(there, record.columns, settings.layout, lines.where)
+        gyros = [name for name in GYROS if name in record]
+        spatial = all(name in gyros for name in GYROS[1:])
+        self._missing = missing(there, gyros, record, settings)
+        places = list(record.columns)
+        used = [*there, *(GYROS if spatial else GYROS[:1])]
+        self._sensors: list[tuple[int, int, Column]] = []
+        for k, name in enumerate((*names, *GYROS)):
+            if name in record and name in used:
+                check_unit(record[name], settings.calibration(name), lines.where)
+                self._sensors.append((k, places.index(name), record[name]))
+        self._temperature = places.index("temperature") if "temperature" in record else -1
+        self._has_gyro = GYROS[0] in record
+        prior = settings.estimator.prior
+        posterior = None if prior is None else load_posterior(prior, settings)
+        self._problem = problem(settings, spatial, posterior)
+        self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(settings.attitude)]]
+        self._live = Live(self._problem, where=lines.where)
+        self._after: AoaState | None = None
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """The problem, the calibrations, and all else that decides the digits."""
+        of, settings = self._problem, self._settings
+        return {
+            "names": ", ".join(of.names),
+            "mean": of.mean,
+            "covariance": of.covariance,
+            "places": of.places,
+            "constants": of.constants,
+            "geometry": of.geometry,
+            "sensors": repr([(name, settings.calibration(name)) for name in (*of.layout.names, *GYROS)]),
+            "attitude": repr(settings.attitude),
+            "zero": repr(settings.zero),
+            "columns": repr([(k, place, column.name) for k, place, column in self._sensors]),
+            "every": self._every,
+        }
+
+    def initial(self) -> AoaState:
+        """Nothing known."""
+        return AoaState(
+            live=Live(self._problem).state, t=-math.inf, begun=math.nan, zeroed=False, temperature=math.nan,
+            heard=math.nan, nis=0.0, scalars=0, window=math.nan, said=0, slots=Slots(),
+        )  # fmt: skip
+
+    def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
+        """The state after a row, and the lines of this row and of those that were held until now."""
+        if state is not self._after:
+            self._live = Live(self._problem, state.live, self._where)
+        if self._temperature >= 0 and math.isfinite(sample.values[self._temperature]):
+            state = state._replace(temperature=sample.values[self._temperature])
+        state, values = self._measured(self._told_of_sensors(state), sample)
+        n = self._problem.count
+        later = sample.t > state.t
+        stated = (math.nan, math.nan)
+        gyro, roll, yaw = values[n:].tolist()
+        if later:
+            state, stated = self._zero(state, sample.t, values[:n])
+            state = self._heard(state, sample.t, gyro)
+        told = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *stated)
+        if later:
+            begun = sample.t if math.isnan(state.begun) else state.begun
+            state = state._replace(t=sample.t, begun=begun)
+        state, outputs = self._lines(self._judged(state, told)._replace(live=self._live.state), told)
+        self._after = state
+        return state, outputs
+
+    def finish(self, state: AoaState) -> Sequence[Output]:
+        """The lines of rows that were still held."""
+        return self._lines(state, Live(self._problem, state.live, self._where).finish())[1]
+
+    def _measured(self, state: AoaState, sample: Sample) -> tuple[AoaState, Array]:
+        """What the sensors of a row measure, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
+        values = np.full(self._problem.count + len(GYROS), np.nan)
+        temperature = None if math.isnan(state.temperature) else state.temperature
+        for k, place, column in self._sensors:
+            how = self._settings.calibration(column.name)
+            indicated = indication(column, np.array(sample.values[place]))
+            measured = how.measured(indicated, temperature)
+            if not at_range(indicated, measured, how):
+                values[k] = measured
+                continue
+            text = f"{column.name}: at its range, such samples are left out"
+            state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
+        return state, values
+
+    def _told_of_sensors(self, state: AoaState) -> AoaState:
+        """The state with what is missing said."""
+        if state.said & 1 << _BEGUN:
+            return state
+        for finding in self._missing:
+            self._say(finding)
+        return state._replace(said=state.said | 1 << _BEGUN)
+
+    def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[AoaState, tuple[float, float]]:
+        """The angle that is stated for a row, and its standard uncertainty [rad]; NaN where there is none."""
+        zero = self._settings.zero
+        if zero is None or state.zeroed or not middle_of(zero) <= t <= zero.end or not np.isfinite(acc).all():
+            return state, (math.nan, math.nan)
+        return state._replace(zeroed=True), (zero.angle, zero.u)
+
+    def _heard(self, state: AoaState, t: float, gyro: float) -> AoaState:
+        """The state with a gyro heard, or said to be silent."""
+        if math.isfinite(gyro) or math.isnan(state.heard):
+            return state._replace(heard=t)
+        if self._has_gyro and t - state.heard > _SILENT:
+            text = f"gyro: no number for {_SILENT:g} s; angles go on from accelerometers alone, less well"
+            return self._alarm(state, _SILENCE, "gyro_missing", text, t)
+        return state
+
+    def _judged(self, state: AoaState, told: Told) -> AoaState:
+        """The state with innovations counted, and an alarm where a window of them contradicts the model.
+
+        Each counts as far as the gate lets it through, so that a single spike is no alarm.
+        """
+        gate = self._problem.constants[GATE]
+        for t, innovations in zip(told.t.tolist(), told.innovations, strict=True):
+            squared = np.minimum(np.square(innovations[np.isfinite(innovations)]), gate)
+            if not squared.size or t - state.begun < SETTLED:
+                continue
+            window = t if math.isnan(state.window) else state.window
+            nis, scalars = state.nis + float(squared.sum()), state.scalars + squared.size
+            state = state._replace(nis=nis, scalars=scalars, window=window)
+            if t - window < _WINDOW:
+                continue
+            if scalars >= _FEWEST and nis > _CONTRADICTED * scalars:
+                text = (
+                    f"NIS is {nis / scalars:.3g} on average over {_WINDOW:g} s, expected 1 or less: the rows "
+                    "contradict the model or the stated noise"
+                )
+                state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, t)
+            state = state._replace(nis=0.0, scalars=0, window=math.nan)
+        return state
+
+    def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
+        """The state with an alarm given, once."""
+        if state.said & 1 << bit:
+            return state
+        self._say(Finding(code, text, f"t = {t:.10g} s"))
+        return state._replace(said=state.said | 1 << bit)
+
+    def _lines(self, state: AoaState, told: Told) -> tuple[AoaState, list[Output]]:
+        """The state with the slots of lines, and the lines that are due."""
+        outputs: list[Output] = []
+        said = rows(told.theta, told.u, told.rate, self._settings.attitude)
+        for t, row in zip(told.t.tolist(), said.tolist(), strict=True):
+            if self._every > 0.0:
+                slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None
+                if slots is None:
+                    continue
+                state = state._replace(slots=slots)
+            outputs.append([t, *row])
+        return state, outputs

@@ -1,0 +1,172 @@
+"""A plain NumPy twin of the fusion, written from its equations: dense matrices, derivatives by complex steps.
+
+Transitions and their noise are scipy's matrix exponentials (Van Loan). The smoother is that of Rauch, Tung and
+Striebel, another form than the one that is compiled.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+_STEP = 1e-30
+
+
+@dataclass
+class Twin:
+    """The states by name, and what is taken as known from the settings of a study."""
+
+    settings: object
+    names: tuple
+    spatial: bool = False
+
+    def __post_init__(self):
+        self.place = {name: k for k, name in enumerate(self.names)}
+        roll = self.settings.attitude.roll
+        self.roll = 0.0 if roll is None else roll.value
+
+    def of(self, x, name):
+        return x[self.place[name]] if name in self.place else 0.0
+
+    def accelerometer(self, x, i, p, y):
+        """Real or complex."""
+        layout, k = self.settings.layout, i + 1
+        g, theta, w, al = self.settings.site.gravity, x[0], x[1], x[2]
+        r, z = layout.r[i] + self.of(x, f"dr_{k}"), layout.z[i] + self.of(x, f"zo_{k}")
+        if self.spatial:
+            phi, p, y = self.of(x, "phi"), p - self.of(x, "b_roll"), y - self.of(x, "b_yaw")
+        else:
+            # a fixed roll phi: the turn w is about the horizontal, its parts in the body are w cos phi, w sin phi
+            phi, p, y, w, al = self.roll, 0.0, w * math.sin(self.roll), w * math.cos(self.roll), al
+            fx = g * np.sin(theta) - r * x[1] ** 2 - z * math.cos(phi) * al
+            fz = g * np.cos(theta) * math.cos(phi) + r * math.cos(phi) * al - z * w**2
+        if self.spatial:
+            fx = g * np.sin(theta) - r * (w**2 + y**2) - z * (al - p * y)
+            fz = g * np.cos(theta) * np.cos(phi) + r * (al + p * y) - z * (w**2 + p**2)
+        fx, fz = fx + self.of(x, "flexure_x"), fz + self.of(x, "flexure_z")
+        angle = layout.angle[i]
+        return fx * math.cos(angle) - fz * math.sin(angle) + self.of(x, f"b_{k}")
+
+    def gyro(self, x):
+        tau = self.settings.timing.gyro_delay
+        tau = self.of(x, "tau_g") if tau is None else tau
+        level = 1.0 if self.spatial else math.cos(self.roll)
+        then = x[1] - tau * x[2] + 0.5 * tau**2 * x[3]
+        return (1.0 + self.of(x, "k_g")) * level * then + self.of(x, "b_g")
+
+    def reading(self, x, i, row):
+        """What scalar ``i`` of a row should read, its derivative, its variance."""
+        n, noise = len(self.settings.layout.names), self.settings.noise
+
+        def told(x, p, y):
+            if i < n:
+                return self.accelerometer(x, i, p, y)
+            return self.gyro(x) if i == n else x[0]
+
+        p, y = row[n + 3 :] if self.spatial else (0.0, 0.0)
+        h = np.array([told(_off(x, k), p, y).imag / _STEP for k in range(len(x))])
+        variance = (noise.accelerometer, noise.gyro, row[n + 2])[(i >= n) + (i > n)] ** 2
+        if self.spatial:
+            by = [
+                told(x.astype(complex), p + _STEP * 1j, y).imag,
+                told(x.astype(complex), p, y + _STEP * 1j).imag,
+            ]
+            variance += (by[0] ** 2 + by[1] ** 2) / _STEP**2 * noise.gyro**2
+        return told(x.astype(complex), p, y).real, h, variance
+
+    def transition(self, x, dt, p, y):
+        """State ahead, F (n, n), Q (n, n)."""
+        n, prior = len(x), self.settings.prior
+        A, N = np.zeros((n, n)), np.zeros((n, n))
+        A[0, 1] = A[1, 2] = A[2, 3] = 1.0
+        N[3, 3] = self.settings.estimator.snap
+        for s, output, of in (("s_z", "flexure_z", prior.vertical), ("s_x", "flexure_x", prior.axial)):
+            if s in self.place:
+                a, b = self.place[s], self.place[output]
+                A[a, b], A[b, a], A[b, b] = 1.0, -(of.frequency**2), -2.0 * of.damping * of.frequency
+                N[b, b] = 4.0 * of.damping * of.frequency * of.level**2
+        size = N.max()
+        block = expm(np.block([[-A, N / size], [np.zeros((n, n)), A.T]]) * dt)
+        F = block[n:, n:].T
+        Q = F @ block[:n, n:] * size
+        if not self.spatial:
+            return F @ x, F, Q
+        # theta and roll: a step of Euler with the turn of pitch in full
+        roll = self.place["phi"]
+        ahead = F @ x
+
+        def turned(x):
+            w, al, j, phi = x[1], x[2], x[3], x[roll]
+            rolling, yawing = p - x[roll + 1], y - x[roll + 2]
+            steep = np.sin(x[0]) * np.cos(x[0]) / (np.cos(x[0]) ** 2 + 1e-4)
+            turn = w * dt + al * dt**2 / 2 + j * dt**3 / 6
+            return (
+                x[0] + np.cos(phi) * turn + yawing * np.sin(phi) * dt,
+                phi + dt * (rolling + (w * np.sin(phi) - yawing * np.cos(phi)) * steep),
+            )
+
+        ahead[[0, roll]] = turned(x)
+        for k in range(n):
+            F[0, k], F[roll, k] = (each.imag / _STEP for each in turned(_off(x, k)))
+        s, c = math.sin(x[roll]), math.cos(x[roll])
+        steep = math.sin(x[0]) * math.cos(x[0]) / (math.cos(x[0]) ** 2 + 1e-4)
+        # columns: noise of the roll gyro, of the yaw gyro
+        by = np.array([[0.0, s], [1.0, -c * steep]]) * self.settings.noise.gyro * dt
+        added = by @ by.T
+        Q[0, 0] += added[0, 0]
+        Q[roll, roll], Q[0, roll], Q[roll, 0] = added[1, 1], added[0, 1], added[0, 1]
+        return ahead, F, Q
+
+
+def _off(x, k):
+    off = x.astype(complex)
+    off[k] += _STEP * 1j
+    return off
+
+
+def run(twin, start, t, rows):
+    """Filter and smoother from a `Start`: arrays of states (m, n) and covariances (m, n, n), causal and smoothed.
+
+    The innovations over their standard deviations (m, N + 1) come last.
+    """
+    n, gate = len(twin.settings.layout.names), twin.settings.estimator.gate
+    x, P, turns = start.x.copy(), start.P.copy(), start.turns.copy()
+    predicted, updated, steps = [], [], []
+    innovations = np.full((len(t), n + 1), np.nan)
+    for k, row in enumerate(rows):
+        dt = t[k] - t[k - 1] if k else 0.0
+        before = turns.copy()
+        turns = np.where(np.isfinite(row[n + 3 :]), row[n + 3 :], turns)
+        F = np.eye(len(x))
+        if dt > 0.0:
+            x, F, Q = twin.transition(x, dt, *(0.5 * (before + turns)))
+            P = F @ P @ F.T + Q
+        predicted.append((x, P))
+        steps.append(F)
+        for i in range(n + 2):
+            if math.isnan(row[i]):
+                continue
+            told, h, variance = twin.reading(x, i, np.concatenate([row[: n + 3], turns]))
+            v, S = row[i] - told, h @ P @ h + variance
+            if i <= n:
+                innovations[k, i] = v / math.sqrt(S)
+            S = max(S, v**2 / gate)
+            K = P @ h / S
+            x = x + K * v
+            # Joseph's form, of the measurement with the noise that its variance leaves for it
+            left = np.eye(len(x)) - np.outer(K, h)
+            P = left @ P @ left.T + np.outer(K, K) * (S - h @ P @ h)
+        updated.append((x, P))
+    smooth = [updated[-1]]
+    for k in range(len(t) - 2, -1, -1):
+        (x, P), (ahead, spread) = updated[k], predicted[k + 1]
+        scale = np.sqrt(np.diag(spread))
+        G = np.linalg.solve(spread / np.outer(scale, scale), (steps[k + 1] @ P) / scale[:, None]).T / scale
+        later, of_later = smooth[0]
+        smooth.insert(0, (x + G @ (later - ahead), P + G @ (of_later - spread) @ G.T))
+    return (
+        *(np.array(each) for each in zip(*updated, strict=True)),
+        *(np.array(each) for each in zip(*smooth, strict=True)),
+        innovations,
+    )

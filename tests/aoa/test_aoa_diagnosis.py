@@ -1,0 +1,126 @@
+"""Smaller errors: named by the constant that makes the recording fit, with its value."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sting_study import BASE, DEG, G, scenario, study
+
+from inercal.aoa.diagnosis import diagnose
+from inercal.aoa.plausibility import implausible
+from inercal.aoa.scatter import scatter
+from inercal.aoa.settings import Disturbances, MotionPlan, Oscillation
+from inercal.aoa.simulate import simulate
+
+SWEEP = study(motion=MotionPlan("static", duration=7.0, first=-10.0 * DEG, last=60.0 * DEG))
+SHORT = study(motion=replace(BASE, duration=7.0))
+
+
+def recorded(settings, seed=0):
+    return simulate(settings, np.random.default_rng([43, seed])).recording
+
+
+def said(recording, settings):
+    """Code and message of the one finding; plausibility has none."""
+    assert implausible(recording, settings) == []
+    (finding,) = diagnose(recording, settings, None, None)
+    return finding.code, finding.message
+
+
+def stated(settings, **changes):
+    return replace(settings, layout=replace(settings.layout, **changes))
+
+
+@pytest.mark.parametrize("degrees", [0.5, -5.0])
+def test_an_axis_that_is_turned(degrees):
+    # the sensor truly looks along 0 deg, the study says otherwise
+    turned = stated(SWEEP, angle=SWEEP.layout.angle + np.array([0.0, degrees * DEG, 0.0]))
+    code, message = said(recorded(SWEEP), turned)
+    assert code == "unmodelled"
+    number = float(re.match(r"the axis of a2 looks turned by (\S+) deg", message)[1])
+    # biases of 1e-4 g make 0.006 deg each
+    assert number == pytest.approx(-degrees, abs=0.03)
+
+
+def test_gravity_of_another_site():
+    elsewhere = replace(SWEEP, site=replace(SWEEP.site, gravity=9.78))
+    code, message = said(recorded(SWEEP), elsewhere)
+    assert code == "site_suspect"
+    # biases of 1e-4 g are 1e-3 m/s^2
+    assert float(re.match(r"gravity looks to be (\S+) m/s\^2", message)[1]) == pytest.approx(G, abs=4e-3)
+
+
+def test_a_scale_and_a_bias():
+    recording = recorded(SWEEP)
+    code, message = said(replace(recording, acc=recording.acc * [1.0, 1.01, 1.0]), SWEEP)
+    assert code == "unmodelled"
+    assert float(re.match(r"a2 looks to read (\S+) times", message)[1]) == pytest.approx(1.01, abs=1e-3)
+    code, message = said(replace(recording, acc=recording.acc + np.array([0.0, 5e-3 * G, 0.0])), SWEEP)
+    assert code == "prior_suspect"
+    assert float(re.match(r"the bias of a2 looks to be (\S+) mg", message)[1]) == pytest.approx(5.0, abs=0.4)
+
+
+def test_one_angle_cannot_tell_and_says_so():
+    rest = study(motion=MotionPlan("static", duration=7.0, first=10.0 * DEG, last=10.0 * DEG))
+    recording = recorded(rest)
+    _, message = said(replace(recording, acc=recording.acc + np.array([0.0, 10e-3 * G, 0.0])), rest)
+    assert "as well possible" in message
+    assert "the bias of a2 looks" in message
+
+
+def test_yaw_that_no_gyro_tells():
+    amplitude, frequency = 1.0 * DEG, 8.0
+    moving = replace(SHORT, disturbances=Disturbances(yaw=Oscillation(amplitude, frequency)))
+    recording = recorded(moving)
+    blind = replace(recording, turns=np.full_like(recording.turns, np.nan))
+    code, message = said(blind, moving)
+    assert code == "unmodelled"
+    rate = amplitude * 2.0 * math.pi * frequency / math.sqrt(2.0) / DEG
+    assert float(re.search(r"yaw to and fro by (\S+) deg/s rms", message)[1]) == pytest.approx(rate, rel=0.1)
+    assert "record gyro_roll and gyro_yaw" in message
+
+
+@pytest.mark.parametrize("name", ["flexure", "pivot", "heights"])
+def test_too_few_states(name):
+    small = scenario(name, states=8, duration=7.0)
+    recording = recorded(small)
+    code, message = said(recording, small)
+    assert code == "unmodelled"
+    assert "which 8 states leave out" in message
+    assert "write states = 19" in message
+    assert diagnose(recording, scenario(name, states=19, duration=7.0), None, None) == []
+
+
+@pytest.mark.parametrize(("key", "size"), [("accelerometer", 1e-4 * G), ("gyro", 0.2 * DEG)])
+def test_noise_that_is_misstated(key, size):
+    recording = recorded(SHORT)
+    for factor, code in ((0.2, "excess_scatter"), (5.0, "low_scatter")):
+        wrong = replace(SHORT, noise=replace(SHORT.noise, **{key: factor * size}))
+        findings = diagnose(recording, wrong, None, None)
+        assert [finding.code for finding in findings] == [code]
+        assert f"write {key} = " in findings[0].message
+        # 6000 samples, sixth differences: 3 % of a standard deviation
+        ratio = float(re.search(r"noise is (\S+) times", findings[0].message)[1])
+        assert ratio == pytest.approx(1.0 / factor, rel=0.1)
+
+
+def test_noise_is_told_from_motion():
+    # sines up to 15 Hz of a thousand times the noise, at 1 kHz and at 100 Hz
+    rng = np.random.default_rng(3)
+    for rate in (1000.0, 100.0):
+        t = np.arange(6000) / rate
+        motion = sum(np.sin(2.0 * np.pi * f * t + p) for f, p in rng.uniform(1.0, 15.0, (10, 2)))
+        found = scatter(1e3 * motion + rng.standard_normal(len(t)))
+        assert not found.certain or found.size == pytest.approx(1.0, rel=0.1)
+    assert scatter(rng.standard_normal(6000)).size == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_model_livelier_than_its_snap():
+    fast = study(
+        motion=MotionPlan("buffet", mean=10.0 * DEG, rms=0.2 * DEG, low=2.0, high=15.0, sample_rate=100.0)
+    )
+    code, message = said(recorded(fast), fast)
+    assert code == "unmodelled"
+    assert "write snap = " in message

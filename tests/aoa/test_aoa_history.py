@@ -1,0 +1,123 @@
+"""Angles and points as columns of files."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.io import netcdf_file
+from sting_study import DEG, study
+
+from inercal.aoa.angles import of_fusion
+from inercal.aoa.filtered import estimate
+from inercal.aoa.history import angles_record, columns, points_record, rows
+from inercal.aoa.points import points
+from inercal.aoa.problem import problem
+from inercal.aoa.settings import Attitude, MotionPlan
+from inercal.aoa.simulate import simulate
+from inercal.records.write import SUFFIXES, write_record
+from inercal.units import Quantity, parse_unit
+
+PAUSES = MotionPlan(
+    "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0
+)
+
+
+def degrees(value, u=0.0):
+    return Quantity(value * DEG, u * DEG, parse_unit("deg"), "")
+
+
+@pytest.fixture(scope="module")
+def measured():
+    settings = study(motion=PAUSES)
+    made = simulate(settings, np.random.default_rng(4)).recording
+    t = made.t.copy()
+    t[100] = t[98]  # a stamp that goes back: the row is left out
+    made = replace(made, t=t)
+    return settings, made, of_fusion(estimate(made, problem(settings)), 19)
+
+
+def test_columns_are_those_of_the_contract(measured, tmp_path):
+    settings, made, angles = measured
+    path = tmp_path / "angles.csv"
+    write_record(angles_record(made, angles, settings), path)
+    lines = path.read_text().splitlines()
+    assert lines[0] == "t [s],theta [deg],u_theta [deg],rate [deg/s]"
+    assert len(lines) == 1 + len(made.t)
+    # a row that was left out has its stamp and no numbers
+    assert lines[1 + 100] == f"{float(made.t[98])!r},,,"
+
+
+def columns_of(path):
+    """Columns of a file by the name it gives them, read by what is not inercal's."""
+    match path.suffix:
+        case ".csv":
+            heads = path.read_text().splitlines()[0].split(",")
+            return dict(zip(heads, np.genfromtxt(path, delimiter=",", skip_header=1).T, strict=True))
+        case ".npz":
+            return dict(np.load(path))
+        case ".parquet":
+            table = pytest.importorskip("pyarrow.parquet").read_table(path)
+            return {name: np.array(table[name].to_pylist(), dtype=float) for name in table.column_names}
+        case ".nc":
+            with netcdf_file(path, mmap=False) as file:
+                return {f"{name} [{each.units.decode()}]": each[:] for name, each in file.variables.items()}
+        case _:
+            with pytest.importorskip("h5py").File(path) as file:
+                return {f"{name} [{each.attrs['units']}]": each[:] for name, each in file.items()}
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_every_format_holds_the_angles(measured, tmp_path, suffix):
+    settings, made, angles = measured
+    write_record(angles_record(made, angles, settings), path := tmp_path / f"angles{suffix}")
+    found = columns_of(path)
+    assert set(found) == {"t [s]", "theta [deg]", "u_theta [deg]", "rate [deg/s]"}
+    np.testing.assert_array_equal(found["t [s]"], made.t)
+    for name, si in (
+        ("theta [deg]", angles.theta),
+        ("u_theta [deg]", angles.u),
+        ("rate [deg/s]", angles.rate),
+    ):
+        np.testing.assert_allclose(found[name] * DEG, si, rtol=1e-14)
+
+
+def test_alpha_and_beta_are_there_only_where_the_study_states_the_flow(measured):
+    settings, made, angles = measured
+    rolled = replace(settings, attitude=Attitude(roll=degrees(20.0, 0.1)))
+    record = angles_record(made, angles, rolled)
+    assert list(record.columns) == ["theta", "u_theta", "rate", "alpha", "u_alpha", "beta", "u_beta"]
+    theta, phi = angles.theta, 20.0 * DEG
+    np.testing.assert_allclose(record["alpha"].si(), np.arctan2(np.sin(theta) * math.cos(phi), np.cos(theta)))
+    np.testing.assert_allclose(record["beta"].si(), np.arcsin(np.sin(theta) * math.sin(phi)))
+    assert not any(name in angles_record(made, angles, settings) for name in ("alpha", "beta"))
+
+
+def test_a_stream_tells_the_rows_of_a_file(measured):
+    settings, _, angles = measured
+    whole = rows(angles.theta, angles.u, angles.rate, settings.attitude)
+    one = [rows(*(np.array([each[k]]) for each in (angles.theta, angles.u, angles.rate)), settings.attitude)[0]
+           for k in (50, 100, 300)]  # fmt: skip
+    np.testing.assert_array_equal(whole[[50, 100, 300]], one)
+    assert whole.shape[1] == len(columns(settings.attitude)) == 3
+
+
+def test_points_keep_their_numbers(measured, tmp_path):
+    settings, made, angles = measured
+    found = points(made, angles, settings)
+    record = points_record(found, made, settings)
+    np.testing.assert_array_equal(record["point"].values, [each.number for each in found])
+    np.testing.assert_allclose(record["theta"].values, [0.0, 10.0, 20.0], atol=0.05)
+    path = tmp_path / "points.csv"
+    write_record(record, path)
+    head = path.read_text().splitlines()[0]
+    assert head.startswith(
+        "t [s],point [1],trigger [1],last_trigger [1],begin [s],end [s],rows [1],theta [deg],u_theta"
+    )
+    for suffix in SUFFIXES:
+        write_record(record, tmp_path / f"points{suffix}")
+
+
+def test_no_points_are_an_empty_record(measured):
+    settings, made, _ = measured
+    assert len(points_record((), made, settings)["theta"].values) == 0

@@ -1,0 +1,126 @@
+"""A simulated recording as a record: read with its study it means the same, in whatever unit it is recorded."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sting_study import DEG, SCENARIOS, G, scenario
+
+from inercal.aoa.motion import course, duration
+from inercal.aoa.reading import recording_of
+from inercal.aoa.record import to_record
+from inercal.aoa.settings import Calibration, Disturbances, MotionPlan, Oscillation
+from inercal.aoa.simulate import simulate
+from inercal.errors import StudyError
+from inercal.records.read import read
+from inercal.records.write import write_record
+from inercal.units import Quantity, parse_unit
+
+#: sensors in volts and counts, with biases and temperature terms
+RAW = {
+    "a1": Calibration(0.5 * G, 1.25 * G, 10.0 * G, 50e-6, 1e-4 * G, 25.0, "V"),
+    "a2": Calibration(-61e-6 * G, 0.01 * G, per="count"),
+    "a3": Calibration(1.002, -0.02, bias_slope=1e-3),
+    "gyro": Calibration(20.0 * DEG, 0.5 * DEG, scale_slope=-1e-4, per="V"),
+}
+
+
+def at(celsius):
+    return Quantity(celsius, 0.0, parse_unit("degC"), f"{celsius} degC")
+
+
+def same(found, expected, atol=1e-11):
+    for name in ("t", "acc", "gyro", "turns", "reference"):
+        assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-10, atol=atol, err_msg=name)
+    if expected.point is None:
+        assert found.point is None
+    else:
+        assert_array_equal(found.point, expected.point)
+
+
+@pytest.mark.parametrize("name", [each for each in SCENARIOS if each != "clipping"])
+@pytest.mark.parametrize("raw", [False, True])
+def test_read_again_with_its_study_it_is_the_same(name, raw):
+    settings = scenario(name) if name == "pitch-pause" else scenario(name, duration=2.0)
+    if raw:
+        settings = replace(settings, sensors=RAW, temperature=at(31.0))
+    made = simulate(settings, np.random.default_rng(5)).recording
+    record = to_record(made, settings)
+    units = {column.name: column.unit.symbol for column in record.columns.values()}
+    assert [units[each] for each in ("a1", "a2", "a3", "gyro")] == (
+        ["V", "count", "g", "V"] if raw else ["g", "g", "g", "deg/s"]
+    )
+    assert ("temperature" in units) == raw
+    same(recording_of(record, settings), made)
+
+
+def test_volts_by_hand():
+    """0.5 g/V about 2.5 V at 25 degC; 6 K warmer the scale is 300 ppm larger, the bias 0.6 mg."""
+    settings = replace(scenario("base", duration=1.0), sensors=RAW, temperature=at(31.0))
+    made = simulate(settings, np.random.default_rng(5)).recording
+    volts = to_record(made, settings)["a1"].values
+    assert_allclose(volts, (made.acc[:, 0] / G + 1.25 + 6e-4) / (0.5 * (1 + 3e-4)), rtol=1e-12)
+
+
+def test_gyros_for_roll_and_yaw_come_with_such_motion(tmp_path):
+    settings = scenario("base", duration=2.0)
+    settings = replace(settings, disturbances=Disturbances(yaw=Oscillation(DEG, 8.0), dropouts=0.1))
+    made = simulate(settings, np.random.default_rng(2)).recording
+    write_record(to_record(made, settings), tmp_path / "a.csv")
+    record = read(tmp_path / "a.csv")
+    assert {"gyro_roll", "gyro_yaw", "theta_ref"} <= record.columns.keys()
+    found = recording_of(record, settings)
+    assert found.spatial
+    same(found, made)
+
+
+def test_saturation_is_that_of_what_is_measured_and_is_masked_on_reading():
+    """A range is about the zero point, also of a sensor that indicates 2.5 V there: 0.95 g are 4.4 V and 0.6 V."""
+    limit = 0.95 * G
+    sensors = {"a2": Calibration(0.5 * G, 1.25 * G, limit, per="V"), "gyro": Calibration(range=40.0 * DEG)}
+    plan = MotionPlan("sine", 4.0, amplitude=80.0 * DEG, frequency=0.5)
+    settings = replace(scenario("clipping"), motion=plan, sensors=sensors)
+    made = simulate(settings, np.random.default_rng(1)).recording
+    record = to_record(made, settings)
+    volts = record["a2"].values
+    assert (volts.min(), volts.max()) == (pytest.approx(0.6), pytest.approx(4.4))
+    found = recording_of(record, settings)
+    ends = np.abs(made.acc[:, 1]) > limit - 1e-9
+    assert ends.sum() > 500
+    assert_array_equal(np.isnan(found.acc[:, 1]), ends)
+    assert_array_equal(np.isnan(found.gyro), np.abs(made.gyro) > 40.0 * DEG - 1e-9)
+
+
+def test_a_motion_from_a_file_is_followed(tmp_path):
+    """A recorded angle through a spline: the angle itself, and its derivatives; no longer than the file."""
+    path = tmp_path / "pitch.csv"
+    t = np.arange(0.0, 3.0, 0.01)
+    path.write_text(
+        "t [s],theta_ref [deg]\n" + "".join(f"{a + 7.0:.17g},{5 * np.sin(4 * a):.17g}\n" for a in t.tolist())
+    )
+    plan = MotionPlan("file", path=path, duration=np.inf)
+    assert duration(plan) == pytest.approx(t[-1])
+    assert duration(replace(plan, duration=1.0)) == 1.0
+    theta, rate, acceleration = course(plan, np.random.default_rng(0))(t)
+    assert_allclose(theta, 5 * DEG * np.sin(4 * t), atol=1e-9)
+    inner = slice(20, -20)  # at its ends a spline is less sure of derivatives
+    assert_allclose(rate[inner], 20 * DEG * np.cos(4 * t[inner]), atol=1e-7)
+    assert_allclose(acceleration[inner], -80 * DEG * np.sin(4 * t[inner]), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("t [s],a1 [g]\n0,1\n1,1\n", "no column theta_ref"),
+        ("t [s],theta_ref [deg]\n0,1\n1,1\n", "found no motion in .*expected 6 rows"),
+        ("t [s],theta_ref [deg]\n" + "0,1\n" * 9, "found no motion in"),
+        (None, "motion.file: .*cannot be read|motion.file: .*no such"),
+    ],
+)
+def test_files_without_a_motion(text, words, tmp_path):
+    path = tmp_path / "pitch.csv"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(StudyError, match=words):
+        course(MotionPlan("file", path=path), np.random.default_rng(0))

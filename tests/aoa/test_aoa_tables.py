@@ -1,0 +1,146 @@
+"""What the terminal shows: numbers in units of the field, the same as those of the result."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sting_study import DEG, G, study
+
+from inercal.aoa.angles import Angles, of_fusion
+from inercal.aoa.display import delays, displayed, in_words, shown_unit, sized
+from inercal.aoa.filtered import estimate
+from inercal.aoa.outcome import assemble, assemble_paper
+from inercal.aoa.points import points
+from inercal.aoa.problem import problem
+from inercal.aoa.settings import MotionPlan, Timing
+from inercal.aoa.simulate import simulate
+from inercal.aoa.tables import all_tables, angle, methods, points_table, sensors, uncertainty
+from inercal.aoa.verification import errors
+
+PAUSES = MotionPlan(
+    "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0
+)
+
+
+def measured(judged=True, **changes):
+    settings = study(motion=PAUSES, **changes)
+    made = simulate(settings, np.random.default_rng(4)).recording
+    of = problem(settings)
+    found = estimate(made, of)
+    own = of_fusion(found, 19)
+    off = Angles("by hand", own.theta + 0.02 * DEG, own.u, own.rate, own.rate_u)
+    against = {each.method: errors(made, each) for each in (own, off)} if judged else None
+    at_rest = points(made, own, settings)
+    result = assemble(made, settings, of, found, [], None, at_rest, against, {"by hand": off})
+    return settings, result, at_rest
+
+
+@pytest.fixture(scope="module")
+def shown():
+    return measured()
+
+
+def test_units_of_the_field_are_what_they_say():
+    assert [shown_unit(unit) for unit in ("m", "s", "1")] == [("mm", 1e-3), ("ms", 1e-3), ("ppm", 1e-6)]
+    assert shown_unit("m/s^2") == ("ug", 1e-6 * 9.80665)
+    assert shown_unit("rad/s")[1] * 3600.0 == pytest.approx(DEG)
+    assert shown_unit("kelvin") == ("kelvin", 1.0)
+    assert sized(0.2 * DEG, "rad/s") == (pytest.approx(0.2), "deg/s")
+    assert sized(5.0 * DEG / 3600.0, "rad/s") == (pytest.approx(5.0), "deg/h")
+    assert sized(0.01 * G, "m/s^2") == (pytest.approx(10.0), "mg")
+    assert sized(1e-3, "1") == (pytest.approx(1000.0), "ppm")
+    assert sized(1.0, "1") == (1.0, "1")
+
+
+def test_each_coefficient_has_words(shown):
+    for name in (*shown[1].names, "tau_g", "b_roll", "b_yaw"):
+        assert in_words(name)
+    assert in_words("b_2") == "bias of accelerometer 2"
+    assert in_words("b_g") == "bias of the gyro"
+
+
+def test_the_table_of_sensors_shows_u_beside_the_prior(shown):
+    _, result, _ = shown
+    lines = {row[0]: row for row in sensors(result).rows}
+    _, _, value, u, before, unit = lines["b_1"]
+    assert unit == "ug"
+    assert float(value) == pytest.approx(result["b_1"].value / (1e-6 * G), abs=0.51)
+    assert float(u) == pytest.approx(result["b_1"].u / (1e-6 * G), rel=0.05)
+    assert float(before) == pytest.approx(100.0)
+    assert lines["zo_2"][4:] == ("5", "mm")
+    assert lines["b_g"][4:] == ("5", "deg/h")
+    assert lines["k_g"][4:] == ("1000", "ppm")
+
+
+def test_displaying_changes_units_and_nothing_else(shown):
+    _, result, _ = shown
+    other = displayed(result)
+    for name in result.names:
+        assert other[name].value / other[name].u == pytest.approx(result[name].value / result[name].u)
+    assert other.conditions["ranges"]["theta_deg"] == pytest.approx(
+        np.degrees(result.conditions["ranges"]["theta_rad"])
+    )
+
+
+def test_points_are_listed_with_their_uncertainty(shown):
+    settings, _, at_rest = shown
+    table = points_table(at_rest, settings)
+    assert len(table.rows) == 3
+    assert [float(row[4]) for row in table.rows] == pytest.approx([0.0, 10.0, 20.0], abs=0.05)
+    assert "alpha" not in table.text()
+
+
+def test_methods_side_by_side_tell_errors_where_there_is_a_reference(shown):
+    _, result, _ = shown
+    rows = {row[0]: row[1:] for row in methods(result).rows}
+    assert set(rows) == {"fusion 19", "by hand"}
+    own, off = (float(rows[name][2]) for name in ("fusion 19", "by hand"))
+    assert off - own == pytest.approx(0.02, abs=2e-4)
+
+
+def test_methods_side_by_side_tell_differences_without_a_reference():
+    _, result, _ = measured(judged=False)
+    rows = {row[0]: row[1:] for row in methods(result).rows}
+    assert float(rows["by hand"][0]) == pytest.approx(0.02)
+    assert rows["fusion 19"][0] == "–"
+
+
+def test_the_parts_of_u_add_up_to_it_in_squares(shown):
+    _, result, _ = shown
+    parts = [float(row[3]) for row in uncertainty(result).rows]
+    median = math.degrees(result.result["angle"]["u"]["median"])
+    assert math.hypot(*parts) == pytest.approx(median, rel=0.02)
+    assert parts == sorted(parts, reverse=True)
+
+
+def test_the_cost_of_a_delay_is_said_in_degrees(shown):
+    """10 deg in 1 s by a quintic: 18.75 deg/s at most, 0.019 deg for each millisecond."""
+    assert "not stated" in delays(shown[1])
+    assert "0.019 deg at most" in delays(shown[1])
+    _, result, _ = measured(timing=Timing(gyro_delay=2e-3, common_delay=1e-3, common_delay_u=1e-4))
+    words = delays(result)
+    assert "2 ms as stated" in words
+    assert "1.00 ms (u 0.10 ms)" in words
+    assert "0.019 deg at most" in words
+    assert "0.0019 deg at most" in words
+
+
+def test_all_tables_of_the_fusion_and_of_a_paper_method(shown):
+    settings, result, at_rest = shown
+    titles = [each.title for each in all_tables(result, at_rest, settings)]
+    assert titles == [
+        "Angle", "Points", "Errors of the sensors", "Where the uncertainty of the angle comes from",
+        "Methods side by side",
+    ]  # fmt: skip
+    made = simulate(settings, np.random.default_rng(4)).recording
+    u = np.full(len(made.t), 0.01 * DEG)
+    angles = Angles("improved, mechanical, dual", made.reference, u, made.gyro, u)
+    plain = assemble_paper(made, settings, angles, [], None)
+    assert [each.title for each in all_tables(plain, (), settings)] == ["Angle"]
+    none = replace(
+        angles, theta=np.full(len(made.t), np.nan), rate=np.full(len(made.t), np.nan), u=u * np.nan
+    )
+    empty = assemble_paper(made, settings, none, [], None)
+    assert "–" in angle(empty).text()
+    assert delays(empty) == ""

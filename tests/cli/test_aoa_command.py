@@ -1,0 +1,349 @@
+"""``inercal aoa``: from a simulated file to angles, points, a result and a page; live and by every method."""
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from inercal.aoa import settings
+from inercal.cli import aoa as command
+from inercal.cli import run
+from inercal.estimate.exchange import load
+
+POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
+AOA = ["aoa", "model.csv", "--study", "aoa.toml"]
+SUFFIXES = [".csv", ".npz", ".h5", ".parquet", ".nc"]
+NAMES = ["b_g", "b_1", "b_2", "b_3", "dr_1", "dr_2", "dr_3", "zo_1", "zo_2", "zo_3", "k_g"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The study that `new` writes, a model that swings for 6 s, and one that pauses at four angles."""
+    path = tmp_path_factory.mktemp("aoa")
+    study, quick = path / "aoa.toml", ["--set", "motion.sample_rate=250 Hz", "--quiet"]
+    assert run(["new", "aoa", "--out", str(study), "--quiet"]) == 0
+    text = study.read_text().replace('"45(26) deg"', '"45 deg"').replace('"0(300) m"', '"0 m"')
+    study.write_text(text)
+    begin, end = text.index("[motion]"), text.index("[disturbances]")
+    pauses = '[motion]\nkind = "pitch-pause"\nfirst = "0 deg"\nlast = "30 deg"\nstep = "10 deg"\n'
+    (path / "pauses.toml").write_text(text[:begin] + pauses + text[end:])
+    for name, seed, more in (("model", 4, ["--set", "motion.duration=6 s"]), ("pauses", 5, [])):
+        of = path / ("aoa.toml" if name == "model" else "pauses.toml")
+        out = path / f"{name}.csv"
+        assert run(["simulate", "aoa", str(of), "--seed", str(seed), "--out", str(out), *more, *quick]) == 0
+    return path
+
+
+@pytest.fixture(autouse=True)
+def here(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def told(capsys, *arguments):
+    """The JSON object of a command that is done, and its exit code."""
+    capsys.readouterr()
+    code = run([*arguments, "--json", "--quiet"])
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return code, json.loads(captured.out, parse_constant=lambda text: pytest.fail(f"{text} is not JSON"))
+
+
+def table_of(path):
+    """Titles of a CSV file without units, and its columns (k, n)."""
+    titles = Path(path).read_text().split("\n", 1)[0].split(",")
+    return [title.split(" ")[0] for title in titles], np.genfromtxt(path, delimiter=",", skip_header=1).T
+
+
+def piped(monkeypatch, capsys, *arguments, log="model.csv"):
+    """Exit code, standard output and error of a command with the recording as its standard input."""
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(Path(log).read_bytes())))
+    capsys.readouterr()
+    code = run(list(arguments))
+    return code, *capsys.readouterr()
+
+
+def said_once(captured, *words):
+    """Standard output is empty, standard error one line of the right form that holds the words."""
+    assert captured.out == ""
+    (line,) = captured.err.replace("compiling kernels, once\n", "").splitlines()
+    assert line.startswith("inercal: error: ")
+    for word in words:
+        assert word in line
+
+
+def test_choices_are_those_of_the_settings():
+    """They stand here once more so that `--help` loads nothing."""
+    for name in ("Static", "Centrifugal", "Tangential", "States"):
+        assert get_args(getattr(command, name)) == get_args(getattr(settings, name))
+
+
+# One recording.
+
+
+def test_json_is_the_contract_and_holds_the_truth(capsys):
+    code, data = told(capsys, *AOA)
+    assert (code, data["command"], data["status"]["code"]) == (0, "aoa", "ok")
+    assert [p["name"] for p in data["parameters"]] == NAMES == data["covariance"]["names"]
+    assert {p["unit"] for p in data["parameters"]} == {"rad/s", "m/s^2", "m", "1"}
+    result = data["result"]
+    assert result["method"] == "fusion 19"
+    assert 0.1 < result["nis_mean"] == data["statistics"]["nis_mean"] < 2.0
+    assert list(result["posterior"]) == NAMES
+    for p in data["parameters"]:
+        assert result["posterior"][p["name"]]["value"] == p["value"]
+        assert result["posterior"][p["name"]]["u"] == p["u"]
+    assert 0.0 < result["reference"]["rms_deg"] < result["reference"]["max_abs_deg"] < 0.1
+    assert set(data["timing_s"]) == {"read", "solve", "total"}
+    assert data["timing_s"]["solve"] < data["timing_s"]["total"]
+    assert sorted(Path(each["path"]).name for each in data["inputs"]) == ["aoa.toml", "model.csv"]
+    assert {"accelerometer noise", "gyro noise", "lever arms"} <= {item["source"] for item in data["budget"]}
+
+
+def test_people_see_units_of_the_field_and_get_their_files(capsys):
+    assert run([*AOA, "--out", "result.toml", "--report", "model.html"]) == 0
+    captured = capsys.readouterr()
+    for words in ("deg/h", "ug", "mm", "ppm", "ok: ", "A delay that all sensors have in common"):
+        assert words in captured.out
+    assert "model.html" in captured.err
+    assert Path("model.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
+    assert list(load("result.toml").names) == NAMES
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_samples_in_every_kind_of_file(suffix, capsys):
+    """One row for each of the record, columns as agreed; the angle is the truth to a hundredth of a degree or so."""
+    assert run([*AOA, "--out", f"angles{suffix}", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+    if suffix != ".csv":
+        assert Path(f"angles{suffix}").stat().st_size > 1500 * 4 * 8
+        return
+    assert Path("angles.csv").read_text().startswith("t [s],theta [deg],u_theta [deg],rate [deg/s]\n")
+    _, (t, theta, u, _) = table_of("angles.csv")
+    titles, model = table_of("model.csv")
+    np.testing.assert_array_equal(t, model[0])
+    error = np.abs(theta - model[titles.index("theta_ref")])[500:]
+    assert error.max() < 5.0 * u[500:].max()
+    assert error.max() < 0.1
+
+
+def test_smoothing_gives_another_and_surer_angle(capsys):
+    code, causal = told(capsys, *AOA)
+    assert code == 0
+    for how in (["--smooth"], ["--set", "estimator.smooth=true"]):
+        code, smoothed = told(capsys, *AOA, *how)
+        assert (code, smoothed["result"]["method"]) == (0, "smoothed 19")
+        assert smoothed["result"]["angle"]["u"]["median"] < causal["result"]["angle"]["u"]["median"]
+
+
+@pytest.mark.parametrize("states", [8, 11, 15])
+def test_fewer_states(states, capsys):
+    code, data = told(capsys, *AOA, "--states", str(states))
+    assert (code, data["result"]["method"]) == (0, f"fusion {states}")
+    assert len(data["parameters"]) == {8: 4, 11: 7, 15: 7}[states]
+
+
+@pytest.mark.parametrize(
+    ("option", "choices"),
+    [
+        ("--static", get_args(settings.Static)),
+        ("--centrifugal", get_args(settings.Centrifugal)),
+        ("--tangential", get_args(settings.Tangential)),
+    ],
+)
+def test_every_choice_of_the_paper(option, choices, capsys):
+    """The others as the study says: improved, mechanical, dual if it says nothing; no coefficients are found."""
+    for choice in choices:
+        code, data = told(capsys, *AOA, option, choice)
+        assert code == 0
+        assert choice in data["result"]["method"]
+        assert data["parameters"] == []
+        assert data["result"]["posterior"] == {}
+        assert data["result"]["reference"]["max_abs_deg"] < 20.0
+
+
+def test_choices_combine_and_beat_nothing_done(capsys):
+    """Untreated, the lever arms of 10 deg at 1 Hz cost degrees; the paper's best way leaves hundredths."""
+    none = ["--centrifugal", "none", "--tangential", "none"]
+    worst = told(capsys, *AOA, "--static", "improved", *none)[1]["result"]
+    best = told(capsys, *AOA, "--static", "improved", "--centrifugal", "mechanical", "--tangential", "dual")[
+        1
+    ]["result"]
+    assert worst["reference"]["max_abs_deg"] > 20.0 * best["reference"]["max_abs_deg"]
+
+
+def test_compare_sets_methods_side_by_side(capsys):
+    assert run([*AOA, "--compare", "--out", "compared.json", "--quiet"]) == 0
+    printed = capsys.readouterr().out
+    compare = load("compared.json").result["compare"]
+    assert {"fusion 8", "smoothed 8", "smoothed 19"} <= set(compare)
+    assert len(compare) > 3
+    assert "Methods side by side" in printed
+    for name in compare:
+        assert name in printed
+
+
+def test_points_have_a_row_each(capsys):
+    """The pauses at 0, 10, 20 and 30 degrees, with the numbers of the record."""
+    pauses = ["aoa", "pauses.csv", "--study", "pauses.toml"]
+    assert run([*pauses, "--points", "--out", "points.csv", "--quiet"]) == 0
+    assert "Points" in capsys.readouterr().out
+    titles, columns = table_of("points.csv")
+    found = dict(zip(titles, columns, strict=True))
+    np.testing.assert_allclose(found["theta"], [0.0, 10.0, 20.0, 30.0], atol=0.05)
+    number = dict(zip(*table_of("pauses.csv"), strict=True))["point"]
+    assert found["point"].tolist() == np.unique(number[number > 0]).tolist()
+    code, data = told(capsys, *pauses)
+    assert (code, len(data["result"]["points"])) == (0, 4)
+    assert run(pauses) == 0
+    assert "\nPoints\n" not in capsys.readouterr().out
+
+
+def test_a_bad_verdict_is_exit_code_one_and_still_the_whole_object(capsys):
+    code, data = told(capsys, *AOA, "--set", "noise.accelerometer=1e-6 g", "--set", "noise.gyro=0.002 deg/s")
+    assert code == 1
+    assert data["status"]["code"] == "inconsistent"
+    assert "posterior" in data["result"]
+
+
+def test_the_result_of_one_run_is_the_prior_of_the_next(capsys):
+    """The second run knows the biases as well as the first at its end, and better than the study at the start."""
+    rows = [line.rsplit(",", 1)[0] for line in Path("model.csv").read_text().splitlines()]
+    Path("bare.csv").write_text("\n".join(rows) + "\n")  # without theta_ref
+    bare = ["aoa", "bare.csv", *AOA[2:]]
+    assert run([*bare, "--out", "run1.json", "--quiet"]) == 0
+    code, data = told(capsys, *bare, "--set", "estimator.prior=run1.json")
+    assert code == 0
+    before = {p["name"]: p["u"] for p in json.loads(Path("run1.json").read_text())["parameters"]}
+    for p in data["parameters"]:
+        assert p["u"] <= before[p["name"]] * (1.0 + 1e-9)
+        assert data["result"]["posterior"][p["name"]]["prior"] <= before[p["name"]] * (1.0 + 1e-6)
+
+
+def test_files_with_distinct_channels_are_one_record(capsys):
+    rows = [line.split(",") for line in Path("model.csv").read_text().splitlines()]
+    titles = [title.split(" ")[0] for title in rows[0]]
+    for name, chosen in (("acc", ("t", "a1", "a2", "a3", "theta_ref")), ("gyro", ("t", "gyro"))):
+        places = [titles.index(each) for each in chosen]
+        Path(f"{name}.csv").write_text("".join(",".join(row[k] for k in places) + "\n" for row in rows))
+    apart = told(capsys, "aoa", "acc.csv", "gyro.csv", *AOA[2:])[1]
+    whole = told(capsys, *AOA)[1]
+    for key in ("max_abs_deg", "rms_deg"):
+        assert apart["result"]["reference"][key] == pytest.approx(whole["result"]["reference"][key], rel=1e-9)
+
+
+# Live.
+
+
+@pytest.mark.parametrize("how", [[], ["--states", "8"], ["--set", "model.roll=5.0(2) deg"]])
+def test_a_stream_gives_the_bytes_of_the_file(how, capsys, monkeypatch):
+    assert run([*AOA, *how, "--out", "angles.csv", "--quiet"]) in (0, 1)
+    code, out, err = piped(monkeypatch, capsys, "aoa", "--stream", *AOA[2:], *how, "--quiet")
+    assert (code, err) == (0, "")
+    assert out == Path("angles.csv").read_text()
+
+
+def test_a_stream_from_a_file_a_line_a_second(capsys):
+    assert run([*AOA, "--stream", "--every", "1 s", "--quiet"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [float(line.split(",")[0]) for line in lines[1:]] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
+    stream = ["aoa", "--stream", *AOA[2:], "--states", "8", "--set", "noise.accelerometer=1e-6 g"]
+    code, out, err = piped(monkeypatch, capsys, *stream)
+    assert (code, out.count("\n")) == (0, 1501)
+    assert err.count("excess_scatter: NIS is ") == 1
+
+
+@POSIX
+def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
+    """Killed without warning, while it works: each row is answered, and always with the same digits."""
+    command = ["aoa", "--stream", *AOA[2:], "--quiet"]
+    assert run([*command[:1], "model.csv", *command[1:]]) == 0
+    whole = capsys.readouterr().out.encode().splitlines(keepends=True)
+    saving = ["--checkpoint", str(tmp_path / "state"), "--checkpoint-every", "17"]
+    given = []
+    for lines in (*np.random.default_rng(11).integers(30, 700, 2), None):
+        with open("model.csv", "rb") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "inercal", *command, *saving], stdin=log, stdout=subprocess.PIPE
+            )
+        if lines is not None:
+            given += [process.stdout.readline() for _ in range(lines)]
+            process.send_signal(signal.SIGKILL)
+        given += process.stdout.readlines()
+        process.stdout.close()
+        assert process.wait(60) == (0 if lines is None else -signal.SIGKILL)
+        if not given[-1].endswith(b"\n"):
+            given.pop()  # killed in the middle of a line
+    assert set(given) == set(whole)
+    assert list(dict.fromkeys(given)) == whole
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["aoa", "none.csv", *AOA[2:]], ["none.csv"]),
+        (["aoa", "model.csv"], ["--study"]),
+        (["aoa", *AOA[2:]], ["FILES is missing", "--stream"]),
+        ([*AOA, "--static", "kalman"], ["kalman", "improved"]),
+        ([*AOA, "--states", "9"], ["9", "19"]),
+        ([*AOA, "--smooth", "--static", "gls"], ["--smooth", "--static"]),
+        ([*AOA, "--states", "8", "--tangential", "dual"], ["--states", "--tangential"]),
+        ([*AOA, "--out", "cal.txt"], ["cal.txt", "'.txt'", ".json"]),
+        ([*AOA, "--out", "model.csv"], ["is an input"]),
+        ([*AOA, "--report", "cal.pdf"], [".html"]),
+        ([*AOA, "--every", "1 s"], ["--every", "--stream"]),
+        ([*AOA, "--checkpoint", "c"], ["--checkpoint", "--stream"]),
+        ([*AOA, "--stream", "--json"], ["--json", "stream"]),
+        ([*AOA, "--stream", "--out", "x.csv"], ["--out", "stream"]),
+        ([*AOA, "--stream", "--report", "x.html"], ["--report", "stream"]),
+        ([*AOA, "--stream", "--compare"], ["--compare", "stream"]),
+        ([*AOA, "--stream", "--smooth"], ["--smooth", "stream"]),
+        ([*AOA, "--stream", "--points"], ["--points", "stream"]),
+        ([*AOA, "--stream", "--centrifugal", "none"], ["--centrifugal", "stream"]),
+        ([*AOA, "--stream", "--set", "estimator.smooth=true"], ["aoa.toml", "estimator.smooth", "past"]),
+        ([*AOA, "--stream", "--every", "0 s"], ["--every", "above 0"]),
+        ([*AOA, "--stream", "--checkpoint", "model.csv"], ["is an input"]),
+        (["aoa", "model.csv", "pauses.csv", *AOA[2:], "--stream"], ["--stream", "2 files"]),
+        (["aoa", "model.csv", "pauses.csv", *AOA[2:]], ["pauses.csv", "model.csv", "estimator.prior"]),
+        (["aoa", "model.csv", "--study", "selfcal.toml"], ["selfcal.toml", "rig.kind", "selfcal"]),
+        (["aoa", "model.csv", "--study", "model.csv"], ["model.csv"]),
+        ([*AOA, "--set", "sensors.a1.axis=+y"], ["sensors.a1.axis", "+y"]),
+        ([*AOA, "--set", "estimator.prior=none.json"], ["none.json"]),
+        ([*AOA, "--set", "estimator.stats=8"], ["estimator.stats", "states"]),
+        (["aoa", "gyro_only.csv", *AOA[2:]], ["gyro_only.csv", "accelerometer", "a1"]),
+        (["aoa", "one_axis.csv", *AOA[2:]], ["one_axis.csv", "a2"]),
+        (["aoa", "counts.csv", *AOA[2:]], ["counts.csv", "a1 is in count", "sensors.a1", "scale"]),
+        (["aoa", "counts.csv", *AOA[2:], "--stream"], ["counts.csv", "a1 is in count", "scale"]),
+        (["aoa", "one_axis.csv", *AOA[2:], "--stream"], ["one_axis.csv", "a2"]),
+        (["aoa", "ten.csv", *AOA[2:]], ["ten.csv", "10 rows"]),
+        (["aoa", "noise.bin", *AOA[2:]], ["noise.bin"]),
+    ],
+)
+def test_bad_input_is_one_sentence_and_nothing_is_written(arguments, words, capsys, folder):
+    text = Path("model.csv").read_text()
+    rows = [line.split(",") for line in text.splitlines()]
+    if not Path("ten.csv").exists():
+        run(["new", "selfcal", "--out", "selfcal.toml", "--quiet"])
+        Path("gyro_only.csv").write_text("".join(f"{row[0]},{row[4]}\n" for row in rows))
+        Path("one_axis.csv").write_text("".join(f"{row[0]},{row[1]},{row[3]},{row[4]}\n" for row in rows))
+        Path("counts.csv").write_text(text.replace("a1 [g]", "a1 [count]"))
+        Path("ten.csv").write_text("".join(",".join(row) + "\n" for row in rows[:11]))
+        Path("noise.bin").write_bytes(np.random.default_rng(1).bytes(4000))
+    before = sorted(path.name for path in folder.iterdir())
+    for more in ([], ["--json"] if "--stream" not in arguments else []):
+        capsys.readouterr()
+        assert run([*arguments, *more]) == 2
+        said_once(capsys.readouterr(), *words)
+    assert sorted(path.name for path in folder.iterdir()) == before
