@@ -6,22 +6,19 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from inercal._toml import read_toml
-from inercal.aoa.settings import AoaSettings
 from inercal.errors import StudyError
-from inercal.imu.settings import ImuSettings
-from inercal.selfcal.settings import SelfcalSettings
-from inercal.study.aoa import aoa_study
-from inercal.study.imu import imu_study
-from inercal.study.positions import WAYS
-from inercal.study.rig import DISTRIBUTIONS
-from inercal.study.selfcal import selfcal_study
-from inercal.study.turns import PLAN_WAYS
-from inercal.study.turntable import turntable_study
-from inercal.turntable.settings import TurntableSettings
+from inercal.study.ways import DISTRIBUTIONS, PATHS, POSITIONS
 from inercal.units import shown
+
+# each kind of study brings models that take a tenth of a second to build: those of the others are not wanted
+if TYPE_CHECKING:
+    from inercal.aoa.settings import AoaSettings
+    from inercal.imu.settings import ImuSettings
+    from inercal.selfcal.settings import SelfcalSettings
+    from inercal.turntable.settings import TurntableSettings
 
 #: rig.kind -> the command whose studies have it; those of a turntable serve several
 _COMMANDS = {
@@ -39,8 +36,8 @@ _EXPECTED = {
 
 #: tables (a regular expression) that hold one of these keys: setting one takes the place of the others
 _ONE_OF = (
-    (r"positions", WAYS),
-    (r"plan", PLAN_WAYS),
+    (r"positions", POSITIONS),
+    (r"plan", PATHS),
     (r"rig\.errors\.\w+", DISTRIBUTIONS),
     (r"sensors\.\w+", ("axis", "angle")),
     (r"sensors\.\w+", ("calibration", "scale")),
@@ -64,6 +61,8 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
     StudyError
         One sentence: file and key, what was found, what was expected.
     """
+    from inercal.study.imu import imu_study
+
     return imu_study(_read(path, overrides, "calibrate imu"), path)
 
 
@@ -82,6 +81,8 @@ def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> Tur
     StudyError
         One sentence: file and key, what was found, what was expected.
     """
+    from inercal.study.turntable import turntable_study
+
     return turntable_study(_read(path, overrides, "calibrate turntable"), path)
 
 
@@ -100,6 +101,8 @@ def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> Selfc
     StudyError
         One sentence: file and key, what was found, what was expected.
     """
+    from inercal.study.selfcal import selfcal_study
+
     return selfcal_study(_read(path, overrides, "selfcal"), path)
 
 
@@ -118,6 +121,8 @@ def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettin
     StudyError
         One sentence: file and key, what was found, what was expected.
     """
+    from inercal.study.aoa import aoa_study
+
     return aoa_study(_read(path, overrides, "aoa"), path)
 
 

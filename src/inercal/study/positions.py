@@ -20,15 +20,13 @@ from inercal.rigs.chain import Chain
 from inercal.rigs.plans import NAMED, Plan, grid, listed, named
 from inercal.study.fields import refusal
 from inercal.study.rig import Angle, Limits
+from inercal.study.ways import POSITIONS
 from inercal.units import shown
 
 Array = NDArray[np.float64]
 
 MOST = 200_000
 """Positions of a grid that fit into memory with all their indices."""
-
-WAYS = ("grid", "plan", "list", "file")
-"""Keys of which a study gives one."""
 
 _JOINTS = ("phi1", "phi2", "phi3")
 
@@ -76,7 +74,7 @@ class PositionsTable(Strict):
     @model_validator(mode="after")
     def _one(self) -> PositionsTable:
         """Refuse two ways at once."""
-        ways = dict(zip(WAYS, (self.grid, self.plan, self.list_, self.file), strict=True))
+        ways = dict(zip(POSITIONS, (self.grid, self.plan, self.list_, self.file), strict=True))
         given = [name for name, way in ways.items() if way is not None]
         if len(given) > 1:
             raise refusal(f"found {' and '.join(given)}, expected one of them")

@@ -34,9 +34,6 @@ _MAKE: Mapping[str, Callable[[float], Distribution]] = {
     "triangular": triangular,
     "two_point": two_point,
 }
-DISTRIBUTIONS = tuple(_MAKE)
-"""Keys of which an error of the table gives one."""
-
 _EXPECTED = "uniform, normal, triangular or two_point"
 _LEAVE_OUT = 'an error is left out with NAME = "none"'
 

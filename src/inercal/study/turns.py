@@ -16,9 +16,6 @@ from inercal.study.fields import Duration, QuantityText, Several, SeveralTexts, 
 from inercal.study.rig import Limits
 from inercal.units import Quantity, shown
 
-PLAN_WAYS = ("turns", "path")
-"""Keys of which a study gives one."""
-
 FEWEST = 10
 """Rows of a plan below which there is nothing to find out."""
 
