@@ -12,6 +12,9 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
 @pytest.mark.parametrize(
     ("command", "says"),
     [
+        (["aoa_bands.py", "--seeds", "1", "--draws", "4", "--scenario", "base"], "smoothed 19"),
+        (["aoa_fusion.py", "--smoke"], "19 states"),
+        (["aoa_fusion.py", "--endless", "20000"], " 0 without an angle"),
         (["ferraris.py", "--smoke"], "inercal, with uncertainties"),
         (["imu_calibration.py", "--smoke"], "inercal, solve"),
         (["imu_coverage.py", "--runs", "2"], "all together"),

@@ -131,7 +131,7 @@ def run(twin, start, t, rows):
     The innovations over their standard deviations (m, N + 1) come last.
     """
     n, gate = len(twin.settings.layout.names), twin.settings.estimator.gate
-    x, P, turns = start.x.copy(), start.P.copy(), start.turns.copy()
+    x, P, turns = start.x.copy(), start.P.copy(), start.turns[:2]
     predicted, updated, steps = [], [], []
     innovations = np.full((len(t), n + 1), np.nan)
     for k, row in enumerate(rows):

@@ -13,7 +13,7 @@ from sting_study import BASE, DEG, G, scenario
 
 from inercal.aoa.figures import angle_page, pictures
 from inercal.aoa.record import to_record
-from inercal.aoa.settings import Methods
+from inercal.aoa.settings import Attitude, Disturbances, Methods, Oscillation
 from inercal.aoa.simulate import simulate
 from inercal.aoa.task import measure
 from inercal.report import sting
@@ -27,6 +27,7 @@ from inercal.report.aoa_published import (
     tangential_residual,
 )
 from inercal.report.spectra import of_angle, peak, spectral_density
+from inercal.units import Quantity, parse_unit
 
 
 def words_of(svg):
@@ -91,6 +92,7 @@ def test_what_is_drawn_of_a_fusion():
         "Close-up",
         "Where the sensors are",
         "Error against the reference",
+        "Sensors against the reference angle",
         "What lever arms add to the readings",
         "Flexure of the sting",
         "What was learned of the sensors",
@@ -107,6 +109,36 @@ def test_what_is_drawn_of_a_fusion():
     assert {"b_g", "b_1", "dr_3", "zo_2", "k_g"} <= set(words["What was learned of the sensors"])
     found = re.search(r"oscillates at (\S+) Hz", by_title(drawn)["Spectra"].caption)
     assert float(found[1]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_alpha_beta_and_roll_are_drawn_where_they_are_known():
+    """A roll of 20 deg with yaw gyros: roll, alpha and beta; stated alone: alpha and beta; else theta is no alpha."""
+    lies = Attitude(roll=Quantity(20.0 * DEG, 0.1 * DEG, parse_unit("rad"), ""))
+    coupled = Disturbances(roll=Oscillation(1.0 * DEG, 3.0), yaw=Oscillation(1.0 * DEG, 2.0))
+    title = "Alpha, beta and roll"
+    assert title not in by_title(of_the_base())
+    for changes, panels in (
+        ({"attitude": lies}, {"alpha [°]", "beta [°]"}),
+        ({"attitude": lies, "disturbances": coupled}, {"alpha [°]", "beta [°]", "roll [°]"}),
+        ({"disturbances": coupled}, {"roll [°]"}),
+    ):
+        settings = short(**changes)
+        words = texts(by_title(pictures(measurement(settings), settings))[title])
+        assert {word for word in words if word.endswith("[°]")} == panels
+        if "roll [°]" in panels and "attitude" in changes:
+            told = next(word for word in words if word.startswith("roll:"))
+            low, high = (float(x) for x in re.findall(r"-?[\d.]+", told.replace("−", "-"))[:2])
+            assert (low, high) == pytest.approx((19.0, 21.0), abs=0.4)
+
+
+def test_sensors_against_the_reference_are_drawn_as_they_are():
+    values = np.array([[100.0, -50.0], [0.1, 0.2]])
+    seen = np.array([[True, False], [True, True]])
+    picture = sting.fitted(
+        ("a1", "a2"), ("scale − 1 [ppm]", "axis [mrad]"), values, 0.1 * np.abs(values), seen
+    )
+    assert {"a1", "a2", "scale − 1 [ppm]", "axis [mrad]"} <= set(texts(picture))
+    texts(sting.fitted(("a1",), ("x",), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)))
 
 
 def test_lever_arms_are_what_they_are_worth():

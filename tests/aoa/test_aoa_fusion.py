@@ -161,29 +161,28 @@ def test_across_a_restart_motion_is_forgotten_and_the_sensors_are_not(interrupte
     np.testing.assert_allclose(whole.theta[:700], alone.theta, atol=1e-3 * alone.u.max())
     of = problem(told)
     whole, alone = estimate(recording, of, smoothed=True), estimate(cut, of, smoothed=True)
-    assert np.median(whole.u[:700] / alone.u) < 0.9
+    assert (whole.u[:700] < alone.u).all()
+    assert np.median(whole.u[:700] / alone.u) < 0.99
     # where nothing was measured there is no angle, neither causal nor smoothed
     assert np.isnan(whole.theta[1400:1475]).sum() >= 60
     assert np.isfinite(whole.theta[1480:]).all()
 
 
-def test_roll_goes_on_across_a_gap_that_theta_does_not_survive():
-    """A gap of 0.3 s, with roll and yaw gyros: roll keeps what it was, less certain; the smoother goes through."""
+def test_after_a_gap_roll_is_what_is_stated():
+    """A gap of 0.3 s tells nothing of roll, here of 2 deg at 3 Hz about 0: taken for 0 afterwards, that costs at most
+    1 - cos of twice it, 0.14 deg x sin theta cos theta."""
     told = study(motion=replace(BASE, duration=4.0), disturbances=COUPLED)
     recording = simulate(told, np.random.default_rng(8)).recording
     rows = np.delete(np.arange(4000), np.s_[2000:2300])
-    recording = replace(
-        recording,
-        **{k: getattr(recording, k)[rows] for k in ("t", "acc", "gyro", "turns", "stated", "reference")},
-    )
+    columns = ("t", "acc", "gyro", "turns", "stated", "reference")
+    recording = replace(recording, **{name: getattr(recording, name)[rows] for name in columns})
     of = problem(told, spatial=True)
     for smoothed in (False, True):
         found = estimate(recording, of, smoothed)
         assert found.starts == (0, 2000)
-        late = np.r_[500:2000, 2100:3700]
-        error = (found.theta - recording.reference)[late]
-        assert abs(error).max() < 0.05 * DEG
-        assert (abs(error) < 5.0 * found.u[late]).all()
+        error = abs(found.theta - recording.reference)
+        assert (error < 5.0 * found.u)[500:2000].all()
+        assert error[2100:].max() < 0.1 * DEG
 
 
 @pytest.mark.parametrize("states", [8, 19])

@@ -8,7 +8,7 @@ import pytest
 from scipy.io import netcdf_file
 from sting_study import DEG, study
 
-from inercal.aoa.angles import of_fusion
+from inercal.aoa.angles import of_fusion, stated_roll
 from inercal.aoa.filtered import estimate
 from inercal.aoa.history import angles_record, columns, points_record, rows
 from inercal.aoa.points import points
@@ -91,6 +91,27 @@ def test_alpha_and_beta_are_there_only_where_the_study_states_the_flow(measured)
     np.testing.assert_allclose(record["alpha"].si(), np.arctan2(np.sin(theta) * math.cos(phi), np.cos(theta)))
     np.testing.assert_allclose(record["beta"].si(), np.arcsin(np.sin(theta) * math.sin(phi)))
     assert not any(name in angles_record(made, angles, settings) for name in ("alpha", "beta"))
+
+
+def test_the_uncertainty_of_a_stated_roll_is_in_the_columns_once(measured):
+    """Theta found under a roll of 20 deg that may be off by 1 deg, with and without the roll's part put in before."""
+    settings, made, angles = measured
+    attitude = Attitude(roll=degrees(20.0, 1.0))
+    rolled = replace(settings, attitude=attitude)
+    whole = stated_roll(angles, attitude)
+    record = angles_record(made, whole, rolled)
+    np.testing.assert_allclose(record["u_theta"].si(), whole.u, rtol=1e-12)
+    known = np.isfinite(angles.theta)
+    # at 20 deg pitch the roll leaves 0.11 deg per degree; at 0 nothing
+    level, s, c = math.cos(20.0 * DEG), np.sin(angles.theta), np.cos(angles.theta)
+    by = level * math.sin(20.0 * DEG) * s * c / (c**2 + (level * s) ** 2)
+    np.testing.assert_allclose(whole.u[known], np.hypot(angles.u, by * DEG)[known], rtol=1e-12)
+    for name in record.columns:
+        np.testing.assert_array_equal(record[name].values, angles_record(made, angles, rolled)[name].values)
+    exact = Attitude(roll=degrees(20.0))
+    assert stated_roll(angles, exact) is angles
+    tracked = replace(angles, roll=np.zeros(len(made.t)), roll_u=np.zeros(len(made.t)))
+    assert stated_roll(tracked, attitude) is tracked
 
 
 def test_a_stream_tells_the_rows_of_a_file(measured):

@@ -12,15 +12,17 @@ from inercal.aoa.angles import Angles
 from inercal.aoa.filtered import estimate
 from inercal.aoa.outcome import assemble, assemble_paper
 from inercal.aoa.problem import problem
-from inercal.aoa.settings import Estimator, MotionPlan, Timing, Zero
+from inercal.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
 from inercal.aoa.simulate import simulate
 from inercal.aoa.sources import parts
+from inercal.aoa.stated import by_fusion, by_methods
 from inercal.aoa.verification import errors
 from inercal.aoa.zero import with_zero
 from inercal.estimate.exchange import from_json, to_json
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.records.findings import Finding
+from inercal.units import Quantity, parse_unit
 
 SINE = MotionPlan("sine", duration=6.0, mean=30.0 * DEG, amplitude=10.0 * DEG, frequency=1.0)
 
@@ -92,6 +94,57 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
     # a common delay adds (w u)^2, and nothing else does it
     assert by_name["common delay"] == pytest.approx(np.mean((told.rate[after] * 2e-4) ** 2), rel=3e-3)
     assert by_name["stated zero"] > 0.0
+
+
+def test_gravity_and_a_stated_roll_widen_the_angle_as_wrong_ones_move_it():
+    """A roll of 20 deg that is off by 0.1 deg, and gravity by 1e-3 m/s^2: the filter settles on other angles."""
+    roll = Quantity(20.0 * DEG, 0.1 * DEG, parse_unit("rad"), "")
+    uncertain = Site(G, (GravityInput("gravity", 1e-3, "m/s^2", 1.0),))
+    settings = study(motion=SINE, attitude=Attitude(roll=roll), site=uncertain)
+    result, found, made = assembled(settings)
+    told = by_fusion(made, settings, problem(settings), found)
+    other = replace(roll, value=roll.value + roll.u)
+    by_roll, _, _ = assembled(replace(settings, attitude=Attitude(roll=other)), made)
+    turned = estimate(made, problem(replace(settings, attitude=Attitude(roll=other)))).theta - found.theta
+    heavier = estimate(made, problem(replace(settings, site=Site(G + 1e-3)))).theta - found.theta
+    late = made.t > 2.0
+    np.testing.assert_allclose(
+        told.by_roll[late] * roll.u, turned[late], rtol=0.02, atol=0.02 * np.ptp(turned)
+    )
+    own = np.hypot(found.u, heavier)[late]
+    np.testing.assert_allclose(told.known_u[late], own, rtol=0.02)
+    np.testing.assert_allclose(told.u[late], np.hypot(own, turned[late]), rtol=0.02)
+    assert result.result["angle"]["u"]["max"] == pytest.approx(told.u[made.t >= 2.0].max())
+    # coefficients move too, all by one error
+    moved = by_roll.values - result.values
+    assert (result.u >= 0.97 * np.abs(moved)).all()
+    share = {item.source: item.share["theta"] for item in result.budget}
+    assert share["stated roll"] == pytest.approx(
+        np.mean(turned[late] ** 2) / np.mean(told.u[late] ** 2), rel=0.03
+    )
+    assert share["gravity"] == pytest.approx(
+        np.mean(heavier[late] ** 2) / np.mean(told.u[late] ** 2), rel=0.03
+    )
+    sure = replace(settings, attitude=Attitude(roll=replace(roll, u=0.0)), site=Site(G))
+    exact, *_ = assembled(sure, made)
+    assert exact.result["angle"]["u"]["max"] == pytest.approx(found.u[made.t >= 2.0].max())
+
+
+@pytest.mark.parametrize("with_zero_at", [None, Zero(0.0, 4.0, 30.0 * DEG, 0.0)])
+def test_an_uncertain_roll_is_in_u_of_the_papers_methods_unless_a_zero_takes_it_out(with_zero_at):
+    """theta = atan2(A2, A3 / cos phi): tan theta moves by -tan phi tan theta per radian of phi."""
+    roll = Quantity(20.0 * DEG, 0.1 * DEG, parse_unit("rad"), "")
+    still = MotionPlan("static", duration=4.0, sample_rate=200.0, first=30.0 * DEG, last=30.0 * DEG)
+    settings = study(motion=still, attitude=Attitude(roll=roll), zero=with_zero_at)
+    made = simulate(settings, np.random.default_rng(6)).recording
+    angles = by_methods(made, settings, Methods(static="complementary"))
+    expected = -math.tan(20.0 * DEG) * math.sin(30.0 * DEG) * math.cos(30.0 * DEG)
+    if with_zero_at is None:
+        np.testing.assert_allclose(angles.by_roll, expected, rtol=5e-3)
+    else:
+        np.testing.assert_allclose(angles.by_roll, 0.0, atol=5e-3)
+    part = np.sqrt(angles.u**2 - angles.known_u**2)
+    np.testing.assert_allclose(part, np.abs(angles.by_roll) * roll.u, rtol=1e-6, atol=1e-9)
 
 
 def test_a_share_says_what_a_better_sensor_would_bring():

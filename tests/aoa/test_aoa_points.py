@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from sting_study import BASE, DEG, scenario, study
+from sting_study import BASE, DEG, SCENARIOS, scenario, study
 
-from inercal.aoa.angles import Angles, of_fusion
+from inercal.aoa.angles import Angles, of_fusion, stated_roll
 from inercal.aoa.filtered import estimate
+from inercal.aoa.flow import theta_by_roll
 from inercal.aoa.motion import Sines, buffet
 from inercal.aoa.pauses import at_rest, pauses
 from inercal.aoa.points import COSINES, mean_u, points
@@ -155,12 +156,22 @@ def test_a_rolled_models_points_have_alpha_and_beta():
     assert found.u_beta == pytest.approx(1e-3)
     tracked = points(
         recording(t, point=np.ones(5)),
-        angles(np.full(5, 0.2)),
+        replace(angles(np.full(5, 0.2)), roll=np.full(5, 0.5 * math.pi), roll_u=np.zeros(5)),
         study(),
-        np.full(5, 0.5 * math.pi),
-        np.zeros(5),
     )
     assert tracked[0].beta == pytest.approx(0.2)
+
+
+def test_the_uncertainty_of_a_stated_roll_is_in_that_of_a_point():
+    t, attitude = np.arange(5.0), Attitude(roll=Quantity(0.5, 0.02, parse_unit("rad"), ""))
+    settings, plain_angles = study(attitude=attitude), angles(np.full(5, 0.4), u=1e-4)
+    numbered = recording(t, point=np.ones(5))
+    (found,) = points(numbered, stated_roll(plain_angles, attitude), settings)
+    by = float(theta_by_roll(np.array([0.4]), 0.5)[0])
+    assert found.u == pytest.approx(math.hypot(1e-4, 0.02 * by))
+    # alpha takes the roll both ways from what is left without it, and not twice
+    (without,) = points(numbered, plain_angles, settings)
+    assert (found.u_alpha, found.u_beta) == pytest.approx((without.u_alpha, without.u_beta))
 
 
 @pytest.mark.parametrize("rms", [0.0, 0.05, 0.3])
@@ -195,6 +206,71 @@ def test_a_slow_oscillation_has_no_pauses(frequency):
     settings = study(motion=replace(BASE, frequency=frequency, duration=20.0, sample_rate=200.0))
     simulated = simulate(settings, np.random.default_rng(69))
     assert points(simulated.recording, angles(simulated.theta), settings) == ()
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_only_a_pitch_pause_has_pauses(name):
+    # 10 deg and 16 deg at 1 Hz, a chirp to 5 Hz, a buffet of 0.2 deg: whatever the seed, none of them rests
+    for seed in range(8):
+        settings = scenario(name, sample_rate=100.0)
+        simulated = simulate(settings, np.random.default_rng([73, seed]))
+        t, u = simulated.recording.t, 1e-5
+        theta = simulated.theta + u * np.random.default_rng(seed).standard_normal(len(t))
+        still, _ = at_rest(t, theta, np.full(len(t), u))
+        found = pauses(t, theta, np.full(len(t), u))
+        if name == "pitch-pause":
+            assert len(found) == 11
+            assert 0.7 < still.mean() < 0.76  # 4 s of 5.5 s, 11 pauses and 10 moves: 0.746
+        else:
+            assert found == ()
+            assert still.mean() < 0.02
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("rms", [0.05, 0.1, 0.2, 0.3])
+def test_a_pause_is_found_under_buffet_whatever_the_seed(seed, rms):
+    settings = scenario("pitch-pause", last=10.0 * DEG, rms=rms * DEG, sample_rate=100.0)
+    simulated = simulate(settings, np.random.default_rng([74, seed]))
+    t = simulated.recording.t
+    found = pauses(t, simulated.theta, np.full(len(t), 1e-5))
+    assert len(found) == 3
+    for k, each in enumerate(found):
+        assert 5.5 * k - 1e-9 <= t[each.start]
+        assert t[each.stop - 1] <= 5.5 * k + 4.0
+
+
+def test_a_long_chirp_does_not_rest_however_fast_it_gets():
+    """Of 5 deg, 0.1 to 5 Hz in 600 s: more than half of it turns to and fro within the window."""
+    settings = scenario("chirp", duration=600.0, sample_rate=50.0)
+    simulated = simulate(settings, np.random.default_rng(75))
+    t, u = simulated.recording.t, np.full(30_000, 1e-5)
+    assert pauses(t, simulated.theta, u) == ()
+    still, _ = at_rest(t, simulated.theta, u)
+    # what is left are the turning points of the slow oscillations, of a rate that reaches 157 deg/s
+    assert still.mean() < 0.02
+    assert np.abs(simulated.rate[still]).max() < 5.0 * DEG
+
+
+def test_a_model_at_one_angle_rests_under_a_small_buffet_and_not_under_a_large_one():
+    t, u = np.arange(0.0, 20.0, 0.005), np.full(4000, 1e-5)
+    for rms, count in ((0.05, 1), (0.5, 0)):
+        shaken = buffet(rms * DEG, 3.0, 15.0, np.random.default_rng(76))(t)[0]
+        assert len(pauses(t, 0.1 + shaken, u)) == count
+
+
+def test_an_oscillation_that_begins_ends_a_pause():
+    t = np.arange(0.0, 20.0, 0.005)
+    theta = 0.1 + np.where(t > 8.0, 5.0 * DEG * np.sin(2.0 * math.pi * 5.0 * t), 0.0)
+    (found,) = pauses(t, theta, np.full(len(t), 1e-5))
+    assert found.start == 0
+    assert 7.0 < t[found.stop] <= 8.0
+
+
+def test_noise_within_its_uncertainty_is_no_motion():
+    # a poor sensor: 1 deg from row to row, and said to be so
+    t = np.arange(0.0, 10.0, 0.01)
+    theta = DEG * np.random.default_rng(77).standard_normal(len(t))
+    assert len(pauses(t, theta, np.full(len(t), DEG))) == 1
 
 
 def test_a_sweep_has_no_pauses_and_a_model_at_rest_is_one():

@@ -1,5 +1,6 @@
 """What the terminal shows: numbers in units of the field, the same as those of the result."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -13,14 +14,22 @@ from inercal.aoa.filtered import estimate
 from inercal.aoa.outcome import assemble, assemble_paper
 from inercal.aoa.points import points
 from inercal.aoa.problem import problem
-from inercal.aoa.settings import MotionPlan, Timing
+from inercal.aoa.sensor_fit import fit
+from inercal.aoa.settings import Calibration, MotionPlan, Timing
 from inercal.aoa.simulate import simulate
-from inercal.aoa.tables import all_tables, angle, methods, points_table, sensors, uncertainty
+from inercal.aoa.tables import all_tables, angle, fitted, methods, points_table, sensors, uncertainty
 from inercal.aoa.verification import errors
+from inercal.estimate.exchange import to_json
 
 PAUSES = MotionPlan(
     "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0
 )
+
+
+def assembled(settings, made, verified=None):
+    of = problem(settings)
+    found = estimate(made, of)
+    return assemble(made, settings, of, found, [], None, verified=verified), found
 
 
 def measured(judged=True, **changes):
@@ -124,6 +133,72 @@ def test_the_cost_of_a_delay_is_said_in_degrees(shown):
     assert "1.00 ms (u 0.10 ms)" in words
     assert "0.019 deg at most" in words
     assert "0.0019 deg at most" in words
+
+
+def test_a_delay_is_later_earlier_or_not_seen(shown):
+    _, result, _ = shown
+
+    def words(spectra, stated=0.0):
+        value, u = spectra
+        known = {"stated": stated, "spectra": {"value": value, "u": u, "coherence": 1.0}}
+        timing = result.result["timing"] | {"gyro_delay": known}
+        return delays(replace(result, result=result.result | {"timing": timing})).partition(". ")[0]
+
+    assert (
+        words((2e-3, 1e-5))
+        == "The gyro is later than the accelerometers by 2.000 ms (u 0.010 ms) by the spectra"
+    )
+    assert words((-2e-3, 1e-5)).endswith(
+        "is earlier than the accelerometers by 2.000 ms (u 0.010 ms) by the spectra"
+    )
+    none = words((-2.9e-7, 3.2e-6))
+    assert (
+        none
+        == "No delay of the gyro against the accelerometers is seen: -0.0003 ms (u 0.0032 ms) by the spectra"
+    )
+    both = words((1e-7, 3.2e-6), stated=-1e-3)
+    assert both.endswith(
+        "earlier than the accelerometers by 1 ms as stated, -0.0001 ms (u 0.0032 ms) by the spectra"
+    )
+
+
+def test_sensors_of_the_conditions_are_told_in_words_with_units(shown):
+    _, result, _ = shown
+    told = displayed(result).conditions["sensors"]
+    assert told == {
+        "a1": "lambda 90 deg, r -0.25 m, z 0 m",
+        "a2": "lambda 0 deg, r 0.2 m, z 0 m",
+        "a3": "lambda -90 deg, r 0.25 m, z 0 m",
+    }
+    sensors_known = {"a1": Calibration(scale=1.01, bias=0.5), "gyro": Calibration(bias=0.1 * DEG)}
+    _, other, _ = measured(sensors=sensors_known)
+    told = displayed(other).conditions["sensors"]
+    assert told["a1"].endswith("scale 1.01, bias 0.5 m/s^2")
+    assert told["gyro"] == "scale 1, bias 0.1 deg/s"
+
+
+def test_the_fit_to_a_reference_is_a_table():
+    """Two sensors whose axes are off by 0.5 mrad, 0.0286 deg, on a table that turns slowly: no position is seen."""
+    sweep = MotionPlan("static", duration=40.0, sample_rate=100.0, first=-10.0 * DEG, last=90.0 * DEG)
+    settings = study(motion=sweep)
+    off = replace(settings.layout, angle=settings.layout.angle + np.array([5e-4, -5e-4, 0.0]))
+    made = simulate(replace(settings, layout=off), np.random.default_rng(5)).recording
+    found = fit(made, settings)
+    result, _ = assembled(settings, made, found)
+    rows = {row[0]: row[1:] for row in fitted(result).rows}
+    assert rows["dlambda_1"][0] == "axis of accelerometer 1, towards down"
+    assert float(rows["dlambda_1"][1]) == pytest.approx(0.5, abs=5.0 * float(rows["dlambda_1"][2]))
+    assert rows["dlambda_2"][3] == "mrad"
+    assert float(rows["dlambda_2"][4]) == pytest.approx(-0.0286, abs=5e-3)
+    assert float(rows["S_1"][1]) == pytest.approx(0.0, abs=5.0 * float(rows["S_1"][2]))
+    assert rows["S_1"][3] == "ppm"
+    assert rows["zo_1"][1] == rows["tau_g"][1] == "not seen"
+    assert set(rows) == {*found.names, ""}
+    assert "prior" in fitted(result).caption
+    json.dumps(to_json(result), allow_nan=False)
+    poor, _ = assembled(settings, made, replace(found, converged=False))
+    assert "not to be used" in fitted(poor).caption
+    assert "did not converge" in fitted(poor).title
 
 
 def test_all_tables_of_the_fusion_and_of_a_paper_method(shown):

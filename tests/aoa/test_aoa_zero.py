@@ -57,22 +57,22 @@ def test_many_zeros_miss_by_their_uncertainty():
     assert 0.1 < np.mean(squares) < 1.0 + 4.0 * math.sqrt(2.0 / 40.0)
 
 
-def test_an_angle_is_stated_once():
-    settings, simulated = at_20_deg()
-    stated = with_zero(simulated.recording, settings).stated
-    (row,) = np.flatnonzero(np.isfinite(stated[:, 0]))
-    assert simulated.recording.t[row] == pytest.approx(3.0)
-    assert stated[row].tolist() == [ZERO.angle, ZERO.u]
-    assert np.isnan(simulated.recording.stated).all()
-
-
-def test_a_row_that_goes_back_in_time_is_not_the_one():
-    # such rows never reach the filter
+def test_all_rows_together_know_the_angle_as_well_as_it_is_stated():
     settings, simulated = at_20_deg()
     recording = replace(simulated.recording, t=simulated.recording.t.copy())
-    recording.t[1400:1600] = recording.t[1399]
-    (row,) = np.flatnonzero(np.isfinite(with_zero(recording, settings).stated[:, 0]))
-    assert row < 1400 or row >= 1600
+    recording.t[1400:1600] = recording.t[1399]  # the clock stands still: rows that never reach the filter
+    recording.acc[1700:1800, 1] = np.nan
+    stated = with_zero(recording, settings).stated
+    rows = np.flatnonzero(np.isfinite(stated[:, 0]))
+    assert set(stated[rows, 0]) == {ZERO.angle}
+    assert not np.isin(np.arange(1401, 1600), rows).any()
+    assert not np.isin(np.arange(1700, 1800), rows).any()
+    assert (recording.t[rows] > ZERO.start).all()
+    assert (recording.t[rows] <= ZERO.end).all()
+    # information adds up to that of one measurement, less what is missing of the stretch
+    lost = 100 / settings.motion.sample_rate / (ZERO.end - ZERO.start)
+    assert np.sum(stated[rows, 1] ** -2.0) == pytest.approx((1.0 - lost) / ZERO.u**2, rel=0.01)
+    assert np.isnan(simulated.recording.stated).all()
 
 
 def test_a_study_without_a_zero_leaves_the_recording_as_it_is():

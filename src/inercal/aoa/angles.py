@@ -19,8 +19,8 @@ class Angles:
     """What a ``method`` says at each of n rows, NaN where it says nothing.
 
     ``theta`` pitch and its standard uncertainty ``u`` [rad]; ``rate`` and ``rate_u`` [rad/s]. ``roll`` and ``roll_u``
-    [rad] where gyros for roll and yaw track it. ``own_u`` is u without the part of a roll that is stated, where there
-    is such a part (`stated_roll`): what `inercal.aoa.flow.alpha_beta` takes.
+    [rad] where gyros for roll and yaw track it. Where the study states a roll with an uncertainty, ``own_u`` is u
+    without its part, what `inercal.aoa.flow.alpha_beta` takes, and ``by_roll`` the change of theta by that of the roll.
     """
 
     method: str
@@ -31,6 +31,7 @@ class Angles:
     roll: Array | None = None
     roll_u: Array | None = None
     own_u: Array | None = None
+    by_roll: Array | None = None
 
     @property
     def known_u(self) -> Array:
@@ -49,4 +50,5 @@ def stated_roll(angles: Angles, attitude: Attitude) -> Angles:
     stated, it is exact, or gyros track it: then it is in u already."""
     if attitude.roll is None or attitude.roll.u == 0.0 or angles.roll is not None:
         return angles
-    return replace(angles, u=theta_u(angles.theta, angles.known_u, attitude), own_u=angles.known_u)
+    u = theta_u(angles.theta, angles.known_u, attitude, angles.by_roll)
+    return replace(angles, u=u, own_u=angles.known_u)

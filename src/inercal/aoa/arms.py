@@ -42,7 +42,7 @@ def level_of(settings: AoaSettings) -> float:
     if abs(level) < _ACROSS:
         found = 0.0 if roll is None else math.degrees(roll.value)
         raise StudyError(
-            "attitude.roll",
+            "model.roll",
             f"found {found:.6g} deg, expected one further from +-90 deg, at which pitch shows",
         )
     return level

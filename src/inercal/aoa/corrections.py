@@ -33,6 +33,7 @@ def told(verified: Verified) -> dict[str, Any]:
         "unseen": list(verified.unseen),
         "converged": verified.converged,
         "rows": verified.rows,
+        "reference_noise_rad": verified.reference_noise,
     }
 
 

@@ -69,8 +69,9 @@ def _too_fast(part: Recording, settings: AoaSettings, now: Judged) -> list[Findi
         livelier = replace(settings, estimator=replace(settings.estimator, snap=snap))
         then = judge(part, livelier)
         if (then.fits or then.misfit <= SOUND) and then.misfit < (1.0 - _WORTH) * now.misfit:
-            text = f"the model moves faster than a snap of {settings.estimator.snap:.3g} rad^2/s^7 lets it: write snap = "
-            return [Finding("unmodelled", f'{text}"{snap:.3g} rad^2/s^7" under [estimator]')]
+            text = f"the model moves faster than a snap of {settings.estimator.snap:.3g} rad^2/s^7 lets it"
+            said = f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]'
+            return [Finding("unmodelled", said)]
     return []
 
 
@@ -165,7 +166,7 @@ def _advice(found: FittedError, settings: AoaSettings) -> str:
         case "yaw":
             return "no sensor here sees that, record gyro_roll and gyro_yaw"
         case _:
-            return "state roll under [attitude], or record gyro_roll and gyro_yaw where it changes"
+            return "state roll under [model], or record gyro_roll and gyro_yaw where it changes"
 
 
 def _contradiction(part: Recording, settings: AoaSettings, now: Judged) -> Finding:

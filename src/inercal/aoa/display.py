@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.settings import GYROS
 from inercal.estimate.result import Estimate, rounded
 from inercal.units import STANDARD_GRAVITY
 
@@ -37,6 +38,9 @@ _WORDS = {
     "zo_": "position of accelerometer {}, up",
     "k_g": "scale of the gyro",
     "tau_g": "delay of the gyro",
+    "S_": "scale of accelerometer {}, less 1",
+    "dlambda_": "axis of accelerometer {}, towards down",
+    "tau": "delay of all sensors against the reference",
 }
 
 _STATISTICS = {
@@ -69,20 +73,22 @@ def in_words(name: str) -> str:
 
 
 def displayed(estimate: Estimate) -> Estimate:
-    """The estimate with coefficients and budget in units of the field, angles of the conditions in degrees, and keys
-    of the statistics in words.
+    """The estimate with coefficients and budget in units of the field, angles of the conditions in degrees, sensors and
+    keys of the statistics in words.
 
     All of ``result`` stays as it is.
     """
     shown = [shown_unit(unit) for unit in estimate.units]
     size = np.array([size for _, size in shown])
+    conditions = _in_degrees(estimate.conditions)
+    stated = estimate.conditions.get("sensors", {})
     return replace(
         estimate,
         units=tuple(unit for unit, _ in shown),
         values=estimate.values / size,
         covariance=estimate.covariance / np.outer(size, size),
         common=None if estimate.common is None else estimate.common / np.outer(size, size),
-        conditions=_in_degrees(estimate.conditions),
+        conditions=conditions | {"sensors": {name: _sensor(name, of) for name, of in stated.items()}},
         statistics={_STATISTICS.get(key, key): value for key, value in estimate.statistics.items()},
         budget=tuple(
             replace(item, u=u, unit=unit)
@@ -105,6 +111,32 @@ def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
     return shown
 
 
+def _sensor(name: str, stated: Mapping[str, float]) -> str:
+    """A sensor as the study states it: ``lambda 90 deg, r -0.25 m, z 0 m``."""
+    told = []
+    if "angle_rad" in stated:
+        angle = float(np.degrees(stated["angle_rad"]))
+        told += [f"lambda {angle:.6g} deg", f"r {stated['r_m']:.6g} m", f"z {stated['z_m']:.6g} m"]
+    if "scale" in stated:
+        of_gyro = name in GYROS
+        bias = float(np.degrees(stated["bias_si"])) if of_gyro else stated["bias_si"]
+        told += [f"scale {stated['scale']:.8g}", f"bias {bias:.6g} {'deg/s' if of_gyro else 'm/s^2'}"]
+    return ", ".join(told)
+
+
+def use_of_fit(estimate: Estimate) -> str:
+    """How the sensors that were fitted to a reference angle are used; nothing where there is no such fit."""
+    fit = estimate.result.get("verified")
+    if fit is None:
+        return ""
+    if not fit["converged"]:
+        return "The fit of the sensors to theta_ref did not converge: it is not to be used."
+    return (
+        'To use the fit to theta_ref: write this result by --out result.json, and put prior = "result.json" under '
+        "[estimator] of the study; scales and axes are then put right, and the rest is what is known before."
+    )
+
+
 def delays(estimate: Estimate) -> str:
     """Sentences on delays: that of the gyro, and what one common to all sensors costs."""
     timing = estimate.result["timing"]
@@ -116,12 +148,19 @@ def _of_gyro(estimate: Estimate, known: Mapping[str, Any]) -> str:
     """What is known of the delay of the gyro."""
     told = []
     if "tau_g" in estimate.names:
-        told.append(f"{_ms(estimate['tau_g'].value, estimate['tau_g'].u)} by the fusion")
+        told.append((estimate["tau_g"].value, estimate["tau_g"].u, "by the fusion"))
     elif known["stated"]:
-        told.append(f"{1e3 * known['stated']:.4g} ms as stated")
+        told.append((known["stated"], 0.0, "as stated"))
     if known["spectra"] is not None:
-        told.append(f"{_ms(known['spectra']['value'], known['spectra']['u'])} by the spectra")
-    return f"The gyro is later than the accelerometers by {', '.join(told)}." if told else ""
+        told.append((known["spectra"]["value"], known["spectra"]["u"], "by the spectra"))
+    if not told:
+        return ""
+    shown = [value for value, u, _ in told if abs(value) > 2.0 * u]
+    turned = -1.0 if shown and shown[0] < 0.0 else 1.0
+    values = ", ".join(f"{_ms(turned * value, u)} {how}" for value, u, how in told)
+    if not shown:
+        return f"No delay of the gyro against the accelerometers is seen: {values}."
+    return f"The gyro is {'later' if turned > 0.0 else 'earlier'} than the accelerometers by {values}."
 
 
 def _in_common(timing: Mapping[str, Any]) -> str:

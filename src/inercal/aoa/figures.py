@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
-from inercal.aoa.clock import later
 from inercal.aoa.display import delays, displayed, shown_unit
+from inercal.aoa.flow import alpha_beta, stated
 from inercal.aoa.outcome import unit_of
 from inercal.aoa.pauses import at_rest
 from inercal.aoa.tables import all_tables
+from inercal.aoa.task import in_order
 from inercal.aoa.verification import REFERENCE_U
 from inercal.report import sting
 from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches
@@ -58,7 +59,7 @@ def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
     map_of_sensors = sting.side_view(
         layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any())
     )
-    seen = _in_order(measurement)
+    seen = in_order(measurement)
     recording, found = seen.recording, seen.filtered
     t = recording.t
     if len(t) < 2:
@@ -71,7 +72,8 @@ def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
     drawn = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
     if missing.any() or len(marks.gaps):
         drawn.append(measured(t, names, missing, masked, marks))
-    drawn += _against_reference(seen, marks) + _points(measurement) + _compared(seen, marks)
+    drawn += _in_the_stream(seen, settings, marks)
+    drawn += _against_reference(seen, marks) + _fitted(seen) + _points(measurement) + _compared(seen, marks)
     drawn += _lever_arms(seen, settings, marks)
     if found is not None:
         drawn += _flexure(seen, found, settings, marks) + _learned(seen, found)
@@ -84,34 +86,6 @@ def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
         {} if found is None else dict(zip(names, found.innovations.T, strict=True)),
     )
     return drawn + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
-
-
-def _in_order(measurement: Measurement) -> Measurement:
-    """The measurement without the rows that are not later than those before them."""
-    t = measurement.recording.t
-    taken = later(t)
-    if len(taken) == len(t):
-        return measurement
-
-    def rows(of: Any, *names: str) -> Any:
-        """A part of the measurement, with those of its fields cut."""
-        return replace(
-            of, **{name: getattr(of, name)[taken] for name in names if getattr(of, name) is not None}
-        )
-
-    each = ("theta", "u", "rate", "rate_u")
-    found = measurement.filtered
-    if found is not None:
-        starts = tuple(int(k) for k in np.searchsorted(taken, found.starts))
-        found = replace(rows(found, *each, "acceleration", "innovations"), starts=starts)
-    kept = ("t", "acc", "gyro", "turns", "stated", "point", "trigger", "reference", "masked")
-    return replace(
-        measurement,
-        recording=rows(measurement.recording, *kept),
-        angles=rows(measurement.angles, *each),
-        filtered=found,
-        compared={name: rows(other, *each) for name, other in measurement.compared.items()},
-    )
 
 
 def _angle(seen: Measurement, marks: Marks) -> Picture:
@@ -200,6 +174,56 @@ def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
             1.5,
         )
     ]
+
+
+def _in_the_stream(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[Picture]:
+    """Angle of attack and sideslip, where the study states how the model lies, and roll where it is tracked."""
+    angles, panels = seen.angles, []
+    if stated(settings.attitude):
+        flow = alpha_beta(
+            angles.theta, angles.known_u, settings.attitude, angles.roll, angles.roll_u, angles.by_roll
+        )
+        for name, value, u in (("alpha", flow.alpha, flow.u_alpha), ("beta", flow.beta, flow.u_beta)):
+            panels.append(_banded(seen, name, np.degrees(value), np.degrees(u)))
+    if angles.roll is not None and angles.roll_u is not None:
+        panels.append(_banded(seen, "roll", np.degrees(angles.roll), np.degrees(angles.roll_u)))
+    if not panels:
+        return []
+    return [
+        over_time(
+            "Alpha, beta and roll",
+            "Angle of attack alpha and sideslip beta, the wind from the right, from pitch, roll, yaw and the flow "
+            "angularity that the study states, where it does; the roll, right wing down, where gyros track it. Bands "
+            f"of ± two standard uncertainties u.{marks.words}",
+            seen.recording.t,
+            panels,
+            marks,
+            0.75,
+        )
+    ]
+
+
+def _banded(seen: Measurement, name: str, value: Array, u: Array) -> Panel:
+    """An angle [deg] with its band."""
+    late = u[settled(seen.recording.t)]
+    title = f"{name}: {span(value)}°, u median {middle(u):.2g}°, largest after the start {largest(late):.2g}°"
+    return Panel(f"{name} [°]", {"": value}, title, (value - 2.0 * u, value + 2.0 * u))
+
+
+def _fitted(seen: Measurement) -> list[Picture]:
+    """The sensors as the reference angle shows them; nothing without such a fit."""
+    fit, names = seen.verified, seen.settings.layout.names
+    if fit is None or not fit.converged:
+        return []
+    kinds = (("S", "scale − 1 [ppm]", 1e-6), ("b", "bias [mg]", _MG), ("dlambda", "axis [mrad]", 1e-3),
+             ("dr", "position, forward [mm]", 1e-3), ("zo", "position, up [mm]", 1e-3))  # fmt: skip
+    rows = [[fit[f"{kind}_{k + 1}"] for k in range(len(names))] for kind, *_ in kinds]
+    sizes = np.array([[size] for *_, size in kinds])
+    values = np.array([[each.value for each in row] for row in rows])
+    values[0] -= 1.0
+    u = np.array([[each.u for each in row] for row in rows])
+    told = np.array([[each.name not in fit.unseen for each in row] for row in rows])
+    return [sting.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
 
 
 def _points(measurement: Measurement) -> list[Picture]:

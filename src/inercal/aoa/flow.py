@@ -56,14 +56,20 @@ def stated(attitude: Attitude) -> bool:
 
 
 def alpha_beta(
-    theta: Array, u_theta: Array, attitude: Attitude, roll: Array | None = None, u_roll: Array | None = None
+    theta: Array,
+    u_theta: Array,
+    attitude: Attitude,
+    roll: Array | None = None,
+    u_roll: Array | None = None,
+    by_roll: Array | None = None,
 ) -> Flow:
     """Angle of attack and sideslip at pitch angles ``theta`` (n,) [rad] of standard uncertainty ``u_theta``.
 
     ``roll`` and ``u_roll`` (n,) [rad] as the fusion tracks them with gyros for roll and yaw, in the place of the stated
     roll. Uncertainties are propagated to first order, their sources taken as independent. A roll that is stated was
-    used to find theta too, and its error comes in by both ways (`theta_by_roll`), so that ``u_theta`` is without it. Where the wind comes straight from
-    the side alpha is not defined, and its uncertainty that of any angle.
+    used to find theta too, and its error comes in by both ways, so that ``u_theta`` is without it; ``by_roll`` (n,) is
+    the change of theta by that of the stated roll, `theta_by_roll` where it is not given.
+    Where the wind comes straight from the side alpha is not defined, and its uncertainty that of any angle.
     """
     yaw, up, side = (_of(each) for each in (attitude.yaw, attitude.upwash, attitude.sidewash))
     of_roll = _of(attitude.roll)
@@ -71,7 +77,8 @@ def alpha_beta(
     x, y, z, slopes = _seen(theta, phi, yaw[0], up[0], side[0])
     if roll is None:
         # the roll's own way, and the way through theta
-        slopes[1] = slopes[1] + theta_by_roll(theta, of_roll[0]) * slopes[0]
+        through = theta_by_roll(theta, of_roll[0]) if by_roll is None else by_roll
+        slopes[1] = slopes[1] + through * slopes[0]
         u_roll = np.full(np.shape(theta), of_roll[1])
     elif u_roll is None:
         u_roll = np.zeros(np.shape(theta))
@@ -90,16 +97,22 @@ def alpha_beta(
     return Flow(alpha, np.where(known, u_alpha, np.nan), beta, np.sqrt(of_beta))
 
 
-def theta_u(theta: Array, u: Array, attitude: Attitude) -> Array:
-    """Standard uncertainty (n,) [rad] of ``theta``: ``u`` (n,), and what the roll that is stated leaves in theta."""
+def theta_u(theta: Array, u: Array, attitude: Attitude, by_roll: Array | None = None) -> Array:
+    """Standard uncertainty (n,) [rad] of ``theta``: ``u`` (n,), and what the roll that is stated leaves in theta.
+
+    ``by_roll`` as of `alpha_beta`.
+    """
     value, of_roll = _of(attitude.roll)
-    return np.hypot(u, theta_by_roll(theta, value) * of_roll) if of_roll else u
+    if not of_roll:
+        return u
+    return np.hypot(u, (theta_by_roll(theta, value) if by_roll is None else by_roll) * of_roll)
 
 
 def theta_by_roll(theta: Array, roll: float) -> Array:
-    """Change of theta, found by accelerometers along and across the body, per change of the roll that is stated.
+    """Change of theta, found by accelerometers along and across the body at rest, per change of the stated roll.
 
-    The best fit of g sin theta and g cos phi cos theta, each as well known, to what is read moves by
+    It is what a stream, which knows no better, goes by; `inercal.aoa.stated` does know better. The best fit of
+    g sin theta and g cos phi cos theta, each as well known, to what is read moves by
     -cos phi sin phi sin theta cos theta / (cos^2 theta + cos^2 phi sin^2 theta).
     """
     s, c, level = np.sin(theta), np.cos(theta), math.cos(roll)

@@ -33,9 +33,9 @@ _NO_ARM = 1e-3
 class State(NamedTuple):
     """What the filter knows between two rows.
 
-    ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (2,) [rad/s] the last roll and yaw rates; ``t``
-    [s] of the last row, -inf before the first; ``started``: the filter runs. Until it does ``held`` (k, N + 6) are the
-    rows that wait, time first.
+    ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (3,) as of `inercal.aoa.recursion.advance`;
+    ``t`` [s] of the last row, -inf before the first; ``started``: the filter runs. Until it does ``held`` (k, N + 6)
+    are the rows that wait, time first.
     """
 
     x: Array
@@ -47,14 +47,12 @@ class State(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where the filter started: the row, counted in the trace, its state before that row's update, and the places of
-    states that are ``new`` then: they have nothing in common with those before."""
+    """Where the filter started: the row, counted in the trace, and its state before that row's update."""
 
     row: int
     x: Array
     P: Array
     turns: Array
-    new: tuple[int, ...]
 
 
 class Trace(NamedTuple):
@@ -68,7 +66,7 @@ class Trace(NamedTuple):
 def initial(problem: Problem) -> State:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
-    return State(problem.mean.copy(), problem.covariance.copy(), np.zeros(2), -math.inf, False, none)
+    return State(problem.mean.copy(), problem.covariance.copy(), np.zeros(3), -math.inf, False, none)
 
 
 def advance(
@@ -100,11 +98,10 @@ def advance(
             end = min(at + HELD, m)
             if end - at < HELD and not last:
                 break
-            new = unknown(P, problem)
-            if not start(x, P, turns, problem, t[at:end], rows[at:end], new):
+            if not start(x, P, turns, problem, t[at:end], rows[at:end]):
                 at = end
                 continue
-            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), new))
+            starts.append(Start(at, x.copy(), P.copy(), turns.copy()))
             dt[at] = 0.0
         done = recursion.advance(
             x,
@@ -127,25 +124,24 @@ def advance(
     return State(x, P, turns, before, running, held), Trace(out[:at], tuple(starts))
 
 
-def unknown(P: Array, problem: Problem) -> tuple[int, ...]:
-    """Places of the states that a start knows nothing of: motion, flexure of the sting, and roll if it is lost too."""
+def unknown(problem: Problem) -> list[int]:
+    """Places of the states that a start does not know from before: motion, flexure of the sting, and roll, of which a
+    gap tells as little."""
     flexure, roll = problem.places[RESONATORS], problem.places[ROLL]
     of_flexure = range(flexure, flexure + 4) if flexure >= 0 else ()
-    of_roll = (int(roll),) if roll >= 0 and not P[roll, roll] < recursion.LOST else ()
-    return (0, 1, 2, 3, *of_flexure, *of_roll)
+    return [0, 1, 2, 3, *of_flexure, *((int(roll),) if roll >= 0 else ())]
 
 
-def start(
-    x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array, new: tuple[int, ...]
-) -> bool:  # fmt: skip
+def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array) -> bool:
     """Put motion into ``x`` and ``P`` as a few rows tell it at the first of them; False where they tell no angle.
 
     Theta is that which fits the medians of the accelerometers best, the rate the gyro's or, without one, that at which
     theta changes, and the acceleration what is left over (Tan et al. with three axes: atan2(A2, (A3 - A1)/2) and
-    (A1 + A3)/(r3 - r1)). Other states that are ``new`` are as in the prior. What else is known stays.
+    (A1 + A3)/(r3 - r1)). What else is `unknown` is as in the prior, what is known of the sensors stays.
     """
     n, spatial = problem.count, problem.spatial
-    fresh = list(new[4:])
+    new = unknown(problem)
+    fresh = new[4:]
     x[fresh] = problem.mean[fresh]
     together = t - t[0] <= 3.0 * HELD * np.median(np.diff(t, prepend=t[0]))
     t, rows = t[together], rows[together]
@@ -174,6 +170,7 @@ def start(
     P[:, new] = 0.0
     P[[0, 1, 2, 3], [0, 1, 2, 3]] = START**2
     P[fresh, fresh] = problem.covariance[fresh, fresh]
+    turns[2] = 0.0
     for k in range(2):
         if math.isfinite(middle[n + 3 + k]):
             turns[k] = middle[n + 3 + k]

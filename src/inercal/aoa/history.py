@@ -52,15 +52,16 @@ def rows(
     attitude: Attitude,
     roll: Array | None = None,
     u_roll: Array | None = None,
+    by_roll: Array | None = None,
 ) -> Array:
     """The columns (n, 3 or 7), in their units, of ``theta``, ``u`` [rad] and ``rate`` [rad/s], (n,) each.
 
     ``u`` is that of theta, were the stated roll exact: the column has it with the roll's part, where ``roll`` is not
-    given. ``roll``, ``u_roll`` as in `inercal.aoa.flow.alpha_beta`.
+    given. ``roll``, ``u_roll``, ``by_roll`` as in `inercal.aoa.flow.alpha_beta`.
     """
-    found = [theta, theta_u(theta, u, attitude) if roll is None else u, rate]
+    found = [theta, theta_u(theta, u, attitude, by_roll) if roll is None else u, rate]
     if stated(attitude):
-        flow = alpha_beta(theta, u, attitude, roll, u_roll)
+        flow = alpha_beta(theta, u, attitude, roll, u_roll, by_roll)
         found += [flow.alpha, flow.u_alpha, flow.beta, flow.u_beta]
     return np.degrees(np.column_stack(found))
 
@@ -68,7 +69,13 @@ def rows(
 def angles_record(recording: Recording, angles: Angles, settings: AoaSettings) -> Record:
     """Angles with the time stamps of the recording, a row for each of its own."""
     told = rows(
-        angles.theta, angles.known_u, angles.rate, settings.attitude, angles.roll, angles.roll_u
+        angles.theta,
+        angles.known_u,
+        angles.rate,
+        settings.attitude,
+        angles.roll,
+        angles.roll_u,
+        angles.by_roll,
     )
     source = Source(f"angles of {angles.method}", "")
     return _record(columns(settings.attitude), told, recording.t, recording, source)

@@ -192,7 +192,7 @@ def load(problem: Problem) -> None:
     none = np.empty(0)
     rows = np.empty((0, problem.count + BESIDE))
     recursion.advance(
-        problem.mean.copy(), problem.covariance.copy(), np.zeros(2), none, rows, problem.geometry, problem.places,
+        problem.mean.copy(), problem.covariance.copy(), np.zeros(3), none, rows, problem.geometry, problem.places,
         problem.constants, np.empty((0, OUTPUTS + problem.count + 1)), np.empty((0, 2 * problem.size)), 1, 0,
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa import verdict
-from inercal.aoa.angles import Angles, of_fusion
+from inercal.aoa.angles import Angles
 from inercal.aoa.clock import later
 from inercal.aoa.corrections import as_stated, told
 from inercal.aoa.filtered import SETTLED, Filtered
@@ -19,6 +19,7 @@ from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.aoa.sources import parts
+from inercal.aoa.stated import by_fusion
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
@@ -85,6 +86,7 @@ def assemble(
     errors: Mapping[str, Errors] | None = None,
     compared: Mapping[str, Angles] | None = None,
     verified: Verified | None = None,
+    angles: Angles | None = None,
 ) -> Estimate:
     """Put together what the fusion found.
 
@@ -106,13 +108,15 @@ def assemble(
         Angles of other methods, by name.
     verified : Verified or None
         The sensors as fitted to the reference angle.
+    angles : Angles or None
+        Of the fusion, where they are known already (`inercal.aoa.stated.by_fusion`).
 
     Returns
     -------
     Estimate
         Its parameters are the coefficients of the sensors, at the end of the recording.
     """
-    angles = of_fusion(filtered, settings.estimator.states)
+    angles = by_fusion(recording, settings, problem, filtered) if angles is None else angles
     names, at = tuple(problem.nuisances), list(problem.nuisances.values())
     values, P = filtered.state.x[at], filtered.state.P[np.ix_(at, at)]
     before = np.sqrt(np.diag(problem.covariance)[at])
@@ -133,9 +137,7 @@ def assemble(
     if status is Status.NOT_CONVERGED:
         return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
     split = parts(recording, problem, settings, filtered.smoothed)
-    of_gravity = math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in settings.site.inputs))
-    common = np.outer(split.gravity, split.gravity) * of_gravity**2
-    covariance = P + common
+    covariance = P + split.common
     u = np.sqrt(np.diag(covariance))
     rows = zip(names, values.tolist(), u.tolist(), before.tolist(), strict=True)
     result["posterior"] = {
@@ -156,7 +158,7 @@ def assemble(
         findings=said if at_prior is None else (*said, at_prior),
         budget=split.budget,
         result=result,
-        common=common,
+        common=split.common,
         **fields,
     )
 

@@ -92,8 +92,17 @@ def _explaining(
     if any(given):
         return []
     tried.sort(key=lambda one: one.misfit)
-    better = [one.faults for one in tried[:_TRIED] if one.misfit < now.misfit]
-    return _explaining([one for one in better if not one[-1].last], part, settings, now) if better else []
+    better = [one.faults for one in tried[:_TRIED] if one.misfit < now.misfit and not one.faults[-1].last]
+    seconds = _without_gyro(part, settings) or better
+    return _explaining(seconds, part, settings, now) if seconds else []
+
+
+def _without_gyro(part: Recording, settings: AoaSettings) -> list[tuple[Fault, ...]]:
+    """Faults without which the accelerometers fit each other: what is left then is the gyro's."""
+    blind = replace(part, gyro=np.full_like(part.gyro, np.nan))
+    tried = [(judge(*each.change(blind, settings)).misfit, each) for each in faults(blind, settings)]
+    fitting = sorted((one for one in tried if one[0] <= SOUND), key=lambda one: one[0])
+    return [(each,) for _, each in fitting[:_TRIED]]
 
 
 def _loud(part: Recording, settings: AoaSettings) -> bool:
@@ -132,6 +141,6 @@ def _on_its_back(now: Judged) -> list[Finding]:
     middle = math.degrees(float(np.nanmedian(np.remainder(now.theta, 2.0 * math.pi))))
     text = (
         f"theta is about {middle:.0f} deg, the model on its back: exchange or reverse the accelerometers across it, or "
-        'state roll = "180 deg" under [attitude] if it was mounted so'
+        'state roll = "180 deg" under [model] if it was mounted so'
     )
     return [Finding("channel_swap", text)]

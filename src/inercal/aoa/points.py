@@ -120,10 +120,11 @@ def _point(
     u = math.hypot(common, left)
     own = math.hypot(float(angles.known_u[rows].mean()), left)
     mean = math.remainder(mean, 2.0 * math.pi)
-    roll, roll_u = (
-        None if each is None else each[rows].mean(keepdims=True) for each in (angles.roll, angles.roll_u)
+    roll, roll_u, by_roll = (
+        None if each is None else each[rows].mean(keepdims=True)
+        for each in (angles.roll, angles.roll_u, angles.by_roll)
     )
-    flow = alpha_beta(np.array([mean]), np.array([own]), settings.attitude, roll, roll_u)
+    flow = alpha_beta(np.array([mean]), np.array([own]), settings.attitude, roll, roll_u, by_roll)
     triggers = np.full(1, np.nan) if recording.trigger is None else recording.trigger[rows]
     triggers = triggers[np.isfinite(triggers)] if np.isfinite(triggers).any() else np.full(1, np.nan)
     since = t - t.mean()

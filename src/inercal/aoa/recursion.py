@@ -2,8 +2,10 @@
 
 A row is predicted, then updated by one scalar after the other: accelerometers in their order, the gyro, and an angle
 that is stated, each relinearised at the state that it finds. An innovation v that is larger than five
-standard deviations enlarges its own variance, S = v^2 / 25: what is merely surprising still pulls, by five standard
-deviations, while a gate that shuts would lock the filter out for good once it is off.
+standard deviations enlarges its own variance, S = v^2 / 25: it pulls the less the larger it is, while a gate that shuts
+would lock the filter out for good once it is off. Where the gyro agrees with what is wrong, as after a shock, that pull
+can be too little all the same: when the accelerometers show one other angle for a hundred rows, or all that is measured
+is as surprising, theta is found anew.
 """
 
 from __future__ import annotations
@@ -46,6 +48,10 @@ OUTPUTS = 5
 BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, an angle that is stated and its u, roll and yaw."""
 
+_OFF, _AGREED, _PATIENCE = 0.02, 0.8, 100
+"""An angle [rad] by which all accelerometers differ, the share of their squared innovations that it must explain, and
+the rows in a row after which it is believed."""
+
 _READING = 1e100
 """What no sensor reads: from here on it counts as missing, as what is no number does."""
 
@@ -55,9 +61,9 @@ _EVEN = 1e-9
 class Memory(NamedTuple):
     """What a filter remembers of the rows of a block (b,) for a smoother; of none for b = 0.
 
-    ``steps`` (b, d, d) the transposed transition of the states that move to each row, and to one in which theta is
-    lost; ``known`` (b, n + 1, n) the state after the row, and its covariance; ``scalars`` (b, N + 2, 2 n + 2) of each
-    scalar its row h, P h^T, the innovation v and the variance S used, 0 where it was left out.
+    ``steps`` (b, d, d) the transposed transition of the states that move to each row; ``known`` (b, n + 1, n) the state
+    after the row, and its covariance; ``scalars`` (b, N + 2, 2 n + 2) of each scalar its row h, P h^T, the innovation v
+    and the variance S used, 0 where it was left out.
     """
 
     steps: Array
@@ -163,9 +169,9 @@ def update(
         x[i] += gain * work[i]
     inverse = 1.0 / variance
     for i in range(n):
-        of_row = work[i] * inverse
         for j in range(n):
-            P[i, j] -= of_row * work[j]
+            # in this order it is symmetric to the last digit
+            P[i, j] -= work[i] * work[j] * inverse
     return surprise, variance
 
 
@@ -202,13 +208,15 @@ def advance(
 ) -> int:  # fmt: skip
     """Go on by the rows of ``dt`` (m,) [s] and ``z`` (m, N + 5); the number of rows done.
 
-    ``x`` (n,), ``P`` (n, n) and ``turns`` (2,), the last indications of the roll and yaw gyros, are changed in place. A
-    row of ``z`` holds the accelerometers [m/s^2], the gyro [rad/s], an angle stated and its standard uncertainty [rad],
-    roll and yaw gyros [rad/s]; NaN where not measured. ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and
-    the innovations over their standard deviations. ``kept`` (k, 2 n) receives x and its standard deviations at each
-    ``every``-th row, counted from ``first``; none for 0 rows. ``remembered`` is filled if it has room for m rows.
+    ``x`` (n,), ``P`` (n, n) and ``turns`` (3,), the last indications of the roll and yaw gyros and how many of the last
+    rows showed another angle, are changed in place. A row of ``z`` holds the accelerometers [m/s^2], the gyro [rad/s],
+    an angle stated and its standard uncertainty [rad], roll and yaw gyros [rad/s]; NaN where not measured. ``out`` (m,
+    `OUTPUTS` + N + 1) receives what `write` says and the innovations over their standard deviations. ``kept`` (k, 2 n)
+    receives x and its standard deviations at each ``every``-th row, counted from ``first``; none for 0 rows.
+    ``remembered`` is filled if it has room for m rows.
 
-    Ends before a row in which theta is lost: it or its variance, which is over `LOST`, are no angle's any more.
+    Ends before a row in which theta is lost: its variance is over `LOST`, it is no angle any more, or accelerometers
+    have shown another for too long.
     """
     steps, known, scalars = remembered
     done: int = _advance(
@@ -238,20 +246,20 @@ def _advance(
             last, base = step, Q[0, 0]
         if step > 0.0:
             go_on(x, P, step, p, y, places, constants, F, Q, base, work)
-        if remember:
-            for i in range(d):
-                for j in range(d):
-                    steps[k, i, j] = F[j, i]
-        if not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
+        if not (P[0, 0] < LOST and abs(x[0]) < _TURNS and turns[2] < _PATIENCE):
             return k
         if spatial:
             p, y = turns[0], turns[1]
+        along, power, total, seen, shut = 0.0, 0.0, 0.0, 0, 0
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:
                 expected, entries, noise = row_of(i, x, z, k, geometry, places, constants, p, y, at, row)
                 v = z[k, i] - expected
                 surprise, variance = update(P, x, v, entries, at, row, noise, constants[GATE], line)
+                seen, shut = seen + 1, shut + int(surprise * surprise > constants[GATE])
+                if i < count:
+                    along, power, total = along + row[0] * v, power + row[0] * row[0], total + v * v
             if i <= count:
                 out[k, OUTPUTS + i] = surprise
             if remember:
@@ -260,8 +268,14 @@ def _advance(
                 for j in range(entries):
                     scalars[k, i, at[j]] = row[j]
                 scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
+        off = abs(along) > _OFF * power and along * along > _AGREED * total * power
+        off = shut > 0 and (off or (shut > 1 and shut == seen))
+        turns[2] = turns[2] + 1.0 if off else 0.0
         write(x, P, constants, out, k)
         if remember:
+            for i in range(d):
+                for j in range(d):
+                    steps[k, i, j] = F[j, i]
             for i in range(n):
                 known[k, 0, i] = x[i]
                 for j in range(n):

@@ -60,15 +60,15 @@ def smooth(
     out = np.full((len(t), OUTPUTS), np.nan)
     kept = np.empty((0, 2 * n)) if kept is None else kept
     rows = np.ascontiguousarray(rows)
-    lam, Lam = np.zeros(n), np.zeros((n, n))
+    lam, Lam, new = np.zeros(n), np.zeros((n, n)), unknown(problem)
     end = len(t)
     for begin in reversed(starts):
         part = slice(begin.row, end)
         dt = np.diff(t[part], prepend=t[begin.row])
         _stretch(problem, begin, dt, rows[part], lam, Lam, out[part], kept, every)
-        lam[list(begin.new)] = 0.0
-        Lam[begin.new, :] = 0.0
-        Lam[:, begin.new] = 0.0
+        lam[new] = 0.0
+        Lam[new, :] = 0.0
+        Lam[:, new] = 0.0
         end = begin.row
     return out
 
@@ -76,7 +76,7 @@ def smooth(
 def load(problem: Problem) -> None:
     """Load, or compile, the kernels."""
     x, P = problem.mean.copy(), problem.covariance.copy()
-    start = Start(0, x, P, np.zeros(2), unknown(P, problem))
+    start = Start(0, x, P, np.zeros(3))
     smooth(problem, np.zeros(1), np.full((1, problem.count + recursion.BESIDE), np.nan), (start,))
 
 
@@ -96,15 +96,9 @@ def _stretch(
         done = recursion.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0)
         if done < len(dt[block]):
             break
-    at = problem.places[ROWS : ROWS + problem.places[MOVING]]
     for a, x, P, turns in reversed(heads):
         block = slice(a, a + BLOCK)
         done = recursion.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0, memory)
-        if done < len(dt[block]):
-            # theta was lost here: what comes later goes back through the step to its row all the same
-            F = np.eye(n)
-            F[np.ix_(at, at)] = memory.steps[done].T
-            lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
         _backward(lam, Lam, *memory, done, *given[1:], out[block], kept, every, begin.row + a)
 
 

@@ -12,6 +12,7 @@ runs as there are sources.
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -27,6 +28,7 @@ from inercal.aoa.problem import problem as stated_problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.smoother import smooth
+from inercal.aoa.stated import GRAVITY_STEP, ROLL_STEP, uncertain_roll
 from inercal.estimate.budget import BudgetItem
 
 Array = NDArray[np.float64]
@@ -36,9 +38,6 @@ ANGLE = "theta"
 
 _STEP = 1e-3
 """Relative change of a variance, for its slope."""
-
-_GRAVITY_STEP = 1e-5
-"""That of gravity."""
 
 MOST = 20_000
 """Rows that are looked at, from the first on; half of them where they are smoothed."""
@@ -70,12 +69,12 @@ class Parts:
     ----------
     budget : tuple of BudgetItem
         With the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first 2 s.
-    gravity : (p,)
-        Change of each coefficient with gravity [SI unit s^2/m].
+    common : (p, p)
+        Covariance of the coefficients by gravity and roll as they are stated: by what the same site and mounting share.
     """
 
     budget: tuple[BudgetItem, ...]
-    gravity: Array
+    common: Array
 
 
 def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool) -> Parts:
@@ -89,29 +88,49 @@ def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothe
     of = sources(problem, settings)
     changed = [_enlarged(problem, rows, each) for each in of]
     g = problem.constants[model.GRAVITY]
-    heavier = problem.constants.copy()
-    heavier[model.GRAVITY] = g * (1.0 + _GRAVITY_STEP)
-    runs = [(problem, rows), *changed, (replace(problem, constants=heavier), rows)]
+    g, roll = problem.constants[model.GRAVITY], settings.attitude.roll
+    of_roll = uncertain_roll(settings, problem.spatial)
+    # neither is a state of the filter: their errors move the estimate
+    lean = (
+        (g * GRAVITY_STEP, model.GRAVITY, g * (1.0 + GRAVITY_STEP)),
+        *(
+            [(ROLL_STEP, model.ROLL_COSINE, math.cos(roll.value + ROLL_STEP))]
+            if roll is not None and of_roll
+            else []
+        ),
+    )
+    moved = [(_with_constant(problem, place, value), rows) for _, place, value in lean]
     with ThreadPoolExecutor() as pool:
-        (angle, P, x, theta), *others, (_, _, moved, turned) = pool.map(
-            lambda run: _run(run[0], t, run[1], smoothed), runs
-        )
+        runs = pool.map(lambda run: _run(run[0], t, run[1], smoothed), [(problem, rows), *changed, *moved])
+        (angle, P, x, theta), *others = runs
     found: list[tuple[Source, Array]] = []
-    for source, (by, spread, *_) in zip(of, others, strict=True):
+    for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
         slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
         found.append((source, np.maximum(slope, 0.0)))
-    # gravity is no state of the filter: its error moves the estimate
-    by_gravity = (moved - x)[at] / (g * _GRAVITY_STEP)
-    apart = (turned - theta)[np.isfinite(turned - theta)]
-    of_angle = float(np.sqrt(np.mean(np.square(apart)))) / (g * _GRAVITY_STEP)
-    for each in settings.site.inputs:
-        shift = each.sensitivity * each.u * np.append(of_angle, by_gravity)
-        found.append((Source(each.source, "B", each.u, each.unit), np.square(shift)))
-    return Parts(_items(found, (ANGLE, *problem.nuisances)), by_gravity)
+    slopes = []
+    for (step, *_), (_, _, state, turned) in zip(lean, others[len(of) :], strict=True):
+        apart = (turned - theta)[np.isfinite(turned - theta)]
+        of_angle = float(np.sqrt(np.mean(np.square(apart))))
+        slopes.append(np.append(of_angle, (state - x)[at]) / step)
+    stated = [(Source(each.source, "B", each.u, each.unit), slopes[0] * each.sensitivity * each.u)
+              for each in settings.site.inputs]  # fmt: skip
+    stated += [(Source("stated roll", "B", of_roll, "rad"), slope * of_roll) for slope in slopes[1:]]
+    found += [(source, np.square(shift)) for source, shift in stated]
+    common = np.zeros((len(at), len(at)))
+    for _, shift in stated:
+        common += np.outer(shift[1:], shift[1:])
+    return Parts(_items(found, (ANGLE, *problem.nuisances)), common)
+
+
+def _with_constant(problem: Problem, place: int, value: float) -> Problem:
+    """The problem with one constant of its model changed."""
+    constants = problem.constants.copy()
+    constants[place] = value
+    return replace(problem, constants=constants)
 
 
 def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:
-    """All sources that a problem has, but for gravity."""
+    """All sources that a problem has, but for gravity and a stated roll."""
     noise, prior, timing = settings.noise, settings.prior, settings.timing
     before = _known_before(problem, settings)
     roll, zero = settings.attitude.roll, settings.zero

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from inercal.aoa.display import in_words, short, shown_unit, sized
+from inercal.aoa.display import in_words, short, shown_unit, sized, use_of_fit
 from inercal.aoa.flow import stated
 from inercal.aoa.points import Point
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.sources import ANGLE
 from inercal.estimate.result import Estimate, rounded
 from inercal.estimate.table import Table
+
+_OF_AXIS = ("mrad", 1e-3)
+"""Unit of the error of an axis."""
 
 _SMALL = 0.001
 """Share of a variance below which a source is not listed."""
@@ -26,6 +29,7 @@ def all_tables(estimate: Estimate, points: Iterable[Point], settings: AoaSetting
         angle(estimate),
         points_table(points, settings),
         sensors(estimate),
+        fitted(estimate),
         uncertainty(estimate),
         methods(estimate),
     )
@@ -106,6 +110,28 @@ def sensors(estimate: Estimate) -> Table:
         tuple(rows),
         2,
     )
+
+
+def fitted(estimate: Estimate) -> Table:
+    """What the reference angle says of the sensors."""
+    fit = estimate.result.get("verified")
+    heads = (("", ""), ("what it is", ""), ("value", ""), ("u", ""), ("unit", ""), ("as angle", "deg"))
+    title, rows = "Sensors as fitted to the reference angle", []
+    if fit is None:
+        return Table(title, "", heads, ())
+    for each in fit["parameters"]:
+        name, value = each["name"], each["value"]
+        unit, size = _OF_AXIS if name.startswith("dlambda_") else shown_unit(each["unit"])
+        value -= 1.0 if name.startswith("S_") else 0.0
+        shown, u = rounded(value / size, each["u"] / size)
+        angle = f"{math.degrees(value):.4f}" if name.startswith("dlambda_") else ""
+        told = ("not seen", "–", "", "") if name in fit["unseen"] else (shown, u, unit, angle)
+        rows.append((name, in_words(name), *told))
+    title += "" if fit["converged"] else ": it did not converge, and is not to be used"
+    noise = short(math.degrees(fit["reference_noise_rad"]))
+    rows.append(("", "noise of theta_ref from sample to sample", noise, "–", "deg", ""))
+    caption = f"What each sensor reads against theta_ref, its zero and its clock taken as true. {use_of_fit(estimate)}"
+    return Table(title, caption, heads, tuple(rows), 2)
 
 
 def uncertainty(estimate: Estimate) -> Table:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa import filtered, recursion, smoother
-from inercal.aoa.angles import Angles, of_fusion
+from inercal.aoa.angles import Angles
+from inercal.aoa.clock import later
 from inercal.aoa.delay import Delay, relative_delay
 from inercal.aoa.diagnosis import diagnose
 from inercal.aoa.filtered import Filtered
 from inercal.aoa.methods import MEASURED, label, low_passed
-from inercal.aoa.methods import measure as by_methods
 from inercal.aoa.outcome import assemble, assemble_paper
 from inercal.aoa.plausibility import implausible
 from inercal.aoa.points import Point, points
@@ -26,8 +27,9 @@ from inercal.aoa.reading import recording_of
 from inercal.aoa.recording import Recording, plain
 from inercal.aoa.sensor_fit import Verified, fit
 from inercal.aoa.settings import AoaSettings, Methods
+from inercal.aoa.stated import by_fusion, by_methods
 from inercal.aoa.verification import Errors, errors
-from inercal.aoa.zero import tare, with_zero
+from inercal.aoa.zero import with_zero
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
@@ -58,6 +60,35 @@ class Measurement:
     compared: Mapping[str, Angles] = field(default_factory=dict)
 
 
+def in_order(measurement: Measurement) -> Measurement:
+    """The measurement without the rows that are not later than those before them."""
+    t = measurement.recording.t
+    taken = later(t)
+    if len(taken) == len(t):
+        return measurement
+
+    def rows(of: Any, *names: str) -> Any:
+        """A part of the measurement, with those of its fields cut."""
+        return replace(
+            of, **{name: getattr(of, name)[taken] for name in names if getattr(of, name) is not None}
+        )
+
+    motion = ("theta", "u", "rate", "rate_u")
+    angles = (*motion, "roll", "roll_u", "own_u", "by_roll")
+    found = measurement.filtered
+    if found is not None:
+        starts = tuple(int(k) for k in np.searchsorted(taken, found.starts))
+        found = replace(rows(found, *motion, "acceleration", "innovations"), starts=starts)
+    kept = ("t", "acc", "gyro", "turns", "stated", "point", "trigger", "reference", "masked")
+    return replace(
+        measurement,
+        recording=rows(measurement.recording, *kept),
+        angles=rows(measurement.angles, *angles),
+        filtered=found,
+        compared={name: rows(other, *angles) for name, other in measurement.compared.items()},
+    )
+
+
 def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare: bool = False) -> None:
     """Load, or compile, the kernels that `measure` uses, so that they do not count in its time."""
     if methods is not None and not compare:
@@ -65,7 +96,7 @@ def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare:
     of, t = problem(settings), np.arange(2.0)
     rows = plain(t, np.full((2, of.count), np.nan), np.full(2, np.nan)).rows
     out, none = np.empty((0, recursion.OUTPUTS + of.count + 1)), np.empty((0, 2 * of.size))
-    x, P, turns = of.mean.copy(), of.covariance.copy(), np.zeros(2)
+    x, P, turns = of.mean.copy(), of.covariance.copy(), np.zeros(3)
     recursion.advance(x, P, turns, t[:0], rows[:0], of.geometry, of.places, of.constants, out, none, 1, 0)
     if settings.estimator.smooth or compare:
         smoother.load(of)
@@ -118,12 +149,12 @@ def measure(
     if methods is None:
         progress("smoothing" if settings.estimator.smooth else "filtering")
         found = filtered.estimate(zeroed, of, settings.estimator.smooth)
-        angles = of_fusion(found, settings.estimator.states)
+        angles = by_fusion(zeroed, settings, of, found)
         progress("looking for faults")
         findings = [*findings, *diagnose(zeroed, settings, of, found)]
     else:
         progress(label(methods))
-        angles = by_methods(tare(recording, settings), settings, methods)
+        angles = by_methods(recording, settings, methods)
     compared = _compared(zeroed, settings, angles, progress) if compare else {}
     progress("assembling")
     judged: dict[str, Errors] = {}
@@ -137,7 +168,7 @@ def measure(
     if found is None:
         estimate = assemble_paper(recording, settings, angles, *behind)
     else:
-        estimate = assemble(zeroed, settings, of, found, *behind)
+        estimate = assemble(zeroed, settings, of, found, *behind, angles=angles)
     estimate = replace(estimate, timing={"solve": time.perf_counter() - clock})
     return Measurement(
         estimate, settings, of, recording, angles, found, at_rest, delay, judged, verified, compared
@@ -164,15 +195,14 @@ def _compared(
             name = f"{'smoothed' if smoothed else 'fusion'} {states}"
             if name != done.method:
                 progress(name)
-                found = filtered.estimate(recording, problem(chosen, recording.spatial), smoothed)
-                others[name] = of_fusion(found, states)
-    tared = tare(recording, settings)
+                of = problem(chosen, recording.spatial)
+                others[name] = by_fusion(recording, chosen, of, filtered.estimate(recording, of, smoothed))
     for methods in MEASURED:
         if label(methods) == done.method:
             continue
         progress(label(methods))
         try:
-            others[label(methods)] = by_methods(tared, settings, methods)
+            others[label(methods)] = by_methods(recording, settings, methods)
         except InputError:  # two axes, or no gyro: not for every method
             continue
     if (paper := others.get(label(MEASURED[0]))) is not None:

@@ -1,8 +1,9 @@
 """Wind-off zero and tare: a stretch of the record at rest, at an angle that is known from elsewhere.
 
-The fusion takes the angle as one measurement, in one row in the middle of the stretch: its error is the same in all
-rows, and as many measurements it would count as many independent ones. Through it the filter learns the biases at that
-angle. The paper's methods learn nothing; from them the biases seen in the stretch are subtracted.
+The fusion takes the angle as measured in every row of the stretch, each so uncertain that all of them together know it
+as well as it is stated: its error is the same in all rows, while noise and flexure average out. Through it the filter
+learns the biases at that angle. The paper's methods learn nothing; from them the biases seen in the stretch are
+subtracted.
 """
 
 from __future__ import annotations
@@ -38,16 +39,26 @@ def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
     if settings.zero is None:
         return recording
     rows = _stretch(recording, settings, settings.zero)
-    middle = min(int(np.searchsorted(recording.t[rows], middle_of(settings.zero))), len(rows) - 1)
+    taken = later(recording.t)
+    before = np.full(len(recording.t), -np.inf)
+    before[taken[1:]] = recording.t[taken[:-1]]
     stated = recording.stated.copy()
-    stated[rows[middle]] = settings.zero.angle, settings.zero.u
+    stated[rows] = [
+        stated_at(settings.zero, t, last)
+        for t, last in zip(recording.t[rows].tolist(), before[rows].tolist(), strict=True)
+    ]
     return replace(recording, stated=stated)
 
 
-def middle_of(zero: Zero) -> float:
-    """Time [s] from which on the first row with all accelerometers is the one that takes the angle: so a stream knows
-    it too."""
-    return 0.5 * (zero.start + zero.end)
+def stated_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
+    """The angle of a row at ``t`` [s] and its standard uncertainty [rad], NaN out of the stretch.
+
+    The row before was at ``before``. Its time is the row's share of the stretch, and of what the stretch tells.
+    """
+    share = min(t - before, t - zero.start) / (zero.end - zero.start)
+    if not (share > 0.0 and t <= zero.end):
+        return math.nan, math.nan
+    return zero.angle, zero.u / math.sqrt(share)
 
 
 def tare(recording: Recording, settings: AoaSettings) -> Recording:

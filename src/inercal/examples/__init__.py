@@ -99,5 +99,12 @@ EXAMPLES: dict[str, Example] = {
             study="selfcal.toml",
             verb="selfcal",
         ),
+        Example(
+            "sting",
+            "wind-tunnel model on a sting that pitches by steps of 5 deg and is shaken, 42 s at 250 Hz, simulated",
+            ("sting.csv.gz",),
+            study="sting.toml",
+            verb="aoa",
+        ),
     )
 }

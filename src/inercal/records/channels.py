@@ -73,6 +73,11 @@ def nearest(name: str) -> str:
     return f"did you mean {near[0]}?" if near else f"known channels: {', '.join(_EXAMPLES)}"
 
 
+def may_be_empty(name: str) -> bool:
+    """True for what some rows alone have: numbers of points and triggers."""
+    return name in ("point", "trigger")
+
+
 def needs_unit(name: str) -> bool:
     """False for indices, labels and the like, which are plain numbers or text."""
     return "number" not in _dimensions(name)[0]

@@ -25,7 +25,7 @@ from inercal.aoa.posterior import load as load_posterior
 from inercal.aoa.problem import problem
 from inercal.aoa.reading import missing
 from inercal.aoa.settings import GYROS, AoaSettings
-from inercal.aoa.zero import middle_of
+from inercal.aoa.zero import stated_at
 from inercal.records.findings import Finding
 from inercal.records.record import Column
 from inercal.stream.lines import Lines, Sample
@@ -53,15 +53,14 @@ class AoaState(NamedTuple):
     """What is known after a row.
 
     ``live`` is the state of the fusion; ``t`` [s] the latest stamp, ``begun`` [s] the first one (NaN before);
-    ``zeroed``: the study's zero has been used; ``temperature`` [degC] the last one known; ``heard`` [s] the last row in
-    which the gyro spoke. ``nis`` and ``scalars``: sum of the squared innovations since ``window`` [s], and their
-    number. ``said`` are the alarms given, one bit each; ``slots`` that of the last line.
+    ``temperature`` [degC] the last one known; ``heard`` [s] the last row in which the gyro spoke. ``nis`` and
+    ``scalars``: sum of the squared innovations since ``window`` [s], and their number. ``said`` are the alarms given,
+    one bit each; ``slots`` that of the last line.
     """
 
     live: LiveState
     t: float
     begun: float
-    zeroed: bool
     temperature: float
     heard: float
     nis: float
@@ -147,7 +146,7 @@ class Aoa:
     def initial(self) -> AoaState:
         """Nothing known."""
         return AoaState(
-            live=Live(self._problem).state, t=-math.inf, begun=math.nan, zeroed=False, temperature=math.nan,
+            live=Live(self._problem).state, t=-math.inf, begun=math.nan, temperature=math.nan,
             heard=math.nan, nis=0.0, scalars=0, window=math.nan, said=0, slots=Slots(),
         )  # fmt: skip
 
@@ -163,7 +162,7 @@ class Aoa:
         stated = (math.nan, math.nan)
         gyro, roll, yaw = values[n:].tolist()
         if later:
-            state, stated = self._zero(state, sample.t, values[:n])
+            stated = self._zero(state, sample.t, values[:n])
             state = self._heard(state, sample.t, gyro)
         told = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *stated)
         if later:
@@ -200,12 +199,12 @@ class Aoa:
             self._say(finding)
         return state._replace(said=state.said | 1 << _BEGUN)
 
-    def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[AoaState, tuple[float, float]]:
+    def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[float, float]:
         """The angle that is stated for a row, and its standard uncertainty [rad]; NaN where there is none."""
         zero = self._settings.zero
-        if zero is None or state.zeroed or not middle_of(zero) <= t <= zero.end or not np.isfinite(acc).all():
-            return state, (math.nan, math.nan)
-        return state._replace(zeroed=True), (zero.angle, zero.u)
+        if zero is None or not np.isfinite(acc).all():
+            return math.nan, math.nan
+        return stated_at(zero, t, state.t)
 
     def _heard(self, state: AoaState, t: float, gyro: float) -> AoaState:
         """The state with a gyro heard, or said to be silent."""

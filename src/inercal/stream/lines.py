@@ -16,7 +16,7 @@ from typing import IO, TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from inercal.errors import InputError, MapError, RecordError
-from inercal.records.channels import Channel
+from inercal.records.channels import Channel, may_be_empty
 from inercal.records.findings import Finding
 from inercal.records.read.join import FileTable, check_present, conversion, row_rate
 from inercal.records.read.layout import Layout, comment_marks, find_layout, is_rounded
@@ -207,6 +207,7 @@ class Lines:
         """A value in its unit; NaN where there is none, which is said unless ``silent``."""
         if value is None or not math.isfinite(value):
             text = f"{field.name}: missing value"
+            silent = silent or may_be_empty(field.name)
             if field.name in self._last and not silent:
                 self._waiting.append((text, line))
             elif not silent:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inercal.records.channels import of_a_table
+from inercal.records.channels import may_be_empty, of_a_table
 from inercal.records.checks.angles import angles
 from inercal.records.checks.time import time_axis, time_unit
 from inercal.records.checks.values import (
@@ -63,12 +63,12 @@ def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
 
 
 def missing(values: Mapping[str, Array]) -> tuple[Finding, ...]:
-    """``nan``: rows of each column (by name) that hold no number."""
+    """``nan``: rows of each column (by name) that hold no number, where all should."""
     empty = {name: np.flatnonzero(np.isnan(column)) for name, column in values.items()}
     return tuple(
         Finding("nan", f"{name}: {counted(rows.size, 'missing value')}", places("row", rows + 1))
         for name, rows in empty.items()
-        if rows.size
+        if rows.size and not may_be_empty(name)
     )
 
 

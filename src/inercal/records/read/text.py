@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError
-from inercal.records.channels import Channel
+from inercal.records.channels import Channel, may_be_empty
 from inercal.records.checks import too_long
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
@@ -243,7 +243,7 @@ def _findings(
         findings.append(Finding("bad_row", text, places("line", bad)))
     for index, name in enumerate(names):
         lines = np.concatenate([none, *(flaw.missing[index] for flaw in flaws)])
-        if lines.size:
+        if lines.size and not may_be_empty(name):
             findings.append(
                 Finding("nan", f"{name}: {counted(lines.size, 'missing value')}", places("line", lines))
             )

@@ -1,0 +1,78 @@
+"""The compiled fusion: cached for the next process, and the same as what its source says in plain Python."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import inercal.aoa
+
+RUN = """
+import json
+from dataclasses import replace
+import numpy as np
+from sting_study import BASE, DEG, study
+from inercal.aoa import recursion, smoother
+from inercal.aoa.filtered import estimate
+from inercal.aoa.problem import problem
+from inercal.aoa.settings import Disturbances, Oscillation, Timing
+from inercal.aoa.simulate import simulate
+
+found = {}
+for states in (8, 19):
+    for spatial in (False, True):
+        settings = study(
+            states,
+            motion=replace(BASE, duration=0.1),
+            timing=Timing(None),
+            disturbances=Disturbances(yaw=Oscillation(DEG, 8.0), spikes=0.01),
+        )
+        recording = simulate(settings, np.random.default_rng(4)).recording
+        for smoothed in (False, True):
+            got = estimate(recording, problem(settings, spatial), smoothed)
+            found[f"{states} {spatial} {smoothed}"] = [*got.theta, *got.u, *got.rate, *got.rate_u, got.nis_mean]
+kernels = [recursion._advance, smoother._backward]
+missed = sum(sum(each.stats.cache_misses.values()) for each in kernels) if hasattr(kernels[0], "stats") else None
+types = [len(each.signatures) for each in kernels] if missed is not None else None
+print(json.dumps({"found": found, "missed": missed, "types": types}))
+"""
+
+
+def ran(**environment):
+    """What a new process finds on a tenth of a second with the filter and the smoother."""
+    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.aoa.__file__)))
+    studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
+    done = subprocess.run(
+        [sys.executable, "-c", RUN],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([package, studies])} | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    """The first process compiles what is not yet cached."""
+    return ran()
+
+
+def test_a_second_process_compiles_nothing(compiled):
+    """A kernel that depends on anything of its process would be compiled in each; one type is enough for all."""
+    again = ran()
+    assert again["missed"] == 0
+    assert again["types"] == [1, 1]
+    np.testing.assert_equal(again["found"], compiled["found"])
+
+
+def test_kernels_say_the_same_as_plain_python(compiled):
+    """Without compiling: apart by rounding alone."""
+    plain = ran(NUMBA_DISABLE_JIT="1")
+    assert plain["missed"] is None
+    for name, numbers in compiled["found"].items():
+        np.testing.assert_allclose(numbers, plain["found"][name], rtol=1e-6, atol=1e-10, err_msg=name)
