@@ -25,6 +25,7 @@ bench: .venv/dev/installed
 	$(DEV)/python benchmarks/ferraris.py
 	$(DEV)/python benchmarks/allan.py
 	$(DEV)/python benchmarks/streaming.py
+	$(DEV)/python benchmarks/aoa_fusion.py
 	$(DEV)/python benchmarks/selfcal_filters.py
 	$(DEV)/python benchmarks/selfcal_command.py
 	$(DEV)/python benchmarks/selfcal_coverage.py --runs 1000

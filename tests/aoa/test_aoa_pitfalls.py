@@ -68,31 +68,46 @@ def test_a_gate_that_shuts_locks_the_filter_out_and_ours_does_not(snap):
     """What no sensor could follow has passed, and the angle is off by tens of degrees, which the gyro does not show.
 
     Behind a gate that shuts the filter stays there, as sure as before. The soft one alone would stay as well, for its
-    pull falls as 1 / v; but that all accelerometers show one other angle is seen after a hundred rows, and it is found
-    anew.
+    pull falls as 1 / v; but that sensors surprise without an end is seen after half a second, and it is found anew.
     """
     settings = study(8, estimator=Estimator(8, snap=snap))
     recording = kicked(settings)
     of = problem(settings)
-    late = recording.t > 2.0
+    late = recording.t > 2.5
     shut = abs(hard_gated(of, recording) - recording.reference)[late]
     assert not shut.max() < 20.0 * DEG
     for smoothed in (False, True):
         ours = estimate(recording, of, smoothed)
         assert len(ours.starts) == 2
-        assert 1000 < ours.starts[1] < 1300
+        assert 1500 <= ours.starts[1] < 2000
         assert abs(ours.theta - recording.reference)[late].max() < 0.02 * DEG
 
 
-def test_one_bad_accelerometer_is_no_other_angle():
-    """0.05 g in a1 alone, from 3 s on: the others disagree, nothing is found anew, and the gate holds it back."""
+@pytest.mark.parametrize(("which", "size"), [([0, 1, 2], 0.2), ([0], 0.05), ([1], 0.1)])
+def test_a_shock_is_over_when_it_is_over(which, size):
+    """A fifth of a second of 0.05 to 0.2 g that is no motion leads far astray; a second later it is as if forgotten."""
     settings = scenario("base", duration=10.0)
+    simulated = simulate(settings, np.random.default_rng(38))
+    acc = simulated.recording.acc.copy()
+    acc[4000:4200, which] += size * G
+    for smoothed in (False, True):
+        found = estimate(replace(simulated.recording, acc=acc), problem(settings), smoothed)
+        error = abs(found.theta - simulated.theta)
+        assert (error < 5.0 * found.u)[6000:].all()
+        assert error[6000:].max() < 0.06 * DEG
+        assert found.nis_mean > 10.0
+
+
+def test_one_bad_accelerometer_does_not_lead_ever_further_astray():
+    """0.05 g in a1 alone, for good: an error of degrees, and a NIS that says so."""
+    settings = scenario("base", duration=20.0)
     simulated = simulate(settings, np.random.default_rng(38))
     acc = simulated.recording.acc.copy()
     acc[3000:, 0] += 0.05 * G
     found = estimate(replace(simulated.recording, acc=acc), problem(settings))
-    assert found.starts == (0,)
-    assert np.nanmedian(abs(found.innovations[3000:, 0])) > 5.0
+    error, _ = told(found, simulated, 0.0)
+    assert error.max() < 20.0 * DEG
+    assert found.nis_mean > 10.0
 
 
 @pytest.mark.parametrize("name", ["base", "chirp", "pivot", "flexure"])

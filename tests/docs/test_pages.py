@@ -97,7 +97,12 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
     from inercal.records.maps import read_map
-    from inercal.study.load import load_imu_study, load_selfcal_study, load_turntable_study
+    from inercal.study.load import (
+        load_aoa_study,
+        load_imu_study,
+        load_selfcal_study,
+        load_turntable_study,
+    )
 
     texts = [text for page in PAGES for text in blocks(page, "toml")]
     assert texts
@@ -108,10 +113,8 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
             read_map(tmp_path / "study.toml")
             continue
         kind = keys.get("rig", {}).get("kind", "")
-        if kind == "three_axis_gimbals":
-            load_selfcal_study(tmp_path / "study.toml")
-        else:
-            (load_turntable_study if kind else load_imu_study)(tmp_path / "study.toml")
+        special = {"": load_imu_study, "three_axis_gimbals": load_selfcal_study, "sting": load_aoa_study}
+        special.get(kind, load_turntable_study)(tmp_path / "study.toml")
 
 
 def test_every_link_between_pages_leads_somewhere():

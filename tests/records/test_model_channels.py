@@ -58,6 +58,17 @@ def test_a_guessed_map_reads_the_file(tmp_path):
     assert record.findings == ()
 
 
+def test_numbers_of_points_may_be_empty(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("t [s],a1 [g],point [1],trigger [1]\n0.0,1.0,,\n0.1,0.9,4,17\n0.2,,5,\n")
+    assert [(f.code, f.message) for f in read(path).findings] == [("nan", "a1: 1 missing value")]
+    column = {"t [s]": [0.0, 0.1, 0.2], "a1 [g]": [1.0, 0.9, np.nan], "point [1]": [np.nan, 4.0, 5.0]}
+    np.savez(tmp_path / "run.npz", **column)
+    assert [(f.code, f.message) for f in read(tmp_path / "run.npz").findings] == [
+        ("nan", "a1: 1 missing value")
+    ]
+
+
 def test_units_by_gravity(tmp_path):
     path = tmp_path / "run.csv"
     for factor, unit in ((9.80665, "m/s^2"), (1e3, "mg"), (12345.0, "count")):

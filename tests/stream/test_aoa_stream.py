@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, study
 
-from inercal.aoa.angles import of_fusion
 from inercal.aoa.filtered import estimate
 from inercal.aoa.history import angles_record
 from inercal.aoa.problem import problem
@@ -16,6 +15,7 @@ from inercal.aoa.reading import recording_of
 from inercal.aoa.record import to_record
 from inercal.aoa.settings import Attitude, Calibration, Disturbances, Oscillation, Zero
 from inercal.aoa.simulate import simulate
+from inercal.aoa.stated import by_fusion
 from inercal.aoa.zero import with_zero
 from inercal.errors import InputError, RecordError
 from inercal.estimate.checkpoint import fingerprint
@@ -79,8 +79,8 @@ def of_file(text, settings, tmp_path):
     """The lines that a whole file gives."""
     (tmp_path / "whole.csv").write_text(text)
     recording = with_zero(recording_of(read(tmp_path / "whole.csv"), settings), settings)
-    found = estimate(recording, problem(settings, recording.spatial))
-    angles = of_fusion(found, settings.estimator.states)
+    of = problem(settings, recording.spatial)
+    angles = by_fusion(recording, settings, of, estimate(recording, of))
     write_record(angles_record(recording, angles, settings), tmp_path / "angles.csv")
     return (tmp_path / "angles.csv").read_text().splitlines()
 

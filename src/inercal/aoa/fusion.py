@@ -1,7 +1,8 @@
 """The causal fusion, row by row or in blocks: the same digits either way.
 
 The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
-as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors.
+as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors; with
+the prior where it was lost because sensors did not cease to contradict it.
 Rows must be later than those before them: `inercal.aoa.clock` leaves out those that are not.
 """
 
@@ -33,7 +34,7 @@ _NO_ARM = 1e-3
 class State(NamedTuple):
     """What the filter knows between two rows.
 
-    ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (3,) as of `inercal.aoa.recursion.advance`;
+    ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (N + 3,) as of `inercal.aoa.recursion.advance`;
     ``t`` [s] of the last row, -inf before the first; ``started``: the filter runs. Until it does ``held`` (k, N + 6)
     are the rows that wait, time first.
     """
@@ -47,12 +48,14 @@ class State(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where the filter started: the row, counted in the trace, and its state before that row's update."""
+    """Where the filter started: the row, counted in the trace, its state before that row's update, and whether all of
+    it is of the prior, as at first and after surprises that did not end."""
 
     row: int
     x: Array
     P: Array
     turns: Array
+    anew: bool
 
 
 class Trace(NamedTuple):
@@ -66,7 +69,9 @@ class Trace(NamedTuple):
 def initial(problem: Problem) -> State:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
-    return State(problem.mean.copy(), problem.covariance.copy(), np.zeros(3), -math.inf, False, none)
+    return State(
+        problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3), -math.inf, False, none
+    )
 
 
 def advance(
@@ -98,10 +103,13 @@ def advance(
             end = min(at + HELD, m)
             if end - at < HELD and not last:
                 break
+            anew = bool((turns[2:] >= recursion.PATIENCE).any())
+            if anew:  # neither is to be believed what was learned of the sensors
+                x[:], P[:] = problem.mean, problem.covariance
             if not start(x, P, turns, problem, t[at:end], rows[at:end]):
                 at = end
                 continue
-            starts.append(Start(at, x.copy(), P.copy(), turns.copy()))
+            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew))
             dt[at] = 0.0
         done = recursion.advance(
             x,
@@ -170,7 +178,7 @@ def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Ar
     P[:, new] = 0.0
     P[[0, 1, 2, 3], [0, 1, 2, 3]] = START**2
     P[fresh, fresh] = problem.covariance[fresh, fresh]
-    turns[2] = 0.0
+    turns[2:] = 0.0
     for k in range(2):
         if math.isfinite(middle[n + 3 + k]):
             turns[k] = middle[n + 3 + k]

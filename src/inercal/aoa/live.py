@@ -192,8 +192,9 @@ def load(problem: Problem) -> None:
     none = np.empty(0)
     rows = np.empty((0, problem.count + BESIDE))
     recursion.advance(
-        problem.mean.copy(), problem.covariance.copy(), np.zeros(3), none, rows, problem.geometry, problem.places,
-        problem.constants, np.empty((0, OUTPUTS + problem.count + 1)), np.empty((0, 2 * problem.size)), 1, 0,
+        problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3), none, rows,
+        problem.geometry, problem.places, problem.constants, np.empty((0, OUTPUTS + problem.count + 1)),
+        np.empty((0, 2 * problem.size)), 1, 0,
     )  # fmt: skip
 
 

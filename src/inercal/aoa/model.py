@@ -160,13 +160,17 @@ def transition(dt: float, places: Indices, constants: Array, F: Array, Q: Array)
         for j in range(d):
             F[i, j], Q[i, j] = 0.0, 0.0
         F[i, i] = 1.0
-    F[0, 1], F[1, 2], F[2, 3] = dt, dt, dt
-    F[0, 2], F[1, 3] = 0.5 * dt * dt, 0.5 * dt * dt
-    F[0, 3] = dt * dt * dt / 6.0
+    noise = constants[SNAP] * dt
     for i in range(4):
+        power = noise
         for j in range(4):
-            power = dt ** (7 - i - j)
-            Q[i, j] = constants[SNAP] * power / ((7 - i - j) * _FACTORIAL[3 - i] * _FACTORIAL[3 - j])
+            Q[3 - i, 3 - j] = power / ((i + j + 1) * _FACTORIAL[i] * _FACTORIAL[j])
+            power *= dt
+        noise *= dt
+        power = 1.0
+        for j in range(i, 4):
+            F[i, j] = power / _FACTORIAL[j - i]
+            power *= dt
     if places[RESONATORS] >= 0:
         for b in range(2):
             w0, zeta, level = (

@@ -3,9 +3,9 @@
 A row is predicted, then updated by one scalar after the other: accelerometers in their order, the gyro, and an angle
 that is stated, each relinearised at the state that it finds. An innovation v that is larger than five
 standard deviations enlarges its own variance, S = v^2 / 25: it pulls the less the larger it is, while a gate that shuts
-would lock the filter out for good once it is off. Where the gyro agrees with what is wrong, as after a shock, that pull
-can be too little all the same: when the accelerometers show one other angle for a hundred rows, or all that is measured
-is as surprising, theta is found anew.
+would lock the filter out for good once it is off. Where some of the sensors agree with what is wrong, as after a shock,
+that pull can be too little all the same. So where one sensor has surprised by twice as much in each of a long row of
+rows, theta is found anew.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ OUTPUTS = 5
 BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, an angle that is stated and its u, roll and yaw."""
 
-_OFF, _AGREED, _PATIENCE = 0.02, 0.8, 100
-"""An angle [rad] by which all accelerometers differ, the share of their squared innovations that it must explain, and
-the rows in a row after which it is believed."""
+PATIENCE = 500
+"""Rows in a row in which a sensor surprises by twice what the gate lets through, after which theta counts as lost: half a
+second at 1 kHz, longer than what a small wrong model leaves of one sign, as 5 mm of a height at 1 Hz."""
 
 _READING = 1e100
 """What no sensor reads: from here on it counts as missing, as what is no number does."""
@@ -191,6 +191,12 @@ def row_of(
 
 
 @kernel
+def root(variance: float) -> float:
+    """Standard deviation; 0 where rounding has made a variance negative."""
+    return math.sqrt(variance) if variance > 0.0 else 0.0
+
+
+@kernel
 def write(x: Array, P: Array, constants: Array, out: Array, k: int) -> None:
     """Put theta, u, rate, u, acceleration at the stamp into row ``k``: later by a common delay than the sensors."""
     tau, u = constants[COMMON_DELAY], constants[COMMON_DELAY_U]
@@ -199,7 +205,8 @@ def write(x: Array, P: Array, constants: Array, out: Array, k: int) -> None:
     out[k, 4] = x[2]
     theta = P[0, 0] + 2.0 * tau * P[0, 1] + tau * tau * P[1, 1] + out[k, 2] * out[k, 2] * u * u
     rate = P[1, 1] + 2.0 * tau * P[1, 2] + tau * tau * P[2, 2] + x[2] * x[2] * u * u
-    out[k, 1], out[k, 3] = math.sqrt(max(theta, 0.0)), math.sqrt(max(rate, 0.0))
+    out[k, 1] = root(theta)
+    out[k, 3] = root(rate)
 
 
 def advance(
@@ -208,15 +215,15 @@ def advance(
 ) -> int:  # fmt: skip
     """Go on by the rows of ``dt`` (m,) [s] and ``z`` (m, N + 5); the number of rows done.
 
-    ``x`` (n,), ``P`` (n, n) and ``turns`` (3,), the last indications of the roll and yaw gyros and how many of the last
-    rows showed another angle, are changed in place. A row of ``z`` holds the accelerometers [m/s^2], the gyro [rad/s],
-    an angle stated and its standard uncertainty [rad], roll and yaw gyros [rad/s]; NaN where not measured. ``out`` (m,
-    `OUTPUTS` + N + 1) receives what `write` says and the innovations over their standard deviations. ``kept`` (k, 2 n)
-    receives x and its standard deviations at each ``every``-th row, counted from ``first``; none for 0 rows.
-    ``remembered`` is filled if it has room for m rows.
+    ``x`` (n,), ``P`` (n, n) and ``turns`` (N + 3,) are changed in place; ``turns`` are the last indications of the roll
+    and yaw gyros, and the rows in a row in which each accelerometer and the gyro surprised. A row of ``z`` holds the
+    accelerometers [m/s^2], the gyro [rad/s], an angle stated and its standard uncertainty [rad], roll and yaw gyros
+    [rad/s]; NaN where not measured. ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over
+    their standard deviations. ``kept`` (k, 2 n) receives x and its standard deviations at each ``every``-th row,
+    counted from ``first``; none for 0 rows. ``remembered`` is filled if it has room for m rows.
 
-    Ends before a row in which theta is lost: its variance is over `LOST`, it is no angle any more, or accelerometers
-    have shown another for too long.
+    Ends before a row in which theta is lost: its variance is over `LOST`, it is no angle any more, or a sensor has
+    surprised `PATIENCE` times.
     """
     steps, known, scalars = remembered
     done: int = _advance(
@@ -236,6 +243,9 @@ def _advance(
     F, Q = np.empty((d, d)), np.empty((d, d))
     at, row = np.empty(WIDEST, np.int64), np.empty(WIDEST)
     last, base, spatial, remember = -1.0, 0.0, places[ROLL] >= 0, len(steps) > 0
+    surprised = False
+    for i in range(count + 1):
+        surprised = surprised or turns[2 + i] >= PATIENCE
     for k in range(m):
         step = step_of(dt[k])
         p, y = 0.0, 0.0
@@ -246,20 +256,19 @@ def _advance(
             last, base = step, Q[0, 0]
         if step > 0.0:
             go_on(x, P, step, p, y, places, constants, F, Q, base, work)
-        if not (P[0, 0] < LOST and abs(x[0]) < _TURNS and turns[2] < _PATIENCE):
+        if surprised or not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
             return k
         if spatial:
             p, y = turns[0], turns[1]
-        along, power, total, seen, shut = 0.0, 0.0, 0.0, 0, 0
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:
                 expected, entries, noise = row_of(i, x, z, k, geometry, places, constants, p, y, at, row)
                 v = z[k, i] - expected
                 surprise, variance = update(P, x, v, entries, at, row, noise, constants[GATE], line)
-                seen, shut = seen + 1, shut + int(surprise * surprise > constants[GATE])
-                if i < count:
-                    along, power, total = along + row[0] * v, power + row[0] * row[0], total + v * v
+                if i <= count:
+                    turns[2 + i] = turns[2 + i] + 1.0 if surprise * surprise > 4.0 * constants[GATE] else 0.0
+                    surprised = surprised or turns[2 + i] >= PATIENCE
             if i <= count:
                 out[k, OUTPUTS + i] = surprise
             if remember:
@@ -268,9 +277,6 @@ def _advance(
                 for j in range(entries):
                     scalars[k, i, at[j]] = row[j]
                 scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
-        off = abs(along) > _OFF * power and along * along > _AGREED * total * power
-        off = shut > 0 and (off or (shut > 1 and shut == seen))
-        turns[2] = turns[2] + 1.0 if off else 0.0
         write(x, P, constants, out, k)
         if remember:
             for i in range(d):
@@ -283,7 +289,7 @@ def _advance(
         if len(kept) > 0 and (first + k) % every == 0:
             for i in range(n):
                 kept[(first + k) // every, i] = x[i]
-                kept[(first + k) // every, n + i] = math.sqrt(max(P[i, i], 0.0))
+                kept[(first + k) // every, n + i] = root(P[i, i])
     return m
 
 

@@ -14,7 +14,6 @@ have its rows; so memory goes with the block and not with the recording.
 
 from __future__ import annotations
 
-import math
 from typing import TypeAlias
 
 import numpy as np
@@ -25,7 +24,7 @@ from inercal.aoa import recursion
 from inercal.aoa.fusion import Start, unknown
 from inercal.aoa.model import COUNT, MOVING, ROWS, STATES
 from inercal.aoa.problem import Problem
-from inercal.aoa.recursion import OUTPUTS, congruent, write
+from inercal.aoa.recursion import OUTPUTS, congruent, root, write
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
@@ -66,9 +65,10 @@ def smooth(
         part = slice(begin.row, end)
         dt = np.diff(t[part], prepend=t[begin.row])
         _stretch(problem, begin, dt, rows[part], lam, Lam, out[part], kept, every)
-        lam[new] = 0.0
-        Lam[new, :] = 0.0
-        Lam[:, new] = 0.0
+        forgotten = slice(None) if begin.anew else new
+        lam[forgotten] = 0.0
+        Lam[forgotten, :] = 0.0
+        Lam[:, forgotten] = 0.0
         end = begin.row
     return out
 
@@ -76,7 +76,7 @@ def smooth(
 def load(problem: Problem) -> None:
     """Load, or compile, the kernels."""
     x, P = problem.mean.copy(), problem.covariance.copy()
-    start = Start(0, x, P, np.zeros(3))
+    start = Start(0, x, P, np.zeros(problem.count + 3), True)
     smooth(problem, np.zeros(1), np.full((1, problem.count + recursion.BESIDE), np.nan), (start,))
 
 
@@ -110,19 +110,20 @@ def _backward(
     """Go back over ``size`` rows that the filter remembers: ``lam`` and ``Lam`` from their end to their beginning."""
     n, d = places[STATES], places[MOVING]
     work, line, none = np.empty((d, n)), np.empty(n), np.zeros((d, d))
-    mean, spread = np.empty(3), np.empty((3, 3))
+    mean, spread = np.empty(n), np.empty((n, n))
     for k in range(size - 1, -1, -1):
-        for i in range(3):
+        whole = len(kept) > 0 and (first + k) % every == 0
+        for i in range(n if whole else 3):
             mean[i] = _smoothed(known, k, i, lam, Lam, line)
             for j in range(i + 1):
-                spread[i, j] = _covariance(known, k, j, i, line)
+                spread[i, j] = known[k, i + 1, j]
+                for m in range(n):
+                    spread[i, j] -= line[m] * known[k, j + 1, m]
                 spread[j, i] = spread[i, j]
+            if whole:
+                kept[(first + k) // every, i] = mean[i]
+                kept[(first + k) // every, n + i] = root(spread[i, i])
         write(mean, spread, constants, out, k)
-        if len(kept) > 0 and (first + k) % every == 0:
-            for i in range(n):
-                kept[(first + k) // every, i] = _smoothed(known, k, i, lam, Lam, line)
-                variance = _covariance(known, k, i, i, line)
-                kept[(first + k) // every, n + i] = math.sqrt(max(variance, 0.0))
         for i in range(places[COUNT] + 1, -1, -1):
             if scalars[k, i, 2 * n + 1] > 0.0:
                 _back(lam, Lam, scalars, k, i, line)
@@ -175,13 +176,4 @@ def _smoothed(known: Array, k: int, i: int, lam: Array, Lam: Array, line: Array)
         p = known[k, i + 1, m]
         for j in range(n):
             line[j] += p * Lam[m, j]
-    return total
-
-
-@kernel
-def _covariance(known: Array, k: int, i: int, j: int, line: Array) -> float:
-    """Of the smoothed states ``i`` and ``j`` of row ``k``; ``line`` is that of ``j``."""
-    total: float = known[k, j + 1, i]
-    for m in range(len(line)):
-        total -= line[m] * known[k, i + 1, m]
     return total

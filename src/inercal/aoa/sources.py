@@ -12,7 +12,6 @@ runs as there are sources.
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -28,7 +27,7 @@ from inercal.aoa.problem import problem as stated_problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.smoother import smooth
-from inercal.aoa.stated import GRAVITY_STEP, ROLL_STEP, uncertain_roll
+from inercal.aoa.stated import leaning, leans, uncertain_roll
 from inercal.estimate.budget import BudgetItem
 
 Array = NDArray[np.float64]
@@ -87,19 +86,9 @@ def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothe
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
     changed = [_enlarged(problem, rows, each) for each in of]
-    g = problem.constants[model.GRAVITY]
-    g, roll = problem.constants[model.GRAVITY], settings.attitude.roll
-    of_roll = uncertain_roll(settings, problem.spatial)
-    # neither is a state of the filter: their errors move the estimate
-    lean = (
-        (g * GRAVITY_STEP, model.GRAVITY, g * (1.0 + GRAVITY_STEP)),
-        *(
-            [(ROLL_STEP, model.ROLL_COSINE, math.cos(roll.value + ROLL_STEP))]
-            if roll is not None and of_roll
-            else []
-        ),
-    )
-    moved = [(_with_constant(problem, place, value), rows) for _, place, value in lean]
+    # neither gravity nor a stated roll is a state of the filter: their errors move the estimate
+    changes = leans(settings, problem.spatial)
+    moved = [(leaning(problem, each), rows) for each in changes]
     with ThreadPoolExecutor() as pool:
         runs = pool.map(lambda run: _run(run[0], t, run[1], smoothed), [(problem, rows), *changed, *moved])
         (angle, P, x, theta), *others = runs
@@ -107,26 +96,23 @@ def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothe
     for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
         slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
         found.append((source, np.maximum(slope, 0.0)))
-    slopes = []
-    for (step, *_), (_, _, state, turned) in zip(lean, others[len(of) :], strict=True):
+    stated: list[tuple[Source, Array]] = []
+    for lean, (_, _, state, turned) in zip(changes, others[len(of) :], strict=True):
         apart = (turned - theta)[np.isfinite(turned - theta)]
-        of_angle = float(np.sqrt(np.mean(np.square(apart))))
-        slopes.append(np.append(of_angle, (state - x)[at]) / step)
-    stated = [(Source(each.source, "B", each.u, each.unit), slopes[0] * each.sensitivity * each.u)
-              for each in settings.site.inputs]  # fmt: skip
-    stated += [(Source("stated roll", "B", of_roll, "rad"), slope * of_roll) for slope in slopes[1:]]
+        slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (state - x)[at]) / lean.step
+        if lean.name == "gravity":
+            stated += [
+                (Source(each.source, "B", each.u, each.unit), slope * each.sensitivity * each.u)
+                for each in settings.site.inputs
+            ]
+        else:
+            of_roll = uncertain_roll(settings, problem.spatial)
+            stated.append((Source("stated roll", "B", of_roll, "rad"), slope * of_roll))
     found += [(source, np.square(shift)) for source, shift in stated]
     common = np.zeros((len(at), len(at)))
     for _, shift in stated:
         common += np.outer(shift[1:], shift[1:])
     return Parts(_items(found, (ANGLE, *problem.nuisances)), common)
-
-
-def _with_constant(problem: Problem, place: int, value: float) -> Problem:
-    """The problem with one constant of its model changed."""
-    constants = problem.constants.copy()
-    constants[place] = value
-    return replace(problem, constants=constants)
 
 
 def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:

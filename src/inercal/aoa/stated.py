@@ -8,17 +8,17 @@ the change of theta, row by row, is the slope.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa import filtered as fusion
 from inercal.aoa import model
 from inercal.aoa.angles import Angles, of_fusion, stated_roll
-from inercal.aoa.filtered import Filtered
+from inercal.aoa.filtered import Filtered, estimate
 from inercal.aoa.methods import measure
 from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
@@ -38,19 +38,41 @@ _KNOWN = 1e-6
 """Relative uncertainty of gravity, 0.00006 deg at most, from which it counts."""
 
 
+class Lean(NamedTuple):
+    """What is changed, ``gravity`` or ``roll``, by a ``step`` [m/s^2 or rad]; ``gravity`` and ``roll`` are then so."""
+
+    name: str
+    step: float
+    gravity: float
+    roll: float
+
+
+def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
+    """A change of each of what is stated with an uncertainty; a roll that gyros track is a state, and has none."""
+    g, roll = settings.site.gravity, settings.attitude.roll
+    level, found = 0.0 if roll is None else roll.value, []
+    if gravity_u(settings) > _KNOWN * g:
+        found.append(Lean("gravity", g * GRAVITY_STEP, g * (1.0 + GRAVITY_STEP), level))
+    if uncertain_roll(settings, tracked):
+        found.append(Lean("roll", ROLL_STEP, g, level + ROLL_STEP))
+    return tuple(found)
+
+
+def leaning(problem: Problem, lean: Lean) -> Problem:
+    """The problem of the fusion under a change."""
+    constants = problem.constants.copy()
+    constants[[model.GRAVITY, model.ROLL_COSINE]] = lean.gravity, math.cos(lean.roll)
+    return replace(problem, constants=constants)
+
+
 def by_fusion(recording: Recording, settings: AoaSettings, problem: Problem, filtered: Filtered) -> Angles:
     """The angles of the fusion, with the roll where gyros track it, and with what is stated in their uncertainty."""
     angles, turned = of_fusion(filtered, settings.estimator.states), tracked(recording, problem, filtered)
     if turned is not None:
         angles = replace(angles, roll=turned[0], roll_u=turned[1])
-
-    def run(gravity: float, roll: float) -> Array:
-        constants = problem.constants.copy()
-        constants[[model.GRAVITY, model.ROLL_COSINE]] = gravity, math.cos(roll)
-        off = replace(problem, constants=constants)
-        return fusion.estimate(recording, off, filtered.smoothed).theta
-
-    return _with_stated(angles, settings, run)
+    return _with_stated(
+        angles, settings, lambda lean: estimate(recording, leaning(problem, lean), filtered.smoothed).theta
+    )
 
 
 def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
@@ -60,13 +82,37 @@ def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) ->
     def found(chosen: AoaSettings) -> Angles:
         return measure(tare(recording, chosen), chosen, methods)
 
-    def run(gravity: float, roll: float) -> Array:
-        attitude, site = settings.attitude, replace(settings.site, gravity=gravity)
+    def run(lean: Lean) -> Array:
+        attitude, site = settings.attitude, replace(settings.site, gravity=lean.gravity)
         if attitude.roll is not None:
-            attitude = replace(attitude, roll=replace(attitude.roll, value=roll))
+            attitude = replace(attitude, roll=replace(attitude.roll, value=lean.roll))
         return found(replace(settings, site=site, attitude=attitude)).theta
 
     return _with_stated(found(settings), settings, run)
+
+
+def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Array]) -> Angles:
+    """The angles with what is stated in their uncertainty; ``run`` gives theta under a change."""
+    changes = leans(settings, angles.roll is not None)
+    with ThreadPoolExecutor() as pool:
+        return widened(angles, settings, changes, list(pool.map(run, changes)))
+
+
+def widened(
+    angles: Angles, settings: AoaSettings, changes: Sequence[Lean], turned: Sequence[Array]
+) -> Angles:
+    """The angles with what is stated in their uncertainty, from theta (n,) under each of the ``changes``.
+
+    A row in which there is no such theta goes without.
+    """
+    for lean, theta in zip(changes, turned, strict=True):
+        off = np.remainder(theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
+        slope = np.where(np.isnan(off) & np.isfinite(angles.theta), 0.0, off) / lean.step
+        if lean.name == "roll":
+            angles = stated_roll(replace(angles, by_roll=slope), settings.attitude)
+        else:
+            angles = replace(angles, u=np.hypot(angles.u, slope * gravity_u(settings)))
+    return angles
 
 
 def gravity_u(settings: AoaSettings) -> float:
@@ -78,27 +124,3 @@ def uncertain_roll(settings: AoaSettings, tracked: bool) -> float:
     """Standard uncertainty [rad] of the roll that is stated; 0 where gyros track it: then it is a state."""
     roll = settings.attitude.roll
     return 0.0 if roll is None or tracked else roll.u
-
-
-def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[float, float], Array]) -> Angles:
-    """The angles with the uncertainty of gravity and roll, where they have one; ``run`` gives theta under others."""
-    g, of_gravity = settings.site.gravity, gravity_u(settings)
-    roll = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
-    steps: dict[str, tuple[float, float]] = {}
-    if of_gravity > _KNOWN * g:
-        steps["gravity"] = (g * GRAVITY_STEP, 0.0)
-    if uncertain_roll(settings, angles.roll is not None):
-        steps["roll"] = (0.0, ROLL_STEP)
-    with ThreadPoolExecutor() as pool:
-        found = dict(
-            zip(steps, pool.map(lambda by: run(g + by[0], roll + by[1]), steps.values()), strict=True)
-        )
-    slopes = {}
-    for name, theta in found.items():
-        off = np.remainder(theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
-        slopes[name] = np.where(np.isnan(off) & np.isfinite(angles.theta), 0.0, off) / sum(steps[name])
-    if "gravity" in slopes:
-        angles = replace(angles, u=np.hypot(angles.u, slopes["gravity"] * of_gravity))
-    if "roll" in slopes:
-        angles = stated_roll(replace(angles, by_roll=slopes["roll"]), settings.attitude)
-    return angles

@@ -96,7 +96,7 @@ def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare:
     of, t = problem(settings), np.arange(2.0)
     rows = plain(t, np.full((2, of.count), np.nan), np.full(2, np.nan)).rows
     out, none = np.empty((0, recursion.OUTPUTS + of.count + 1)), np.empty((0, 2 * of.size))
-    x, P, turns = of.mean.copy(), of.covariance.copy(), np.zeros(3)
+    x, P, turns = of.mean.copy(), of.covariance.copy(), np.zeros(of.count + 3)
     recursion.advance(x, P, turns, t[:0], rows[:0], of.geometry, of.places, of.constants, out, none, 1, 0)
     if settings.estimator.smooth or compare:
         smoother.load(of)

@@ -51,16 +51,17 @@ def of_fusion(
     recording: Recording, filtered: Filtered, angles: Angles, said: Sequence[Finding]
 ) -> tuple[Status, str]:
     """Status and sentence of what the fusion found; ``said`` all findings."""
-    known = filtered.state
-    lost = _lost(recording, filtered)
-    if lost is None and not (np.isfinite(known.x).all() and np.isfinite(known.P).all()):
-        lost = "the filter has lost its numbers"
-    if lost is not None:
-        return Status.NOT_CONVERGED, _because(lost, said)
-    mean = filtered.nis_mean
+    state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
+    if 2 * known.sum() <= len(known):
+        return Status.NOT_CONVERGED, _because(_missing(known), said)
+    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
+        return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
     if mean > NIS_LIMIT:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {NIS_LIMIT:g}"
         return Status.INCONSISTENT, _because(text, said)
+    lost = _lost(recording, filtered)
+    if lost is not None:
+        return Status.NOT_CONVERGED, _because(lost, said)
     return Status.OK, _doubted(f"{_words(angles)}, mean NIS {mean:.3g}", said)
 
 
@@ -73,10 +74,7 @@ def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:
 
 
 def _lost(recording: Recording, filtered: Filtered) -> str | None:
-    """Why the angles of a filter are none, in words; None where they are."""
-    known = np.isfinite(filtered.theta)
-    if 2 * known.sum() <= len(known):
-        return _missing(known)
+    """That a filter lost the angle too often, in words; None where it did not."""
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
     losses = [
         row

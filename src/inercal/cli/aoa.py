@@ -157,7 +157,7 @@ def _one_run(records: Sequence[Record]) -> Record:
 
 def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -> int:
     """Write what was asked for, say what was found, and give the exit code."""
-    from inercal.aoa.display import delays
+    from inercal.aoa.display import delays, use_of_fit
     from inercal.aoa.tables import all_tables
 
     def page() -> str:
@@ -178,7 +178,7 @@ def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -
 
     points = found.points if how.points else ()
     shown = [f"{table.title}\n{table.text()}" for table in all_tables(found.estimate, points, found.settings)]
-    shown.append(delays(found.estimate))
+    shown += [text for text in (delays(found.estimate), use_of_fit(found.estimate)) if text]
     return hand_over(found.estimate, shown, page, output, "angles", rows)
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.angles import Angles
 from inercal.aoa.calibrated import at_range, check_axes, check_unit, indication
 from inercal.aoa.filtered import SETTLED
 from inercal.aoa.history import columns, rows
@@ -25,6 +26,7 @@ from inercal.aoa.posterior import load as load_posterior
 from inercal.aoa.problem import problem
 from inercal.aoa.reading import missing
 from inercal.aoa.settings import GYROS, AoaSettings
+from inercal.aoa.stated import gravity_u, leaning, leans, widened
 from inercal.aoa.zero import stated_at
 from inercal.records.findings import Finding
 from inercal.records.record import Column
@@ -49,16 +51,24 @@ _SILENT = 1.0
 _BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
 
 
+class Beside(NamedTuple):
+    """The fusion under a change of what is stated: its state, and theta [rad] of rows that the other has not told."""
+
+    live: LiveState
+    theta: Array
+
+
 class AoaState(NamedTuple):
     """What is known after a row.
 
-    ``live`` is the state of the fusion; ``t`` [s] the latest stamp, ``begun`` [s] the first one (NaN before);
-    ``temperature`` [degC] the last one known; ``heard`` [s] the last row in which the gyro spoke. ``nis`` and
-    ``scalars``: sum of the squared innovations since ``window`` [s], and their number. ``said`` are the alarms given,
-    one bit each; ``slots`` that of the last line.
+    ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by their names; ``t`` [s]
+    the latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last one known; ``heard`` [s]
+    the last row in which the gyro spoke. ``nis`` and ``scalars``: sum of the squared innovations since ``window`` [s],
+    and their number. ``said`` are the alarms given, one bit each; ``slots`` that of the last line.
     """
 
     live: LiveState
+    beside: Mapping[str, Beside]
     t: float
     begun: float
     temperature: float
@@ -122,7 +132,10 @@ class Aoa:
         posterior = None if prior is None else load_posterior(prior, settings)
         self._problem = problem(settings, spatial, posterior)
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(settings.attitude)]]
+        self._changes = leans(settings, spatial)
+        self._leaning = [leaning(self._problem, each) for each in self._changes]
         self._live = Live(self._problem, where=lines.where)
+        self._others: list[Live] = []
         self._after: AoaState | None = None
 
     @property
@@ -135,6 +148,7 @@ class Aoa:
             "covariance": of.covariance,
             "places": of.places,
             "constants": of.constants,
+            "stated": repr([(each, gravity_u(settings)) for each in self._changes]),
             "geometry": of.geometry,
             "sensors": repr([(name, settings.calibration(name)) for name in (*of.layout.names, *GYROS)]),
             "attitude": repr(settings.attitude),
@@ -146,14 +160,19 @@ class Aoa:
     def initial(self) -> AoaState:
         """Nothing known."""
         return AoaState(
-            live=Live(self._problem).state, t=-math.inf, begun=math.nan, temperature=math.nan,
+            live=Live(self._problem).state,
+            beside={
+                each.name: Beside(Live(of).state, np.empty(0))
+                for each, of in zip(self._changes, self._leaning, strict=True)
+            },
+            t=-math.inf, begun=math.nan, temperature=math.nan,
             heard=math.nan, nis=0.0, scalars=0, window=math.nan, said=0, slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
         """The state after a row, and the lines of this row and of those that were held until now."""
         if state is not self._after:
-            self._live = Live(self._problem, state.live, self._where)
+            self._live, self._others = self._from(state)
         if self._temperature >= 0 and math.isfinite(sample.values[self._temperature]):
             state = state._replace(temperature=sample.values[self._temperature])
         state, values = self._measured(self._told_of_sensors(state), sample)
@@ -165,16 +184,27 @@ class Aoa:
             stated = self._zero(state, sample.t, values[:n])
             state = self._heard(state, sample.t, gyro)
         told = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *stated)
+        turned = [each.feed(sample.t, values[:n], gyro, roll, yaw, *stated).theta for each in self._others]
         if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
-        state, outputs = self._lines(self._judged(state, told)._replace(live=self._live.state), told)
+        state = self._judged(state, told)._replace(live=self._live.state)
+        state, outputs = self._lines(state, told, self._others, turned)
         self._after = state
         return state, outputs
 
     def finish(self, state: AoaState) -> Sequence[Output]:
         """The lines of rows that were still held."""
-        return self._lines(state, Live(self._problem, state.live, self._where).finish())[1]
+        live, others = self._from(state)
+        return self._lines(state, live.finish(), others, [each.finish().theta for each in others])[1]
+
+    def _from(self, state: AoaState) -> tuple[Live, list[Live]]:
+        """The fusion, and those under changes, as a state left them."""
+        changed = zip(self._leaning, state.beside.values(), strict=True)
+        return (
+            Live(self._problem, state.live, self._where),
+            [Live(of, each.live, self._where) for of, each in changed],
+        )
 
     def _measured(self, state: AoaState, sample: Sample) -> tuple[AoaState, Array]:
         """What the sensors of a row measure, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
@@ -246,10 +276,22 @@ class Aoa:
         self._say(Finding(code, text, f"t = {t:.10g} s"))
         return state._replace(said=state.said | 1 << bit)
 
-    def _lines(self, state: AoaState, told: Told) -> tuple[AoaState, list[Output]]:
-        """The state with the slots of lines, and the lines that are due."""
+    def _lines(
+        self, state: AoaState, told: Told, others: Sequence[Live], turned: Sequence[Array]
+    ) -> tuple[AoaState, list[Output]]:
+        """The state with the slots of lines, and the lines that are due; ``turned`` is theta under changes."""
         outputs: list[Output] = []
-        said = rows(told.theta, told.u, told.rate, self._settings.attitude)
+        rest, beside, changed = len(told.t), {}, []
+        for (name, before), live, theta in zip(state.beside.items(), others, turned, strict=True):
+            theta = np.append(before.theta, theta)
+            # a filter that has lost theta, or has it anew, alone is out of step until both have it
+            changed.append(np.append(theta[:rest], np.full(max(rest - len(theta), 0), np.nan)))
+            beside[name] = Beside(live.state, theta[rest:])
+        angles = widened(
+            Angles("", told.theta, told.u, told.rate, told.rate_u), self._settings, self._changes, changed
+        )
+        state = state._replace(beside=beside)
+        said = rows(told.theta, angles.known_u, told.rate, self._settings.attitude, by_roll=angles.by_roll)
         for t, row in zip(told.t.tolist(), said.tolist(), strict=True):
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None
