@@ -162,9 +162,12 @@ def test_a_bad_file_of_positions_is_said_with_its_key(write, tmp_path, content, 
     ],
 )
 def test_a_way_to_give_positions_that_is_set_takes_the_place_of_the_other(
-    write, tmp_path, start, override, positions
+    write, tmp_path, monkeypatch, start, override, positions
 ):
-    (tmp_path / "p.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n3,4\n")
+    # a file that is set is one of the working folder
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    (tmp_path / "here" / "p.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n3,4\n")
     path = write(re.sub("(?m)^grid = .*", start, CONTRACT))
     assert len(load_turntable_study(path, [override]).plan) == positions
 

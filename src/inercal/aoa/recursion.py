@@ -49,8 +49,8 @@ BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, an angle that is stated and its u, roll and yaw."""
 
 PATIENCE = 500
-"""Rows in a row in which a sensor surprises by twice what the gate lets through, after which theta counts as lost: half a
-second at 1 kHz, longer than what a small wrong model leaves of one sign, as 5 mm of a height at 1 Hz."""
+"""Rows in a row in which a sensor surprises by twice what the gate lets through, after which theta counts as lost: half
+a second at 1 kHz, longer than what a small wrong model leaves of one sign, as 5 mm of a height at 1 Hz."""
 
 _READING = 1e100
 """What no sensor reads: from here on it counts as missing, as what is no number does."""

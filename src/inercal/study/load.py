@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -43,6 +44,9 @@ _ONE_OF = (
     (r"sensors\.\w+", ("calibration", "scale")),
 )
 
+#: keys (a regular expression) that name a file
+_FILES = r"estimator\.prior|motion\.file|positions\.file|sensors\.\w+\.calibration"
+
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
     """Read the study of ``inercal calibrate imu``.
@@ -54,7 +58,8 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
     overrides : iterable of str
         Keys to set over those of the file, ``"imu.static_start=50 s"``. A value that is TOML
         (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text. Where a table holds one of several
-        keys (``positions.grid``, ``plan``, ...), one that is set takes the place of the others.
+        keys (``positions.grid``, ``plan``, ...), one that is set takes the place of the others. A file that is set
+        is one of the working folder, not of the study's.
 
     Raises
     ------
@@ -150,12 +155,12 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
             f"found a study for `inercal calibrate imu`, expected {_EXPECTED[command]}, with a table [rig]",
         )
     for override in overrides:
-        _put(data, override)
+        _put(data, override, Path(path).parent)
     return data
 
 
-def _put(data: dict[str, Any], override: str) -> None:
-    """Set one key of the freshly read ``data`` by its dotted name."""
+def _put(data: dict[str, Any], override: str, folder: Path) -> None:
+    """Set one key of the freshly read ``data``, of a study in ``folder``, by its dotted name."""
     where = f"--set {shown(override)}"
     name, equals, text = override.partition("=")
     keys = [key.strip() for key in name.split(".")]
@@ -167,7 +172,10 @@ def _put(data: dict[str, Any], override: str) -> None:
         if not isinstance(table, dict):
             raise StudyError(where, f"{'.'.join(keys[:depth])} is no table, expected the key of a value")
         _make_room(table, ".".join(keys[:depth]), keys[depth])
-    table[keys[-1]] = _value(text.strip())
+    value = _value(text.strip())
+    is_file = re.fullmatch(_FILES, ".".join(keys)) and isinstance(value, str)
+    # typed on a command line, and so beside where one is; what a study names lies beside the study
+    table[keys[-1]] = os.path.relpath(value, folder) if is_file else value
 
 
 def _make_room(table: dict[str, Any], name: str, key: str) -> None:
