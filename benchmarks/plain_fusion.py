@@ -1,7 +1,8 @@
 """The causal fusion of three accelerometers and a gyro as one writes it in NumPy, and with filterpy.
 
 The same model with 8 or 19 states at even intervals, without roll, delay or what is masked. `Model` is written with
-care: transitions are made once, derivatives are those of the equations, scalars are put in one after the other.
+care: transitions are made once, derivatives are those of the equations at the prediction, scalars are put in one after
+the other.
 """
 
 import math
@@ -51,6 +52,20 @@ class Model:
         h[BIASES + i] = 1.0
         return along * fx - down * fz + x[BIASES + i], h
 
+    def row(self, x, P):
+        """What the four sensors should read at a prediction, and their derivatives (4, n).
+
+        Positions and the gyro's scale are not learned from a motion that is but noise.
+        """
+        told, H = zip(*(self.read(x, i) for i in range(4)), strict=True)
+        told, H = np.array(told), np.array(H)
+        if self.full:
+            w, al = (max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0 for j in (1, 2))
+            H[:, ARMS : ARMS + 3] *= max(w, al)
+            H[:, HEIGHTS : HEIGHTS + 3] *= max(w, al)
+            H[:, SCALE] *= w
+        return told, H
+
 
 def run_numpy(model, x, P, rows):
     """Angles and their uncertainties (m, 2) of ``rows`` (m, 4)."""
@@ -60,9 +75,9 @@ def run_numpy(model, x, P, rows):
         if k:
             x = F @ x
             P = F @ P @ Ft + Q
-        for i in range(4):
-            told, h = model.read(x, i)
-            v, Ph = row[i] - told, P @ h
+        ahead, (told, H) = x.copy(), model.row(x, P)
+        for i, h in enumerate(H):
+            v, Ph = row[i] - told[i] - h @ (x - ahead), P @ h
             S = float(h @ Ph) + model.variances[i]
             S = max(S, v * v / 25.0)
             x += Ph * (v / S)
@@ -80,14 +95,15 @@ def run_filterpy(model, x, P, rows):
     for k, row in enumerate(rows):
         if k:
             ekf.predict()
-        for i in range(4):
-            told, h = model.read(ekf.x, i)
-            v, variance = row[i] - told, h @ ekf.P @ h
+        ahead, (told, H) = ekf.x.copy(), model.row(ekf.x, ekf.P)
+        for i, h in enumerate(H):
+            expected = told[i] + h @ (ekf.x - ahead)
+            v, variance = row[i] - expected, h @ ekf.P @ h
             R = max(model.variances[i], v * v / 25.0 - variance)
             ekf.update(
                 row[i : i + 1],
                 HJacobian=lambda _, h=h: h[None, :],
-                Hx=lambda _, told=told: np.array([told]),
+                Hx=lambda _, expected=expected: np.array([expected]),
                 R=np.array([[R]]),
             )
         found[k] = ekf.x[0], math.sqrt(ekf.P[0, 0])

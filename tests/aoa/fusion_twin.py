@@ -80,7 +80,7 @@ class Twin:
         n, prior = len(x), self.settings.prior
         A, N = np.zeros((n, n)), np.zeros((n, n))
         A[0, 1] = A[1, 2] = A[2, 3] = 1.0
-        N[3, 3] = self.settings.estimator.snap
+        N[3, 3] = self.settings.estimator.density * max(1.0, 1e-3 / dt) ** 2
         for s, output, of in (("s_z", "flexure_z", prior.vertical), ("s_x", "flexure_x", prior.axial)):
             if s in self.place:
                 a, b = self.place[s], self.place[output]
@@ -125,6 +125,13 @@ def _off(x, k):
     return off
 
 
+def believed_of(twin, x, P):
+    """(n,) how much of a derivative by each state is kept: of positions and the gyro's scale as much as moves."""
+    rate, acceleration = (max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0 for j in (1, 2))
+    by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate}
+    return np.array([by.get(name.partition("_")[0], 1.0) for name in twin.names])
+
+
 def run(twin, start, t, rows):
     """Filter and smoother from a `Start`: arrays of states (m, n) and covariances (m, n, n), causal and smoothed.
 
@@ -144,11 +151,13 @@ def run(twin, start, t, rows):
             P = F @ P @ F.T + Q
         predicted.append((x, P))
         steps.append(F)
+        ahead, believed = x.copy(), believed_of(twin, x, P)
         for i in range(n + 2):
             if math.isnan(row[i]):
                 continue
-            told, h, variance = twin.reading(x, i, np.concatenate([row[: n + 3], turns]))
-            v, S = row[i] - told, h @ P @ h + variance
+            told, h, variance = twin.reading(ahead, i, np.concatenate([row[: n + 3], turns]))
+            h = h * believed
+            v, S = row[i] - told - h @ (x - ahead), h @ P @ h + variance
             if i <= n:
                 innovations[k, i] = v / math.sqrt(S)
             S = max(S, v**2 / gate)

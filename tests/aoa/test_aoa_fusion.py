@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter
-from fusion_twin import Twin, run
+from fusion_twin import Twin, believed_of, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, G, scenario, study
@@ -202,12 +202,14 @@ def test_filterpy_finds_the_same(states):
     for k, row in enumerate(recording.rows):
         if k:
             theirs.predict()
+        ahead, believed = theirs.x.copy(), believed_of(twin, theirs.x, theirs.P)
         for i in range(4):
-            _, _, R = twin.reading(theirs.x, i, row)
+            told_of, h, R = twin.reading(ahead, i, row)
+            h = h * believed
             theirs.update(
                 row[i : i + 1],
-                HJacobian=lambda x, i=i, row=row: twin.reading(x, i, row)[1][None, :],
-                Hx=lambda x, i=i, row=row: np.array([twin.reading(x, i, row)[0]]),
+                HJacobian=lambda x, h=h: h[None, :],
+                Hx=lambda x, h=h, told_of=told_of, ahead=ahead: np.array([told_of + h @ (x - ahead)]),
                 R=np.array([[R]]),
             )
         x.append(theirs.x[:2].copy())

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sting_study import DEG, NOISE, study
+from sting_study import DEG, NOISE, G, study
 
 from inercal.aoa.angles import of_fusion
 from inercal.aoa.corrections import corrected as put_right
@@ -20,6 +20,7 @@ from inercal.errors import InputError, StudyError
 from inercal.estimate.exchange import save
 from inercal.estimate.result import without_parameters
 from inercal.estimate.status import Status
+from inercal.geometry.site import GravityInput, Site
 
 SWEEP = MotionPlan("pitch-pause", first=-10.0 * DEG, last=90.0 * DEG, step=20.0 * DEG, move=1.0, pause=1.0)
 STILL = MotionPlan("static", duration=4.0, first=15.0 * DEG, last=15.0 * DEG)
@@ -59,6 +60,43 @@ def test_what_was_saved_is_what_the_filter_knew(saved):
     assert set(values) == set(of.nuisances)
     np.testing.assert_allclose(of.mean[at], found.state.x[at], rtol=1e-15)
     np.testing.assert_allclose(of.covariance[np.ix_(at, at)], found.state.P[np.ix_(at, at)], rtol=1e-12)
+
+
+def test_the_part_of_gravity_is_carried_from_run_to_run_as_one_error(tmp_path):
+    """Handed on is what the filter knew. And had gravity been another all along, the second run would have ended where
+    its slopes say, and its u holds that change whole, once."""
+    made = [
+        simulate(study(motion=replace(motion, sample_rate=200.0)), np.random.default_rng(seed)).recording
+        for seed, motion in enumerate((SWEEP, STILL))
+    ]
+
+    def chain(gravity):
+        uncertain = Site(gravity, (GravityInput("gravity", 3e-3, "m/s^2", 1.0),))
+        settings, posterior = study(site=uncertain), None
+        for k, recording in enumerate(made):
+            of = problem(settings, posterior=posterior)
+            state = estimate(recording, of).state
+            result = assemble(recording, settings, of, estimate(recording, of), [], None)
+            save(result, tmp_path / f"{k}.json")
+            settings = replace(
+                settings, estimator=replace(settings.estimator, prior=str(tmp_path / f"{k}.json"))
+            )
+            posterior = load(tmp_path / f"{k}.json", settings)
+        return settings, result, of, state
+
+    settings, last, of, state = chain(G)
+    at, size = list(of.nuisances.values()), last.u
+    after = problem(settings, posterior=load(tmp_path / "1.json", settings)).covariance[np.ix_(at, at)]
+    assert np.abs((after - state.P[np.ix_(at, at)]) / np.outer(size, size)).max() < 1e-12
+    slopes = np.array(list(last.result["gravity"]["slopes"].values()))
+    assert (3e-3 * np.abs(slopes) > 0.3 * size).any()
+    np.testing.assert_allclose(np.diag(last.common), (3e-3 * slopes) ** 2, rtol=1e-12)
+    # what is known of another gravity is another error
+    other = replace(settings, site=replace(settings.site, gravity=G + 1e-4))
+    wider = problem(other, posterior=load(tmp_path / "1.json", other)).covariance[np.ix_(at, at)]
+    np.testing.assert_allclose(wider, last.covariance, rtol=1e-12)
+    _, moved, *_ = chain(G + 1e-3)
+    np.testing.assert_allclose((moved.values - last.values) / 1e-3 / size, slopes / size, atol=0.02 / 3e-3)
 
 
 @pytest.mark.parametrize("states", [8, 11])

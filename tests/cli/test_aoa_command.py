@@ -321,6 +321,8 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
         (["aoa", "model.csv", "--study", "model.csv"], ["model.csv"]),
         ([*AOA, "--set", "sensors.a1.axis=+y"], ["sensors.a1.axis", "+y"]),
         ([*AOA, "--set", "estimator.prior=none.json"], ["none.json"]),
+        ([*AOA, "--set", "model.roll=90 deg"], ["aoa.toml", "model.roll", "90 deg"]),
+        ([*AOA, "--set", "model.roll=90 deg", "--stream"], ["aoa.toml", "model.roll", "90 deg"]),
         ([*AOA, "--set", "estimator.stats=8"], ["estimator.stats", "states"]),
         (["aoa", "gyro_only.csv", *AOA[2:]], ["gyro_only.csv", "accelerometer", "a1"]),
         (["aoa", "one_axis.csv", *AOA[2:]], ["one_axis.csv", "a2"]),

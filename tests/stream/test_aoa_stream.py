@@ -16,9 +16,11 @@ from inercal.aoa.record import to_record
 from inercal.aoa.settings import Attitude, Calibration, Disturbances, Oscillation, Zero
 from inercal.aoa.simulate import simulate
 from inercal.aoa.stated import by_fusion
+from inercal.aoa.task import measure
 from inercal.aoa.zero import with_zero
-from inercal.errors import InputError, RecordError
+from inercal.errors import InputError, RecordError, StudyError
 from inercal.estimate.checkpoint import fingerprint
+from inercal.estimate.exchange import save
 from inercal.records.read import read
 from inercal.records.write import write_record
 from inercal.stream.aoa import Aoa
@@ -143,6 +145,50 @@ def test_gyros_for_roll_and_yaw_are_used(tmp_path):
     text = recorded(tmp_path, settings, 4, flawed)
     assert "gyro_yaw" in text.splitlines()[0]
     assert live(text, settings) == of_file(text, settings, tmp_path)
+
+
+@pytest.mark.parametrize("block", [37, 10_000])
+def test_with_them_alpha_and_beta_are_those_of_the_tracked_roll(block, tmp_path, monkeypatch):
+    """To the digit, and off by degrees from those of the stated roll: the model rolls by 2 deg while it is measured."""
+    monkeypatch.setattr("inercal.aoa.filtered._BLOCK", block)
+    rolling = Disturbances(roll=Oscillation(2.0 * DEG, 6.0), yaw=Oscillation(1.0 * DEG, 8.0))
+    settings = study(motion=SHORT, disturbances=rolling, attitude=ROLLED)
+    text = recorded(tmp_path, settings, 4, flawed)
+    out = live(text, settings)
+    assert out == of_file(text, settings, tmp_path)
+    stated = settings.attitude.roll.value
+    theta, beta = np.radians(np.genfromtxt(out[50:150], delimiter=",")[:, [1, 6]]).T
+    assert np.nanmax(np.abs(np.arcsin(np.sin(beta) / np.sin(theta)) - stated)) > 1.0 * DEG
+    # killed and resumed too
+    saving = Saving(tmp_path / "state", 7)
+    given = [line for kill in (2, 130, 214, None) for line in live(text, settings, saving=saving, kill=kill)]
+    assert set(given) == set(out)
+
+
+def test_a_prior_from_a_turntable_puts_the_sensors_right_as_in_the_file(tmp_path):
+    """An axis that is off by 1 mrad: the stream corrects the study as the whole file does."""
+    table = replace(BASE, kind="two-tone", duration=20.0, sample_rate=500.0, mean=20.0 * DEG, amplitude=25.0 * DEG,
+                    frequency=0.2, second_amplitude=5.0 * DEG, second_frequency=1.3)  # fmt: skip
+    settings = study(motion=table)
+    off = replace(settings.layout, angle=settings.layout.angle + np.array([1e-3, -5e-4, 0.0]))
+    made = to_record(simulate(replace(settings, layout=off), np.random.default_rng(11)).recording, settings)
+    first = measure(made, settings)
+    save(first.estimate, tmp_path / "table.json")
+    second = replace(
+        settings, motion=SHORT, estimator=replace(settings.estimator, prior=str(tmp_path / "table.json"))
+    )
+    text = recorded(tmp_path, second, 12)
+    (tmp_path / "whole.csv").write_text(text)
+    whole = measure(read(tmp_path / "whole.csv"), second)
+    assert abs(whole.settings.layout.angle - settings.layout.angle).max() > 5e-4
+    write_record(angles_record(whole.recording, whole.angles, whole.settings), tmp_path / "angles.csv")
+    assert live(text, second) == (tmp_path / "angles.csv").read_text().splitlines()
+
+
+def test_a_model_on_its_side_is_refused():
+    on_side = Attitude(roll=parse_quantity("-90 deg", "angle", "roll"))
+    with pytest.raises(StudyError, match=r"model\.roll: found -90 deg, expected one further from \+-90 deg"):
+        live("t [s],a1 [g],a2 [g],a3 [g],gyro [deg/s]\n0,0,0,0,0\n", study(attitude=on_side))
 
 
 def test_the_zero_is_put_in_where_the_file_has_it(tmp_path):

@@ -35,7 +35,7 @@ def level_of(settings: AoaSettings) -> float:
     Raises
     ------
     StudyError
-        The model lies on its side: the paper's methods have nothing to go by.
+        The model lies on its side: sensors for pitch alone have nothing to go by.
     """
     roll = settings.attitude.roll
     level = 1.0 if roll is None else math.cos(roll.value)

@@ -1,4 +1,4 @@
-"""Rows that go on in time, and those that do not."""
+"""Rows that go on in time, and those that do not; gaps of time, and what is put on an even grid."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ Array = NDArray[np.float64]
 
 PATIENCE = 1000
 """Rows in a row without a later stamp that are left out; more are no accident."""
+
+
+_FINEST = 1.0 / 16.0
+"""Step of an even grid over the mean interval, at least."""
 
 
 def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.int64]:
@@ -34,3 +38,17 @@ def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.
             f"first at {t[row]:.10g} s, expected time to increase",
         )
     return taken
+
+
+def shortened(t: Array, longest: float) -> Array:
+    """Times ``t`` (n,) [s], increasing, with gaps above ``longest`` [s] made as long: a clock that jumped, or runs that
+    are hours apart, are not to be filled with hours of nothing.
+    """
+    excess = np.maximum(np.diff(t, prepend=t[:1]) - longest, 0.0)
+    return t - np.cumsum(excess) if excess.any() else t
+
+
+def usual_step(t: Array) -> float:
+    """Median interval [s] of ``t`` (n,); where rows come in bursts it is at least a sixteenth of the mean one, so that
+    an even grid has no more than 16 n points."""
+    return max(float(np.median(np.diff(t))), _FINEST * float(t[-1] - t[0]) / len(t))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.arms import all_weights, centrifugal_arms
-from inercal.aoa.clock import later
+from inercal.aoa.clock import later, shortened, usual_step
 from inercal.aoa.layout import Layout
 from inercal.aoa.recording import Recording
 
@@ -102,7 +102,9 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     shown = shown + float(weights @ centrifugal_arms(layout)) * gyro**2
     if min(np.isfinite(shown).sum(), np.isfinite(gyro).sum()) < 2:
         return None
-    step = float(np.median(np.diff(t)))
+    # within a gap nothing counts, and beside it nothing of its other side
+    t = shortened(t, _REACH + 2 * (_BRIDGED + 1) * float(np.median(np.diff(t))))
+    step = usual_step(t)
     grid = np.arange(t[0], t[-1] + 0.5 * step, step)
     missing = np.interp(grid, t, (np.isnan(shown) | np.isnan(gyro)).astype(float)) > 0.5
     missing |= np.diff(t, append=np.inf)[np.searchsorted(t, grid, side="right") - 1] > _BRIDGED * step

@@ -10,6 +10,7 @@ is said. Noise is looked at on its own (`inercal.aoa.scatter`).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.scatter import misstated
 from inercal.aoa.settings import STATES, AoaSettings
-from inercal.aoa.unmodelled import FittedError, candidates, fitted
+from inercal.aoa.unmodelled import FittedError, candidates, fitted, likeliest
 from inercal.records.findings import Finding
 from inercal.units import STANDARD_GRAVITY
 
@@ -34,6 +35,9 @@ _WORTH = 0.5
 _MOST = 3
 """Errors that are looked for, one after the other."""
 
+_TRIED = 8
+"""Errors that are fitted to the end each time."""
+
 _SHOWN = 3
 
 #: number of states -> what those with so many have beside the ones with fewer
@@ -45,9 +49,15 @@ _BESIDE = {
 
 
 def diagnose(
-    recording: Recording, settings: AoaSettings, problem: Problem, filtered: Filtered
+    recording: Recording,
+    settings: AoaSettings,
+    problem: Problem,
+    filtered: Filtered,
+    gross: Sequence[Finding] | None = None,
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where it is implausible as a whole.
+
+    ``gross`` is what `inercal.aoa.plausibility.implausible` said, where it was asked already.
 
     Codes are ``excess_scatter``, ``low_scatter``, ``unmodelled``, ``site_suspect``, ``prior_suspect`` and, where no one
     error explains what the sensors say, ``contradiction``.
@@ -55,7 +65,7 @@ def diagnose(
     part = stretch(recording)
     noise, fair = misstated(part, settings)
     now = judge(part, fair)
-    if now.misfit > SOUND and implausible(recording, settings):
+    if now.misfit > SOUND and (implausible(recording, settings) if gross is None else gross):
         return []
     if now.fits:
         return [*noise, *_too_small(part, fair)]
@@ -63,16 +73,26 @@ def diagnose(
 
 
 def _too_fast(part: Recording, settings: AoaSettings, now: Judged) -> list[Finding]:
-    """``unmodelled``: a motion livelier than the study's snap allows."""
+    """``unmodelled``: a motion livelier than the study's snap allows, which some sensor shows."""
+    if now.white:
+        return []
     for factor in (1e2, 1e4):
-        snap = factor * settings.estimator.snap
-        livelier = replace(settings, estimator=replace(settings.estimator, snap=snap))
-        then = judge(part, livelier)
+        snap = factor * settings.estimator.density
+        then = judge(part, _livelier(settings, snap))
         if (then.fits or then.misfit <= SOUND) and then.misfit < (1.0 - _WORTH) * now.misfit:
-            text = f"the model moves faster than a snap of {settings.estimator.snap:.3g} rad^2/s^7 lets it"
-            said = f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]'
-            return [Finding("unmodelled", said)]
+            return [_of_snap(settings, snap)]
     return []
+
+
+def _livelier(settings: AoaSettings, snap: float) -> AoaSettings:
+    """A study with another snap."""
+    return replace(settings, estimator=replace(settings.estimator, snap=snap))
+
+
+def _of_snap(settings: AoaSettings, snap: float) -> Finding:
+    """``unmodelled``: a larger snap makes a recording fit."""
+    text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
+    return Finding("unmodelled", f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]')
 
 
 def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
@@ -81,6 +101,10 @@ def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
     larger = [states for states in STATES if states > stated]
     if not larger or judge(part, settings, stated).fits:
         return []
+    # of more states more snap is usual
+    usual = replace(settings.estimator, states=19).density
+    if judge(part, _livelier(settings, usual), stated).fits:
+        return [_of_snap(settings, usual)]
     enough = next((states for states in larger if judge(part, settings, states).fits), 19)
     at_least = "" if enough == 19 else f" ({enough} at least)"
     text = (
@@ -93,8 +117,10 @@ def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
 def _errors(part: Recording, settings: AoaSettings, now: Judged) -> list[Finding]:
     """Constant errors that explain what is left over, one after the other."""
     findings: list[Finding] = []
+    as_it_is = part, settings, now
     while not now.fits and len(findings) < _MOST:
-        tried = [fitted(each, part, settings) for each in candidates(part, settings, now.theta)]
+        likely = likeliest(candidates(part, settings, now.theta), part, settings, _TRIED)
+        tried = [fitted(each, part, settings) for each in likely]
         found = sorted((each for each in tried if each is not None), key=lambda each: each.judged.misfit)
         if not found or found[0].judged.misfit > (1.0 - _WORTH) * now.misfit:
             break
@@ -103,9 +129,8 @@ def _errors(part: Recording, settings: AoaSettings, now: Judged) -> list[Finding
         findings.append(_in_words(best, alike, settings))
         part, settings = best.error.taken_out(part, settings, best.value)
         now = best.judged
-    if now.fits or now.misfit <= SOUND:
-        return findings
-    return [*findings, _contradiction(part, settings, now)]
+    # what does not make the recording fit is no advice
+    return findings if now.fits or now.misfit <= SOUND else [_contradiction(*as_it_is)]
 
 
 def _in_words(best: FittedError, alike: list[FittedError], settings: AoaSettings) -> Finding:

@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.delay import aligned, relative_delay
+from inercal.aoa.judged import judge, rms
 from inercal.aoa.layout import AXES
 from inercal.aoa.recording import Recording
+from inercal.aoa.scatter import scatter
 from inercal.aoa.settings import AoaSettings
 from inercal.records.findings import Finding
 from inercal.units import STANDARD_GRAVITY
@@ -46,7 +48,23 @@ _GYRO_UNITS = {
     1.0 / 3600.0: ("deg/h", "deg/s"),
     3600.0: ("deg/s", "deg/h"),
 }
-_LENGTHS = {1e-3: ("mm", "m"), 1e3: ("m", "mm")}
+_LENGTHS = {
+    1e-3: ("mm", "m"),
+    1e3: ("m", "mm"),
+    1e-2: ("cm", "m"),
+    1e2: ("m", "cm"),
+    1e-1: ("mm", "cm"),
+    1e1: ("cm", "mm"),
+}
+
+_STILL = 5.0
+"""Times its noise by which a gyro may wander where the model does not move."""
+
+_FEWEST = 100
+"""Rows by which a gyro is held to accelerometers."""
+
+_ARM, _PLAIN = 0.1, 0.02 * STANDARD_GRAVITY
+"""The lever arm [m] of a model at least, and accelerations [m/s^2] from which it shows plainly."""
 
 _LONGEST, _SHORTEST = 3.0, 0.01
 """Lever arms [m] between which the largest of a model is."""
@@ -65,15 +83,40 @@ class Fault:
 def faults(recording: Recording, settings: AoaSettings) -> Iterator[Fault]:
     """All faults that the sensors of a recording may have."""
     there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
+    shown = _shown(recording, settings)
     if np.isfinite(recording.gyro).any():
-        yield from _of_gyro()
-        yield from _of_clock(recording, settings)
+        # at rest a gyro tells of noise alone, which is of no sign and unit
+        if rms(shown) > settings.noise.gyro:
+            yield from _of_gyro()
+        yield from _of_clock(recording, settings, shown)
     if recording.spatial:
         yield from _of_turns()
     yield from _reversed(there, settings)
     yield from _orders(there, settings)
     yield from _units(there, settings)
-    yield from _positions(there, settings)
+    # of steady motion positions show no more than small errors of the sensors do
+    arm = max(float(np.abs(settings.layout.r).max()), _ARM)
+    if arm * rms(np.gradient(shown, recording.t)) > _PLAIN:
+        yield from _positions(there, settings)
+
+
+def _shown(recording: Recording, settings: AoaSettings) -> Array:
+    """Rate (n,) [rad/s] that the accelerometers show."""
+    return judge(replace(recording, gyro=np.full_like(recording.gyro, np.nan)), settings).rate
+
+
+def _follows(recording: Recording, shown: Array, stated: float) -> bool:
+    """True where a gyro explains half of the mean square of the rate that accelerometers show, beside its bias and
+    noise, or where there is hardly any rate; ``stated`` noise."""
+    gyro = recording.gyro
+    known = np.isfinite(gyro) & np.isfinite(shown)
+    known[: len(known) // 10] = False
+    if known.sum() < _FEWEST:
+        return False
+    told = scatter(recording.t[known], gyro[known])
+    noise = stated if told is None else told.size
+    left = float(np.var(gyro[known] - shown[known])) - noise**2
+    return left < 0.5 * max(float(np.var(shown[known])), (_STILL * noise) ** 2)
 
 
 def _of_gyro() -> Iterator[Fault]:
@@ -89,7 +132,7 @@ def _of_gyro() -> Iterator[Fault]:
         yield Fault(Finding("unit_suspect", text), times(factor))
 
 
-def _of_clock(recording: Recording, settings: AoaSettings) -> Iterator[Fault]:
+def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Fault]:
     """A gyro that is late, or one that tells of something else than pitch."""
     if settings.timing.gyro_delay is not None:
         found = relative_delay(recording, settings.layout)
@@ -102,6 +145,8 @@ def _of_clock(recording: Recording, settings: AoaSettings) -> Iterator[Fault]:
                 f'gyro_delay = "{value}" or "estimate" under [timing]'
             )
             yield Fault(Finding("command_shift", text), lambda r, s: (aligned(r, shift), s))
+    if _follows(recording, shown, settings.noise.gyro):
+        return
     text = (
         "gyro does not tell of the pitch that the accelerometers show: it may look along another axis, or be another "
         "channel or on another clock"
@@ -211,7 +256,11 @@ def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
 
     example = int(np.argmax(np.abs(layout.r)))
     for factor, (looks, taken) in _LENGTHS.items():
-        if _SHORTEST < abs(layout.r[example]) < _LONGEST:
+        likely, then_likely = (
+            _SHORTEST < abs(r) < _LONGEST for r in (layout.r[example], factor * layout.r[example])
+        )
+        # mm and cm are both likely
+        if not then_likely or (likely and factor not in (1e-1, 1e1)):
             continue
         now, then = f"{layout.r[example]:g} m", f"{factor * layout.r[example]:g} m"
         text = (

@@ -122,7 +122,8 @@ def _close_up(seen: Measurement) -> list[Picture]:
     t, angles = seen.recording.t, seen.angles
     if not t[-1] - t[0] > 4.0 * _CLOSE or not np.isfinite(angles.theta).any():
         return []
-    edges = np.searchsorted(t, np.arange(t[0] + SETTLED, t[-1] - _CLOSE, _CLOSE))
+    place = np.floor((t - t[0] - SETTLED) / _CLOSE)
+    edges = np.flatnonzero((np.diff(place, prepend=-1.0) > 0.0) & (place >= 0.0))
     theta = np.degrees(angles.theta)
     spans = [float(np.ptp(known(theta[a:b]))) if len(known(theta[a:b])) else 0.0 for a, b in pairwise(edges)]
     if not spans:
@@ -327,7 +328,7 @@ def _flexure(seen: Measurement, found: Filtered, settings: AoaSettings, marks: M
             "Specific force of the model's vibration on its sting, as the fusion estimates it beside the pitch, with "
             "bands of ± two standard uncertainties; dashes: ± two standard deviations of the prior. Within its band "
             "there is none to be seen. Beyond the dashes the prior is too small, and so is the uncertainty of theta; "
-            f"even where they hold it can be too small by up to 2.5 times while the sting vibrates.{marks.words}",
+            f"even where they hold it can be too small by some 20 % while the sting vibrates.{marks.words}",
             found.kept_t,
             panels,
             marks,

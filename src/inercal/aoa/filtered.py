@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.clock import later
-from inercal.aoa.fusion import State, advance, initial
+from inercal.aoa.fusion import Start, State, Trace, advance, initial
+from inercal.aoa.model import ROLL
 from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.recursion import OUTPUTS
@@ -22,6 +23,9 @@ SETTLED = 2.0
 
 KEPT = 2000
 """Rows, about, of which all states are kept for pictures."""
+
+_BLOCK = 10_000
+"""Rows of which all states are there at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +40,8 @@ class Filtered:
     innovations : (n, N + 1)
         Of accelerometers and gyro, of the causal filter, each over its standard deviation before the gate; NaN where
         not measured.
+    roll, roll_u : (n,) or None
+        Roll and its standard uncertainty [rad] at each row of the causal filter, where it is estimated.
     kept_t : (k,) s
         Times at which all states were kept, ``states`` (k, m) and their standard deviations ``states_u`` (k, m), in the
         order of the problem's names; causal or smoothed as the angles.
@@ -63,6 +69,8 @@ class Filtered:
     starts: tuple[int, ...]
     smoothed: bool
     seconds: float
+    roll: Array | None = None
+    roll_u: Array | None = None
 
 
 def estimate(recording: Recording, problem: Problem, smoothed: bool = False, where: object = "t") -> Filtered:
@@ -77,8 +85,12 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
     taken = later(recording.t, where=where)
     t, rows = recording.t[taken], recording.rows[taken]
     every = max(1, len(t) // KEPT)
-    kept = np.full(((len(t) + every - 1) // every, 2 * problem.size), np.nan)
-    state, trace = advance(initial(problem), problem, t, rows, kept, every, last=True)
+    if problem.spatial and not smoothed:
+        state, trace, kept, rolls = _with_roll(problem, t, rows, every)
+    else:
+        rolls = None
+        kept = np.full(((len(t) + every - 1) // every, 2 * problem.size), np.nan)
+        state, trace = advance(initial(problem), problem, t, rows, kept, every, last=True)
     angles = trace.out[:, :OUTPUTS]
     if smoothed:
         kept[:] = np.nan
@@ -86,6 +98,9 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
     n = len(recording.t)
     told, innovations = np.full((n, OUTPUTS), np.nan), np.full((n, problem.count + 1), np.nan)
     told[taken], innovations[taken] = angles, trace.out[:, OUTPUTS:]
+    roll = np.full((n, 2), np.nan)
+    if rolls is not None:
+        roll[taken] = rolls
     seconds = time.perf_counter() - clock
     judged = innovations[taken][t - t[0] >= SETTLED] if len(t) else innovations
     squared = np.square(judged[np.isfinite(judged)])
@@ -105,4 +120,32 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
         starts=tuple(int(taken[each.row]) for each in trace.starts),
         smoothed=smoothed,
         seconds=seconds,
+        roll=None if rolls is None else roll[:, 0],
+        roll_u=None if rolls is None else roll[:, 1],
     )
+
+
+def roll_of(problem: Problem, kept: Array) -> Array:
+    """Roll, in (-pi, pi], and its standard uncertainty (k, 2) [rad] from kept states (k, 2 m)."""
+    k = int(problem.places[ROLL])
+    return np.column_stack([np.pi - np.remainder(np.pi - kept[:, k], 2.0 * np.pi), kept[:, problem.size + k]])
+
+
+def _with_roll(problem: Problem, t: Array, rows: Array, every: int) -> tuple[State, Trace, Array, Array]:
+    """The causal filter's state and trace, states kept at each ``every``-th row, and roll (n, 2) at each.
+
+    All states of all rows would be many: they are there for some rows at a time.
+    """
+    state, done = initial(problem), 0
+    starts: list[Start] = []
+    parts = []
+    for a in range(0, max(1, len(t)), _BLOCK):
+        b, held = min(a + _BLOCK, len(t)), len(state.held)
+        states = np.full((held + b - a, 2 * problem.size), np.nan)
+        state, trace = advance(state, problem, t[a:b], rows[a:b], states, last=b == len(t))
+        told = len(trace.out)
+        starts += [each._replace(row=each.row + done) for each in trace.starts]
+        parts.append((trace.out, states[-done % every : told : every], roll_of(problem, states[:told])))
+        done += told
+    out, kept, rolls = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return state, Trace(out, tuple(starts)), kept, rolls

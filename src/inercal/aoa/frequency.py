@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.arms import all_weights
+from inercal.aoa.clock import shortened
 from inercal.aoa.layout import Layout
 
 Array = NDArray[np.float64]
@@ -64,6 +65,7 @@ def oscillation_frequency(t: Array, acc: Array, gyro: Array, layout: Layout) -> 
     if weights is None or len(t) < 2:
         return found
     usual = round(float(np.median(np.diff(t[: _FIRST + 1]))), 9)
+    t = shortened(t, 2.0 * WINDOW)  # no window reaches over such a gap
     width = usual * max(1, round(_FINE / usual))
     used = np.flatnonzero(weights)
     shaking = _averaged(t, acc[:, used] @ weights[used], width)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,13 +33,17 @@ WHITE = 0.53
 _LARGE = 0.75
 _FAR = 1.5
 
+_BY_MOTION = ("dr_", "zo_", "k_g", "tau_g")
+"""Coefficients that only motion shows; at rest they follow noise, and where they end says nothing."""
+
 
 @dataclass(frozen=True, eq=False)
 class Judged:
     """What the fusion found in a stretch.
 
     ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` how far
-    each coefficient ended from its prior, in standard deviations of it, by name; ``misfit`` of all in one number.
+    each coefficient ended from its prior, in standard deviations of it, by name, without those that only motion shows
+    where there is none; ``misfit`` of all in one number.
     """
 
     innovations: Array
@@ -61,14 +66,19 @@ class Judged:
         return float(self.by_sensor.sum() + silent + np.log1p(self._far**2).sum())
 
     @property
+    def white(self) -> bool:
+        """True where the innovations of no sensor are larger than its noise."""
+        return bool(self.by_sensor.max() < _LARGE)
+
+    @property
     def fits(self) -> bool:
         """True where no sensor and no coefficient is beyond what its noise and its prior explain."""
-        return bool(self.by_sensor.max() < _LARGE and np.abs(self._far).max() < _FAR)
+        return bool(self.white and np.abs(self._far).max() < _FAR)
 
     @property
     def _far(self) -> Array:
         """How far the coefficients are off, over what is expected at most."""
-        return np.array([v / (WIDE_SCALE if k == "k_g" else WIDE) for k, v in self.off.items()])
+        return np.array([0.0, *(v / (WIDE_SCALE if k == "k_g" else WIDE) for k, v in self.off.items())])
 
 
 def _logarithm(v: Array) -> float:
@@ -124,7 +134,17 @@ def judge(
         at = [*posed.nuisances.values()]
         off = (state.x[at] - posed.mean[at]) / np.sqrt(np.diag(posed.covariance)[at])
     told = trace.out
+    still = rms(told[:, 2]) < settings.noise.gyro
     named = {
-        name: float(np.nan_to_num(each, nan=1e6)) for name, each in zip(posed.nuisances, off, strict=True)
+        name: float(np.nan_to_num(each, nan=1e6))
+        for name, each in zip(posed.nuisances, off, strict=True)
+        if not (still and name.startswith(_BY_MOTION))
     }
     return Judged(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)
+
+
+def rms(rate: Array) -> float:
+    """Root mean square of a rate (m,) [rad/s] once a filter has settled; infinite where it is not known."""
+    settled = rate[len(rate) // 10 :]
+    settled = settled[np.isfinite(settled)]
+    return math.sqrt(float(np.mean(np.square(settled)))) if settled.size else math.inf

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa import fusion, recursion
 from inercal.aoa.clock import PATIENCE, later
+from inercal.aoa.filtered import roll_of
 from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.recursion import BESIDE, OUTPUTS
@@ -37,10 +38,12 @@ class LiveState(NamedTuple):
 
 class Told(NamedTuple):
     """What is said of k rows: their stamps ``t`` (k,) [s], and ``out`` (k, `OUTPUTS` + N + 1) as of
-    `inercal.aoa.recursion.advance`, NaN where nothing is known."""
+    `inercal.aoa.recursion.advance`, NaN where nothing is known; ``turned`` (k, 2) roll and its standard uncertainty
+    [rad] where it is estimated."""
 
     t: Array
     out: Array
+    turned: Array | None = None
 
     @property
     def theta(self) -> Array:
@@ -61,6 +64,16 @@ class Told(NamedTuple):
     def rate_u(self) -> Array:
         """(k,) rad/s, the standard uncertainty of the rate."""
         return self.out[:, 3]
+
+    @property
+    def roll(self) -> Array | None:
+        """(k,) rad."""
+        return None if self.turned is None else self.turned[:, 0]
+
+    @property
+    def roll_u(self) -> Array | None:
+        """(k,) rad, the standard uncertainty of the roll."""
+        return None if self.turned is None else self.turned[:, 1]
 
     @property
     def innovations(self) -> Array:
@@ -92,7 +105,7 @@ class Live:
         self._fusion, self._waiting, self._late = _apart(known.fusion), known.waiting, known.late
         self._dt, self._row = np.empty(1), np.empty((1, problem.count + BESIDE))
         self._out = np.empty((1, OUTPUTS + problem.count + 1))
-        self._kept = np.empty((0, 2 * problem.size))
+        self._kept = np.empty((int(problem.spatial), 2 * problem.size))
 
     @property
     def state(self) -> LiveState:
@@ -144,9 +157,9 @@ class Live:
         if not done:  # theta is lost
             self._fusion = state._replace(started=False, held=np.column_stack([stamp, row]))
             self._waiting = stamp
-            return Told(stamp[:0], self._out[:0])
+            return Told(stamp[:0], self._out[:0], self._turned(self._kept[:0]))
         self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held)
-        return Told(stamp, self._out.copy())
+        return Told(stamp, self._out.copy(), self._turned(self._kept))
 
     def feed_block(self, recording: Recording) -> Told:
         """Go on by the rows of a recording, any number of them, as `feed` does."""
@@ -163,13 +176,22 @@ class Live:
         taken = later(waiting, before.t, self._where)
         self._late = self._late_rows(waiting, taken)
         new = taken[len(before.held) :] - len(self._waiting)
-        self._fusion, trace = fusion.advance(before, self._problem, t[new], rows[new], last=last)
+        spatial = self._problem.spatial
+        kept = np.full((spatial * (len(before.held) + len(new)), 2 * self._problem.size), np.nan)
+        self._fusion, trace = fusion.advance(before, self._problem, t[new], rows[new], kept, last=last)
         done = len(trace.out)
         answered = int(taken[done]) if done < len(taken) else len(waiting)
         out = np.full((answered, trace.out.shape[1]), np.nan)
         out[taken[:done]] = trace.out
+        states = np.full((answered, kept.shape[1]), np.nan)
+        if spatial:
+            states[taken[:done]] = kept[:done]
         self._waiting = waiting[answered:]
-        return Told(waiting[:answered], out)
+        return Told(waiting[:answered], out, self._turned(states))
+
+    def _turned(self, states: Array) -> Array | None:
+        """Roll and its standard uncertainty (k, 2) of states (k, 2 n); None where it is not estimated."""
+        return roll_of(self._problem, states) if self._problem.spatial else None
 
     def _late_rows(self, waiting: Array, taken: NDArray[np.int64]) -> int:
         """How many of the last rows were not taken; raises `RecordError` where the clock was set back."""

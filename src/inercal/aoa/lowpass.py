@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.clock import usual_step
+
 Array = NDArray[np.float64]
 
 _UNEVEN = 0.05
 """Deviation of an interval from the usual one, relative to it, from which samples are put on an even grid before."""
+
+_FORGOTTEN = 10.0
+"""Periods of the cutoff after which the filter has forgotten what was: what is further apart is filtered apart."""
 
 
 def zero_phase(t: Array, values: Array, cutoff: float, order: int) -> Array:
@@ -20,10 +25,14 @@ def zero_phase(t: Array, values: Array, cutoff: float, order: int) -> Array:
     """
     from scipy.signal import butter, sosfiltfilt
 
+    cuts = np.flatnonzero(np.diff(t) > _FORGOTTEN / cutoff) + 1
+    if len(cuts):
+        parts = zip(np.split(t, cuts), np.split(values, cuts), strict=True)
+        return np.concatenate([zero_phase(*part, cutoff, order) for part in parts])
     known = np.isfinite(values)
     if known.sum() < 2:
         return values
-    step = float(np.median(np.diff(t)))
+    step = usual_step(t)
     if 2.0 * cutoff * step >= 1.0:
         return values
     even = bool((np.abs(np.diff(t) - step) < _UNEVEN * step).all())

@@ -51,6 +51,9 @@ BIASES = 5
 WIDEST = 11
 """Most entries that a row of the model has."""
 
+_USUAL = 1e-3
+"""Interval [s] for which a snap is stated."""
+
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0)
 
 _NEAR_VERTICAL = 1e-4
@@ -153,14 +156,16 @@ def transition(dt: float, places: Indices, constants: Array, F: Array, Q: Array)
     """How the states that move go on in ``dt`` [s]: theta to jerk under white snap, resonators under white noise.
 
     ``F`` (d, d) receives their transition, ``Q`` (d, d) its noise. Exact (Van Loan's integrals in closed form). Those
-    of a state of roll depend on the motion: `turning`.
+    of a state of roll depend on the motion: `turning`. Above 1 kHz the snap grows with the square of the rate: each row
+    is linearised anew, and the more rows there are the more certain linearisation alone would make the filter.
     """
     d = places[MOVING]
     for i in range(d):
         for j in range(d):
             F[i, j], Q[i, j] = 0.0, 0.0
         F[i, i] = 1.0
-    noise = constants[SNAP] * dt
+    lively = max(1.0, _USUAL / dt) if dt > 0.0 else 1.0
+    noise = constants[SNAP] * lively * lively * dt
     for i in range(4):
         power = noise
         for j in range(4):

@@ -19,7 +19,7 @@ from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.aoa.sources import parts
-from inercal.aoa.stated import by_fusion
+from inercal.aoa.stated import by_fusion, gravity_u
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
@@ -143,6 +143,9 @@ def assemble(
     result["posterior"] = {
         name: {"value": value, "u": own, "prior": prior} for name, value, own, prior in rows
     }
+    if split.by_gravity is not None:
+        slopes = dict(zip(names, split.by_gravity.tolist(), strict=True))
+        result["gravity"] = {"value": settings.site.gravity, "u": gravity_u(settings), "slopes": slopes}
     # of numbers that are not to be used, more would be noise
     at_prior = verdict.left_at_prior(names, np.sqrt(np.diag(P)) / before) if status is Status.OK else None
     return Estimate(

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inercal.aoa.clock import later
 from inercal.aoa.faults import Fault, faults
-from inercal.aoa.judged import Judged, judge, stretch
+from inercal.aoa.judged import Judged, judge, of_rows, stretch
 from inercal.aoa.recording import Recording
 from inercal.aoa.scatter import misstated
 from inercal.aoa.settings import AoaSettings
@@ -32,8 +33,11 @@ _BY = 0.5
 _ALIKE = 0.1
 """Difference of misfits of two faults of which neither is likelier."""
 
-_TRIED = 4
+_TRIED = 3
 """Faults that are looked at together with a second one."""
+
+_TWICE = 20.0
+"""Misfit from which two faults at once are looked for."""
 
 _ON_ITS_BACK = -0.1
 """Cosine of theta below which the model lies on its back."""
@@ -51,7 +55,8 @@ class _Tried:
 def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
     """What does not fit together, with what to write instead; empty for a sound recording.
 
-    Codes are ``sign_suspect``, ``channel_swap`` and ``unit_suspect``. What is left to say of smaller errors is said
+    Codes are ``sign_suspect``, ``channel_swap``, ``unit_suspect`` and ``command_shift``; ``not_stated`` of a model on
+    its back, which may be as it is. What is left to say of smaller errors is said
     after the filtering (`inercal.aoa.diagnosis`).
 
     Raises
@@ -62,7 +67,7 @@ def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
     part = stretch(recording)
     now = judge(part, settings)
     if now.misfit <= SOUND:
-        return _on_its_back(now)
+        return _on_its_back(recording, settings) if _upright(now) <= _ON_ITS_BACK else []
     return [_either(each) for each in _explaining([()], part, settings, now)]
 
 
@@ -89,10 +94,14 @@ def _explaining(
         first = alike[0].faults
         last = [one.faults[-1].finding for one in alike if one.faults[:-1] == first[:-1]]
         return [*([each.finding] for each in first[:-1]), last]
-    if any(given):
+    if any(given) or now.misfit < _TWICE:
         return []
     tried.sort(key=lambda one: one.misfit)
-    better = [one.faults for one in tried[:_TRIED] if one.misfit < now.misfit and not one.faults[-1].last]
+    better = [
+        one.faults
+        for one in tried[:_TRIED]
+        if one.misfit < (1.0 - _BY) * now.misfit and not one.faults[-1].last
+    ]
     seconds = _without_gyro(part, settings) or better
     return _explaining(seconds, part, settings, now) if seconds else []
 
@@ -134,8 +143,9 @@ def _upright(judged: Judged) -> float:
     return float(np.quantile(cosine, 0.99)) if cosine.size else 1.0
 
 
-def _on_its_back(now: Judged) -> list[Finding]:
-    """``channel_swap``: a model that seems to fly on its back."""
+def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
+    """``not_stated``: a model that seems to fly on its back all the time, which no sensor contradicts."""
+    now = judge(of_rows(recording, later(recording.t)), settings, 8)
     if _upright(now) > _ON_ITS_BACK:
         return []
     middle = math.degrees(float(np.nanmedian(np.remainder(now.theta, 2.0 * math.pi))))
@@ -143,4 +153,4 @@ def _on_its_back(now: Judged) -> list[Finding]:
         f"theta is about {middle:.0f} deg, the model on its back: exchange or reverse the accelerometers across it, or "
         'state roll = "180 deg" under [model] if it was mounted so'
     )
-    return [Finding("channel_swap", text)]
+    return [Finding("not_stated", text)]

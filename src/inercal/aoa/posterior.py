@@ -8,15 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.aoa.corrections import corrected as put_right
 from inercal.aoa.corrections import is_verified, prior_of
 from inercal.aoa.outcome import COMMAND, geometry
 from inercal.aoa.settings import AoaSettings
+from inercal.aoa.stated import carried, gravity_u
 from inercal.errors import StudyError
 from inercal.estimate.exchange import load as load_estimate
 from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
+
+Array = NDArray[np.float64]
 
 WHERE = "estimator.prior"
 
@@ -53,13 +57,21 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
     names, x, P = (
         prior_of(earlier, settings)
         if is_verified(earlier)
-        else (earlier.names, earlier.values, earlier.covariance)
+        else (earlier.names, earlier.values, _own(earlier, settings))
     )
     if not (np.isfinite(x).all() and np.isfinite(P).all()):
         raise StudyError(WHERE, f"{path} holds coefficients without numbers, expected all of them")
     values = dict(zip(names, x.tolist(), strict=True))
     covariances = {(a, b): float(P[i, j]) for i, a in enumerate(names) for j, b in enumerate(names)}
     return values, covariances
+
+
+def _own(earlier: Estimate, settings: AoaSettings) -> Array:
+    """Covariance (p, p) without the part of gravity, which `inercal.aoa.stated` carries on from run to run: the error
+    of all of them is one."""
+    slopes = carried(earlier, settings)
+    shift = gravity_u(settings) * np.array([slopes.get(name, 0.0) for name in earlier.names])
+    return np.asarray(earlier.covariance - np.outer(shift, shift))
 
 
 def corrected(path: str | Path, settings: AoaSettings) -> AoaSettings:

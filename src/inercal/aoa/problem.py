@@ -133,7 +133,7 @@ def _constants(settings: AoaSettings) -> Array:
     noise, timing, roll = settings.noise, settings.timing, settings.attitude.roll
     known = {
         model.GRAVITY: settings.site.gravity,
-        model.SNAP: settings.estimator.snap,
+        model.SNAP: settings.estimator.density,
         model.NOISE: noise.accelerometer**2,
         model.GYRO_NOISE: noise.gyro**2,
         model.TURN_NOISE: noise.gyro**2,

@@ -178,7 +178,11 @@ def _lost(column: Column, settings: AoaSettings, values: dict[str, Array]) -> tu
     out |= at_range(indication(column, read), values[name], how)
     noise = settings.noise.gyro if name in GYROS else settings.noise.accelerometer
     others = [other for key, other in values.items() if key != name and len(other) == len(read)]
-    return out, _stuck(read, noise / abs(how.scale * column.unit.factor), others) & ~out
+    stuck = _stuck(read, noise / abs(how.scale * column.unit.factor), others)
+    # one that stands still at an extreme has met its range
+    known = read[np.isfinite(read)]
+    out |= stuck & ((read == known.max()) | (read == known.min()))
+    return out, stuck & ~out
 
 
 def _stuck(read: Array, noise: float, others: list[Array]) -> Flags:

@@ -1,6 +1,7 @@
 """Roll of a model from row to row, where gyros for roll and yaw track it.
 
-The fusion keeps all its states at some thousand times only. Between them the roll follows what the gyros read,
+The causal fusion tells it at each row. Smoothed, its states are kept at some thousand times only, and between them the
+roll follows what the gyros read,
 
     phi' = p + (w sin phi - y cos phi) tan theta
 
@@ -27,10 +28,12 @@ _STEEP = 50.0
 def tracked(recording: Recording, problem: Problem, filtered: Filtered) -> tuple[Array, Array] | None:
     """Roll (n,) and its standard uncertainty (n,) [rad] at each row, NaN where theta is; None where it is not tracked.
 
-    The uncertainty is interpolated between the kept times.
+    Of smoothed angles the uncertainty is interpolated between the kept times.
     """
     if not problem.spatial:
         return None
+    if filtered.roll is not None and filtered.roll_u is not None:
+        return filtered.roll, filtered.roll_u
     k = problem.names.index("phi")
     told = np.isfinite(filtered.states_u[:, k])
     roll, roll_u = np.full((2, len(recording.t)), np.nan)

@@ -22,6 +22,12 @@ _STEADY = 0.5
 _MORE, _LESS, _NONE = 2.0, 0.5, 1e-3
 """Ratios to what is stated from which it is worth a word, and below which there is none, as in numbers made up."""
 
+_EVEN = 0.02
+"""Part of an interval by which others may differ."""
+
+_FEWEST = 20
+"""Differences from which noise is told."""
+
 _SPARSE = 4
 """Rows of which one is taken to see whether noise that is small from row to row is so over some rows too."""
 
@@ -36,25 +42,39 @@ class Scatter:
     sparse: float
 
 
-def scatter(values: Array) -> Scatter:
-    """Noise of ``values`` (n,).
+def scatter(t: Array, values: Array) -> Scatter | None:
+    """Noise of ``values`` (n,) at ``t`` (n,) [s]; None where hardly any come at even intervals.
 
     White noise shows alike in all orders, motion below a quarter of the sample rate from one order to the next at most
     half in the square, so that s6^2 - (s5^2 - s6^2) is noise at least.
     """
-    sizes = _by_order(values)
+    sizes = _by_order(t, values)
+    if sizes is None:
+        return None
     least = 2.0 * sizes[-1] ** 2 - sizes[-2] ** 2
     certain = least > _STEADY * sizes[-1] ** 2
-    return Scatter(math.sqrt(least) if certain else min(sizes), certain, min(_by_order(values[::_SPARSE])))
+    sparse = _by_order(t[::_SPARSE], values[::_SPARSE]) or sizes
+    return Scatter(math.sqrt(least) if certain else min(sizes), certain, min(sparse))
 
 
-def _by_order(values: Array) -> list[float]:
-    """Noise by the median difference of each order, from the first; of white noise the same for all."""
-    known = values[np.isfinite(values)]
+def _by_order(t: Array, values: Array) -> list[float] | None:
+    """Noise by the median difference of each order, from the first; of white noise the same for all.
+
+    Differences of the last order are zero for motion alone where the intervals are alike, so others are left out.
+    """
+    there = np.isfinite(values)
+    known, step = values[there], np.diff(t[there])
+    even = (
+        np.abs(step - np.median(step)) < _EVEN * np.median(step) if len(step) else np.zeros(0, dtype=np.bool_)
+    )
+    runs = even
     found = []
     for order in range(1, _ORDER + 1):
         known = np.diff(known)
-        found.append(float(np.median(np.abs(known))) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
+        runs = even if order == 1 else runs[:-1] & even[order - 1 :]
+        if runs.sum() < _FEWEST:
+            return None
+        found.append(float(np.median(np.abs(known[runs]))) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
     return found
 
 
@@ -65,11 +85,8 @@ def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding
     groups = (("accelerometer", columns, noise.accelerometer), ("gyro", {"gyro": recording.gyro}, noise.gyro))
     findings = []
     for key, sensors, stated in groups:
-        seen = {
-            name: scatter(values)
-            for name, values in sensors.items()
-            if np.isfinite(values).sum() > 100 and stated > 0.0
-        }
+        told = {name: scatter(recording.t, values) for name, values in sensors.items() if stated > 0.0}
+        seen = {name: each for name, each in told.items() if each is not None}
         over = {name: each.size / stated for name, each in seen.items() if each.certain}
         under = {name: max(each.size, each.sparse) / stated for name, each in seen.items() if each.size > 0.0}
         if loud := [name for name, ratio in over.items() if ratio > _MORE]:

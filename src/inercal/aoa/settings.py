@@ -118,14 +118,20 @@ class Timing:
 @dataclass(frozen=True)
 class Estimator:
     """The fusion: number of ``states`` for three accelerometers, whether it smooths, and the posterior of an earlier
-    run as its ``prior``. ``snap`` [rad^2/s^7] the spectral density of the angle's fourth derivative, ``gate`` the
-    innovation squared over its variance from which it is held back."""
+    run as its ``prior``. ``snap`` [rad^2/s^7] the spectral density of the angle's fourth derivative, None where it is
+    not stated (`density`), ``gate`` the innovation squared over its variance from which it is held back."""
 
     states: States = 19
     smooth: bool = False
     prior: Path | None = None
-    snap: float = 1e7
+    snap: float | None = None
     gate: float = 25.0
+
+    @property
+    def density(self) -> float:
+        """``snap``, or where it is not stated 1e7, and 1e8 where flexure is estimated too: a livelier motion that the
+        model does not expect would be taken for errors of positions and of the gyro's scale, which multiply it."""
+        return (1e8 if self.states >= 15 else 1e7) if self.snap is None else self.snap
 
 
 @dataclass(frozen=True)

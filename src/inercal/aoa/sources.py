@@ -70,10 +70,13 @@ class Parts:
         With the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first 2 s.
     common : (p, p)
         Covariance of the coefficients by gravity and roll as they are stated: by what the same site and mounting share.
+    by_gravity : (p,) or None
+        Change of the coefficients per change of gravity [m/s^2]; None where that is known well enough.
     """
 
     budget: tuple[BudgetItem, ...]
     common: Array
+    by_gravity: Array | None = None
 
 
 def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool) -> Parts:
@@ -88,7 +91,7 @@ def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothe
     changed = [_enlarged(problem, rows, each) for each in of]
     # neither gravity nor a stated roll is a state of the filter: their errors move the estimate
     changes = leans(settings, problem.spatial)
-    moved = [(leaning(problem, each), rows) for each in changes]
+    moved = [(leaning(problem, each, settings), rows) for each in changes]
     with ThreadPoolExecutor() as pool:
         runs = pool.map(lambda run: _run(run[0], t, run[1], smoothed), [(problem, rows), *changed, *moved])
         (angle, P, x, theta), *others = runs
@@ -97,10 +100,12 @@ def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothe
         slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
         found.append((source, np.maximum(slope, 0.0)))
     stated: list[tuple[Source, Array]] = []
+    by_gravity: Array | None = None
     for lean, (_, _, state, turned) in zip(changes, others[len(of) :], strict=True):
         apart = (turned - theta)[np.isfinite(turned - theta)]
         slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (state - x)[at]) / lean.step
         if lean.name == "gravity":
+            by_gravity = slope[1:]
             stated += [
                 (Source(each.source, "B", each.u, each.unit), slope * each.sensitivity * each.u)
                 for each in settings.site.inputs
@@ -112,7 +117,7 @@ def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothe
     common = np.zeros((len(at), len(at)))
     for _, shift in stated:
         common += np.outer(shift[1:], shift[1:])
-    return Parts(_items(found, (ANGLE, *problem.nuisances)), common)
+    return Parts(_items(found, (ANGLE, *problem.nuisances)), common, by_gravity)
 
 
 def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:

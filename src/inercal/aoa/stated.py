@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa import model
 from inercal.aoa.angles import Angles, of_fusion, stated_roll
+from inercal.aoa.corrections import is_verified
 from inercal.aoa.filtered import Filtered, estimate
 from inercal.aoa.methods import measure
 from inercal.aoa.problem import Problem
@@ -25,6 +26,8 @@ from inercal.aoa.recording import Recording
 from inercal.aoa.roll import tracked
 from inercal.aoa.settings import AoaSettings, Methods
 from inercal.aoa.zero import tare
+from inercal.estimate.exchange import load as load_estimate
+from inercal.estimate.result import Estimate
 
 Array = NDArray[np.float64]
 
@@ -58,11 +61,29 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     return tuple(found)
 
 
-def leaning(problem: Problem, lean: Lean) -> Problem:
-    """The problem of the fusion under a change."""
-    constants = problem.constants.copy()
+def leaning(problem: Problem, lean: Lean, settings: AoaSettings) -> Problem:
+    """The problem of the fusion under a change, which moves also what an earlier run found."""
+    constants, mean = problem.constants.copy(), problem.mean.copy()
     constants[[model.GRAVITY, model.ROLL_COSINE]] = lean.gravity, math.cos(lean.roll)
-    return replace(problem, constants=constants)
+    prior = settings.estimator.prior
+    if lean.name == "gravity" and prior is not None:
+        for name, slope in carried(load_estimate(prior), settings).items():
+            if name in problem.names:
+                mean[problem.names.index(name)] += slope * lean.step
+    return replace(problem, constants=constants, mean=mean)
+
+
+def carried(earlier: Estimate, settings: AoaSettings) -> dict[str, float]:
+    """By how much gravity [m/s^2] moved the coefficients [SI] of an earlier run of the fusion, by their names.
+
+    Empty where they were found with another gravity than that of the study, whose error is another, or without its
+    uncertainty, or from a reference angle.
+    """
+    known = earlier.result.get("gravity")
+    if known is None or is_verified(earlier):
+        return {}
+    same = zip((known["value"], known["u"]), (settings.site.gravity, gravity_u(settings)), strict=True)
+    return dict(known["slopes"]) if all(math.isclose(a, b, rel_tol=1e-9) for a, b in same) else {}
 
 
 def by_fusion(recording: Recording, settings: AoaSettings, problem: Problem, filtered: Filtered) -> Angles:
@@ -71,7 +92,9 @@ def by_fusion(recording: Recording, settings: AoaSettings, problem: Problem, fil
     if turned is not None:
         angles = replace(angles, roll=turned[0], roll_u=turned[1])
     return _with_stated(
-        angles, settings, lambda lean: estimate(recording, leaning(problem, lean), filtered.smoothed).theta
+        angles,
+        settings,
+        lambda lean: estimate(recording, leaning(problem, lean, settings), filtered.smoothed).theta,
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa import filtered, recursion, smoother
 from inercal.aoa.angles import Angles
+from inercal.aoa.arms import level_of
 from inercal.aoa.clock import later
 from inercal.aoa.delay import Delay, relative_delay
 from inercal.aoa.diagnosis import diagnose
@@ -78,7 +79,8 @@ def in_order(measurement: Measurement) -> Measurement:
     found = measurement.filtered
     if found is not None:
         starts = tuple(int(k) for k in np.searchsorted(taken, found.starts))
-        found = replace(rows(found, *motion, "acceleration", "innovations"), starts=starts)
+        cut = rows(found, *motion, "acceleration", "innovations", "roll", "roll_u")
+        found = replace(cut, starts=starts)
     kept = ("t", "acc", "gyro", "turns", "stated", "point", "trigger", "reference", "masked")
     return replace(
         measurement,
@@ -141,6 +143,8 @@ def measure(
     if prior is not None:
         posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
     recording = recording_of(record, settings)
+    if not recording.spatial:
+        level_of(settings)
     findings = implausible(recording, settings)
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)
@@ -151,7 +155,7 @@ def measure(
         found = filtered.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, found)
         progress("looking for faults")
-        findings = [*findings, *diagnose(zeroed, settings, of, found)]
+        findings = [*findings, *diagnose(zeroed, settings, of, found, findings)]
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)

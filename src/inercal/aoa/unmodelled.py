@@ -8,7 +8,7 @@ of two runs over the stretch that is judged.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from inercal.aoa.judged import Judged, judge
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import AoaSettings
+from inercal.units import Quantity, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -69,30 +70,55 @@ def candidates(recording: Recording, settings: AoaSettings, theta: Array) -> Ite
     yield Error("gravity", _gravity, 1e-4, 0.5)
     if not recording.spatial:
         yield Error("yaw", _yaw(theta), 1e-4, 100.0, 0.0)
-        yield Error("roll", _roll(theta), 1e-5, 0.1, 0.0)
+        yield Error("roll", _roll, 1e-4, 1.0, 0.0)
+
+
+def likeliest(errors: Iterable[Error], recording: Recording, settings: AoaSettings, most: int) -> list[Error]:
+    """Those ``most`` errors of which a first step of the fit promises to take away most."""
+    gated = _open(settings)
+    now = judge(recording, gated).innovations
+    ranked = [(_step(each, now, recording, gated, 0.0)[2], each) for each in errors]
+    ranked.sort(key=lambda one: -one[0])
+    return [each for gain, each in ranked[:most] if gain > 0.0]
 
 
 def fitted(error: Error, recording: Recording, settings: AoaSettings) -> FittedError | None:
     """The error's most likely value; None where it has none, or one that is not believed."""
-    open_gate = replace(settings, estimator=replace(settings.estimator, gate=1e12))
+    gated = _open(settings)
     value, u = 0.0, math.inf
     for _ in range(_ROUNDS):
-        now = judge(*error.taken_out(recording, open_gate, value)).innovations
-        then = judge(*error.taken_out(recording, open_gate, value + error.step)).innovations
-        with np.errstate(all="ignore"):
-            size = np.nanmedian(np.abs(now), axis=0)
-            used = np.isfinite(now) & np.isfinite(then) & (np.abs(now) < _WILD * size)
-            slope = np.where(used, then - now, 0.0) / error.step
-            power = float(np.square(slope).sum())
-            change = -float((slope * np.where(used, now, 0.0)).sum()) / power if power > 0.0 else math.nan
+        now = judge(*error.taken_out(recording, gated, value)).innovations
+        change, u, _ = _step(error, now, recording, gated, value)
         if not math.isfinite(change) or abs(value + change) > 2.0 * error.most:
             return None
-        value, u = value + change, 1.0 / math.sqrt(power)
+        value += change
         if abs(change) < _CLOSE * u:
             break
     if not error.least <= value or abs(value) > error.most:
         return None
     return FittedError(error, value, u, judge(*error.taken_out(recording, settings, value)))
+
+
+def _open(settings: AoaSettings) -> AoaSettings:
+    """A study without a gate."""
+    return replace(settings, estimator=replace(settings.estimator, gate=1e12))
+
+
+def _step(
+    error: Error, now: Array, recording: Recording, settings: AoaSettings, value: float
+) -> tuple[float, float, float]:
+    """Change of ``value`` that makes the innovations ``now`` least, its standard uncertainty, and how much it takes
+    away of their sum of squares; NaN, infinite and 0 where they do not depend on it."""
+    then = judge(*error.taken_out(recording, settings, value + error.step)).innovations
+    with np.errstate(all="ignore"):
+        size = np.nanmedian(np.abs(now), axis=0)
+        used = np.isfinite(now) & np.isfinite(then) & (np.abs(now) < _WILD * size)
+        slope = np.where(used, then - now, 0.0) / error.step
+        power = float(np.square(slope).sum())
+        along = float((slope * np.where(used, now, 0.0)).sum())
+    if not power > 0.0:
+        return math.nan, math.inf, 0.0
+    return -along / power, 1.0 / math.sqrt(power), along**2 / power
 
 
 def _axis(k: int) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
@@ -158,11 +184,9 @@ def _yaw(theta: Array) -> Callable[[Recording, AoaSettings, float], tuple[Record
     return taken_out
 
 
-def _roll(theta: Array) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
-    """Roll to and fro by the mean square ``value`` [rad^2]: f_z is less by half of that of g cos theta."""
-
-    def taken_out(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
-        less = 0.5 * value * settings.site.gravity * np.cos(theta)[:, None]
-        return replace(recording, acc=recording.acc - less * np.sin(settings.layout.angle)), settings
-
-    return taken_out
+def _roll(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+    """Roll of the mean square ``value`` [rad^2], all the time or to and fro: f_z is less by its mean cosine."""
+    stated = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
+    turned = math.acos(math.cos(stated) * math.cos(math.sqrt(max(value, 0.0))))
+    roll = Quantity(turned, 0.0, parse_unit("rad"), "")
+    return recording, replace(settings, attitude=replace(settings.attitude, roll=roll))

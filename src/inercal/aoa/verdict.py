@@ -41,6 +41,9 @@ _CAUSES = (
 )  # fmt: skip
 """Findings that explain innovations too large, the likeliest first."""
 
+_GROSS = frozenset(("unit_suspect", "channel_swap", "sign_suspect"))
+"""Faults for which the angle is another one."""
+
 _HARMLESS = frozenset(
     ("gap", "nan", "bad_row", "outlier", "saturation", "low_scatter", "at_prior", "gyro_missing")
 )
@@ -50,7 +53,12 @@ _HARMLESS = frozenset(
 def of_fusion(
     recording: Recording, filtered: Filtered, angles: Angles, said: Sequence[Finding]
 ) -> tuple[Status, str]:
-    """Status and sentence of what the fusion found; ``said`` all findings."""
+    """Status and sentence of what the fusion found; ``said`` all findings.
+
+    ``inconsistent`` where the mean NIS is beyond its limit, and also below it where sensors contradict each other so
+    grossly that a fault of sign, unit or order is named: resonators and gates take much of it up, and the angle is
+    wrong all the same.
+    """
     state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
     if 2 * known.sum() <= len(known):
         return Status.NOT_CONVERGED, _because(_missing(known), said)
@@ -59,6 +67,9 @@ def of_fusion(
     if mean > NIS_LIMIT:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {NIS_LIMIT:g}"
         return Status.INCONSISTENT, _because(text, said)
+    gross = [each for each in said if each.code in _GROSS and each not in recording.findings]
+    if gross:
+        return Status.INCONSISTENT, _because("the sensors contradict each other or the study", gross)
     lost = _lost(recording, filtered)
     if lost is not None:
         return Status.NOT_CONVERGED, _because(lost, said)
@@ -121,7 +132,7 @@ def shaken(problem: Problem, filtered: Filtered, settings: AoaSettings) -> Findi
         return None
     text = (
         f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms, {rms / noise:.2g} times their noise: u "
-        "of the angle may be too small, by up to 2.5 times"
+        "of the angle may be too small, by some 20 %"
     )
     return Finding("flexure", text)
 

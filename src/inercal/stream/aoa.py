@@ -17,11 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
+from inercal.aoa.arms import level_of
 from inercal.aoa.calibrated import at_range, check_axes, check_unit, indication
 from inercal.aoa.filtered import SETTLED
 from inercal.aoa.history import columns, rows
 from inercal.aoa.live import Live, LiveState, Told
 from inercal.aoa.model import GATE
+from inercal.aoa.posterior import corrected
 from inercal.aoa.posterior import load as load_posterior
 from inercal.aoa.problem import problem
 from inercal.aoa.reading import missing
@@ -112,12 +114,17 @@ class Aoa:
         every: float = 0.0,
         say: Callable[[Finding], None] = lambda _: None,
     ) -> None:
+        posterior = None
+        if (prior := settings.estimator.prior) is not None:
+            posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
         self._settings, self._every, self._say, self._where = settings, every, say, lines.where
         record, names = lines.record, settings.layout.names
         there = [name for name in names if name in record]
         check_axes(there, record.columns, settings.layout, lines.where)
         gyros = [name for name in GYROS if name in record]
         spatial = all(name in gyros for name in GYROS[1:])
+        if not spatial:
+            level_of(settings)
         self._missing = missing(there, gyros, record, settings)
         places = list(record.columns)
         used = [*there, *(GYROS if spatial else GYROS[:1])]
@@ -128,12 +135,10 @@ class Aoa:
                 self._sensors.append((k, places.index(name), record[name]))
         self._temperature = places.index("temperature") if "temperature" in record else -1
         self._has_gyro = GYROS[0] in record
-        prior = settings.estimator.prior
-        posterior = None if prior is None else load_posterior(prior, settings)
         self._problem = problem(settings, spatial, posterior)
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(settings.attitude)]]
         self._changes = leans(settings, spatial)
-        self._leaning = [leaning(self._problem, each) for each in self._changes]
+        self._leaning = [leaning(self._problem, each, settings) for each in self._changes]
         self._live = Live(self._problem, where=lines.where)
         self._others: list[Live] = []
         self._after: AoaState | None = None
@@ -149,6 +154,7 @@ class Aoa:
             "places": of.places,
             "constants": of.constants,
             "stated": repr([(each, gravity_u(settings)) for each in self._changes]),
+            "leaning": repr([each.mean.tolist() for each in self._leaning]),
             "geometry": of.geometry,
             "sensors": repr([(name, settings.calibration(name)) for name in (*of.layout.names, *GYROS)]),
             "attitude": repr(settings.attitude),
@@ -288,10 +294,21 @@ class Aoa:
             changed.append(np.append(theta[:rest], np.full(max(rest - len(theta), 0), np.nan)))
             beside[name] = Beside(live.state, theta[rest:])
         angles = widened(
-            Angles("", told.theta, told.u, told.rate, told.rate_u), self._settings, self._changes, changed
+            Angles("", told.theta, told.u, told.rate, told.rate_u, told.roll, told.roll_u),
+            self._settings,
+            self._changes,
+            changed,
         )
         state = state._replace(beside=beside)
-        said = rows(told.theta, angles.known_u, told.rate, self._settings.attitude, by_roll=angles.by_roll)
+        said = rows(
+            told.theta,
+            angles.known_u,
+            told.rate,
+            self._settings.attitude,
+            told.roll,
+            told.roll_u,
+            angles.by_roll,
+        )
         for t, row in zip(told.t.tolist(), said.tolist(), strict=True):
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None

@@ -115,7 +115,7 @@ frequency = "1 Hz"                  # sine, two-tone: of the sine [Hz]
 states = 19                         # or 15, 11, 8: fewer errors of the sensors are estimated [8, 11, 15, 19]
 # smooth = true                     # use later samples too [true, false]
 # prior = "last.json"               # result of an earlier run: its posterior is the prior of this one
-# snap = "2e7 rad^2/s^7"            # spectral density of the angle's fourth derivative; 1e7 if absent
+# snap = "2e7 rad^2/s^7"            # density of the angle's fourth derivative; 1e7, 1e8 from 15 states on, if absent
 # gate = 16.0                       # innovation squared over its variance from which samples are held back; 25
 
 [methods]                           # the paper's way, where --static, --centrifugal or --tangential asks for it

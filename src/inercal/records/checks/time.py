@@ -12,12 +12,15 @@ from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Array
 
+_JITTER = 8.0
+"""Median deviations of intervals from the median by which one is longer at least where samples are missing."""
+
 
 def time_axis(t: Array, subject: str = "t") -> list[Finding]:
     """``duplicate_time``, ``backward_time``, ``gap`` and ``rate_change`` of a time axis (n,) [s].
 
     A gap is an interval longer than 1.5 times the median around it: the longest median of the neighbouring
-    parts of the recording, so that a change of rate is not taken for gaps. Nor is the interval beside a repeated or
+    parts of the recording, so that a change of rate is not taken for gaps, and well beyond their jitter. Nor is the interval beside a repeated or
     backward stamp, if the stamps around both are as far apart as they should be.
     """
     stamps, rows = known(t)
@@ -38,7 +41,11 @@ def time_axis(t: Array, subject: str = "t") -> list[Finding]:
         step = step / np.diff(rows)
     parts = np.array_split(step, np.clip(step.size // 100, 1, 20))
     medians = [np.median(part[part > 0]) if (part > 0).any() else 0.0 for part in parts]
-    limits = [1.5 * max(medians[max(index - 1, 0) : index + 2]) for index in range(len(parts))]
+    jitter = [_JITTER * np.median(np.abs(part - middle)) for part, middle in zip(parts, medians, strict=True)]
+    limits = [
+        max(1.5 * max(medians[near]), max(medians[near]) + max(jitter[near]))
+        for near in (slice(max(index - 1, 0), index + 2) for index in range(len(parts)))
+    ]
     limit = np.repeat(limits, [len(part) for part in parts])
     long = np.flatnonzero((step > limit) & ~_made_up(step, limit))
     if long.size:
