@@ -4,16 +4,26 @@
 may be held to: after some seconds the error is mostly that of biases and lever arms, one draw of a normal distribution
 each; a figure, the mean of three, is about 0.8 of its standard deviation. So four times the figure is 3.2 standard
 deviations, once in 700 draws, about 18 of which are independent here. Of the median over nine scenarios 1.6 times is
-1.28 standard deviations, which five of nine are beyond in 2 % of all cases.
+1.28 standard deviations, which five of nine are beyond in 2 % of all cases; of five scenarios, to which the smoothed
+angles are held, 1.85 times is 1.48 standard deviations, which three are beyond in 2 %.
 """
 
 import numpy as np
 import pytest
 from sting_bands import FIGURES, FILTERS, MOTIONS, PAPER, errors_of, judged, over_its_uncertainty
 
-ONE, MEDIAN_OF_ALL = 4.0, 1.6
+ONE, MEDIAN_OF_ALL, MEDIAN_OF_FIVE = 4.0, 1.6, 1.85
+FIVE = {
+    "smoothed 8": ("base", "buffet", "pitch-pause", "pivot", "clipping"),
+    "smoothed 19": ("base", "buffet", "pitch-pause", "pivot", "flexure"),
+}
 SEED = 20261121
 DRAWS = 6
+
+
+def held(name, method):
+    """Whether a cell is looked at here."""
+    return judged(name, method) and name in FIVE.get(method, FIGURES)
 
 
 @pytest.fixture(scope="module")
@@ -21,23 +31,25 @@ def ratios():
     """Errors over figures, largest and rms, by scenario and method."""
     found = {}
     for k, (name, figures) in enumerate(FIGURES.items()):
-        errors = errors_of(name, SEED + k)
+        errors = errors_of(name, SEED + k, (PAPER, *(each for each in FILTERS if held(name, each))))
         for method, figure in zip((PAPER, *FILTERS), figures, strict=True):
-            found[name, method] = np.array(errors[method]) / figure
+            if method in errors:
+                found[name, method] = np.array(errors[method]) / figure
     return found
 
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_each_filter_is_near_its_figure(ratios, name):
     for method in FILTERS:
-        if judged(name, method):
+        if held(name, method):
             assert (ratios[name, method] < ONE).all(), method
 
 
 @pytest.mark.parametrize("method", FILTERS)
 def test_over_all_scenarios_each_filter_reaches_its_figures(ratios, method):
-    cells = [ratios[name, method] for name in FIGURES if judged(name, method)]
-    assert (np.median(cells, axis=0) < MEDIAN_OF_ALL).all()
+    cells = [ratios[name, method] for name in FIGURES if held(name, method)]
+    limit = MEDIAN_OF_FIVE if method in FIVE else MEDIAN_OF_ALL
+    assert (np.median(cells, axis=0) < limit).all()
 
 
 @pytest.mark.parametrize("name", FIGURES)

@@ -20,7 +20,8 @@ def time_axis(t: Array, subject: str = "t") -> list[Finding]:
     """``duplicate_time``, ``backward_time``, ``gap`` and ``rate_change`` of a time axis (n,) [s].
 
     A gap is an interval longer than 1.5 times the median around it: the longest median of the neighbouring
-    parts of the recording, so that a change of rate is not taken for gaps, and well beyond their jitter. Nor is the interval beside a repeated or
+    parts of the recording, so that a change of rate is not taken for gaps, and well beyond their jitter. Nor is
+    the interval beside a repeated or
     backward stamp, if the stamps around both are as far apart as they should be.
     """
     stamps, rows = known(t)
