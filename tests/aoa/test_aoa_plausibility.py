@@ -17,8 +17,8 @@ from inercal.aoa.simulate import simulate
 from inercal.aoa.verdict import of_fusion
 from inercal.estimate.status import Status
 
-SHORT = study(motion=replace(BASE, duration=3.0))
-REST = study(motion=MotionPlan("static", duration=3.0, first=10.0 * DEG, last=10.0 * DEG))
+SHORT = study(motion=replace(BASE, duration=1.6))
+REST = study(motion=MotionPlan("static", duration=1.6, first=10.0 * DEG, last=10.0 * DEG))
 SWEEP = study(motion=MotionPlan("static", duration=7.0, first=-10.0 * DEG, last=30.0 * DEG))
 
 
@@ -114,7 +114,7 @@ def test_gross_faults_are_named(name):
 
 @pytest.mark.parametrize("motion", ["pitch-pause", "flexure", "buffet"])
 def test_gross_faults_in_other_motions(motion):
-    settings = scenario(motion, duration=4.0)
+    settings = scenario(motion, duration=2.5)
     recording = recorded(settings, 3)
     for name in ("gyro -", "r in mm"):
         change, code, text = GROSS[name]
@@ -137,7 +137,7 @@ def test_at_rest_only_accelerometers_across_show():
 
 def test_small_errors_are_no_gross_ones():
     # an axis off by a few mrad, and slow drifts, are not taken for a gyro that tells of something else
-    settings = study(motion=replace(BASE, duration=6.0))
+    settings = study(motion=replace(BASE, duration=4.0))
     recording = recorded(settings, 0)
     off = replace(
         settings, layout=replace(settings.layout, angle=settings.layout.angle + np.array([4e-3, 0, 0]))
@@ -205,7 +205,7 @@ def test_a_gyro_of_another_axis():
 
 def test_roll_and_yaw_gyros():
     settings = study(
-        motion=replace(BASE, duration=3.0),
+        motion=replace(BASE, duration=2.0),
         disturbances=Disturbances(yaw=Oscillation(3.0 * DEG, 5.0), roll=Oscillation(5.0 * DEG, 1.3)),
     )
     recording = recorded(settings, 0)
