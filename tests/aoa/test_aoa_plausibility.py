@@ -159,6 +159,16 @@ def test_a_gross_fault_is_no_good_verdict(name):
     assert GROSS[name][2] in message
 
 
+def test_a_late_gyro_is_no_good_verdict():
+    """2 ms cost the fusion 0.2 deg rms, which flexure takes up: NIS alone stays below its limit."""
+    settings = study(motion=replace(BASE, duration=12.0), disturbances=Disturbances(gyro_delay=2e-3))
+    recording = recorded(settings, 0)
+    found = estimate(recording, problem(settings))
+    status, message = of_fusion(recording, found, of_filter(found, 19), implausible(recording, settings))
+    assert status is Status.INCONSISTENT
+    assert "write gyro_delay" in message
+
+
 def test_centimetres_taken_for_metres():
     recording, settings = times("r", 100.0)(recorded(SHORT, 0), SHORT)
     ((code, message),) = said(recording, settings)

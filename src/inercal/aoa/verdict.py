@@ -41,7 +41,7 @@ _CAUSES = (
 )  # fmt: skip
 """Findings that explain innovations too large, the likeliest first."""
 
-_GROSS = frozenset(("unit_suspect", "channel_swap", "sign_suspect"))
+_GROSS = frozenset(("unit_suspect", "channel_swap", "sign_suspect", "command_shift"))
 """Faults for which the angle is another one."""
 
 _HARMLESS = frozenset(
