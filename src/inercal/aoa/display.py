@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.settings import GYROS
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate, in_degrees, rounded
 from inercal.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def displayed(estimate: Estimate) -> Estimate:
     """
     shown = [shown_unit(unit) for unit in estimate.units]
     size = np.array([size for _, size in shown])
-    conditions = _in_degrees(estimate.conditions)
+    conditions = in_degrees(estimate.conditions)
     stated = estimate.conditions.get("sensors", {})
     return replace(
         estimate,
@@ -96,19 +96,6 @@ def displayed(estimate: Estimate) -> Estimate:
             for u, unit in [sized(item.u, item.unit)]
         ),
     )
-
-
-def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested values whose keys say rad or rad/s, in degrees, which the keys then say."""
-    shown: dict[str, Any] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            shown[key] = _in_degrees(value)
-        elif key.endswith(("_rad", "_rad_s")) and value is not None:
-            shown[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
-        else:
-            shown[key] = value
-    return shown
 
 
 def _sensor(name: str, stated: Mapping[str, float]) -> str:

@@ -123,9 +123,7 @@ def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
     )
 
 
-def judge(
-    recording: Recording, settings: AoaSettings, states: States = 19, free_delay: bool = False
-) -> Judged:
+def judge(recording: Recording, settings: AoaSettings, states: States = 19) -> Judged:
     """Filter a stretch whose time goes on."""
     asked = replace(settings, estimator=replace(settings.estimator, states=states))
     posed = problem(asked, recording.spatial)

@@ -31,8 +31,6 @@ from inercal.estimate.result import Parameter
 Array = NDArray[np.float64]
 
 KINDS = ("S", "b", "dlambda", "dr", "zo")
-OF_GYRO = ("b_g", "k_g", "tau_g")
-
 _WIDER = 10.0
 """By what the study's prior is widened."""
 

@@ -173,3 +173,16 @@ def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
     value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
     digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
     return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))
+
+
+def in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested values whose keys say rad or rad/s, in degrees, which the keys then say."""
+    shown: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            shown[key] = in_degrees(value)
+        elif key.endswith(("_rad", "_rad_s")) and value is not None:
+            shown[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
+        else:
+            shown[key] = value
+    return shown

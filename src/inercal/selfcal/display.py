@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate, in_degrees, rounded
 from inercal.estimate.table import Table
 from inercal.selfcal.coefficients import names, product_slope, to_product, units
 from inercal.units import STANDARD_GRAVITY
@@ -75,7 +75,7 @@ def displayed(estimate: Estimate) -> Estimate:
         values=estimate.values / size,
         covariance=estimate.covariance / np.outer(size, size),
         common=None if estimate.common is None else estimate.common / np.outer(size, size),
-        conditions=_in_degrees(estimate.conditions),
+        conditions=in_degrees(estimate.conditions),
         statistics=_in_words(estimate),
         budget=tuple(
             replace(item, u=item.u / size, unit=unit)
@@ -92,19 +92,6 @@ def _in_words(estimate: Estimate) -> dict[str, float]:
         told["time of a row_us"] = estimate.result["step_us"]
         told["time of a row, of the sample interval_percent"] = 100.0 * estimate.result["sample_share"]
     return told
-
-
-def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested values whose keys say rad or rad/s, in degrees, which the keys then say."""
-    shown: dict[str, Any] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            shown[key] = _in_degrees(value)
-        elif key.endswith(("_rad", "_rad_s")) and value is not None:
-            shown[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
-        else:
-            shown[key] = value
-    return shown
 
 
 def found(filtered: Filtered) -> tuple[Array, Array]:
