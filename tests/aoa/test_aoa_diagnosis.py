@@ -24,7 +24,7 @@ def recorded(settings, seed=0):
 
 def said(recording, settings):
     """Code and message of the one finding; there is none where plausibility has any."""
-    (finding,) = diagnose(recording, settings, None, None)
+    (finding,) = diagnose(recording, settings)
     return finding.code, finding.message
 
 
@@ -89,7 +89,7 @@ def test_too_few_states(name):
     assert code == "unmodelled"
     assert "which 8 states leave out" in message
     assert "write states = 19" in message
-    assert diagnose(recording, scenario(name, states=19, duration=7.0), None, None) == []
+    assert diagnose(recording, scenario(name, states=19, duration=7.0)) == []
 
 
 @pytest.mark.parametrize(("key", "size"), [("accelerometer", 1e-4 * G), ("gyro", 0.2 * DEG)])
@@ -97,7 +97,7 @@ def test_noise_that_is_misstated(key, size):
     recording = recorded(SHORT)
     for factor, code in ((0.2, "excess_scatter"), (5.0, "low_scatter")):
         wrong = replace(SHORT, noise=replace(SHORT.noise, **{key: factor * size}))
-        findings = diagnose(recording, wrong, None, None)
+        findings = diagnose(recording, wrong)
         assert [finding.code for finding in findings] == [code]
         assert f"write {key} = " in findings[0].message
         # 4000 samples, sixth differences: 4 % of a standard deviation

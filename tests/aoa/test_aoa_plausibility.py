@@ -62,7 +62,7 @@ SOUND = {
 def test_sound_recordings_say_nothing(name):
     recording = recorded(SOUND[name], 0)
     assert implausible(recording, SOUND[name]) == []
-    assert diagnose(recording, SOUND[name], None, None) == []
+    assert diagnose(recording, SOUND[name]) == []
 
 
 def times(which, factor):

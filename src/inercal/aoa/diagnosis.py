@@ -15,10 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.aoa.filtered import Filtered
 from inercal.aoa.judged import Judged, judge, stretch
 from inercal.aoa.plausibility import SOUND, implausible
-from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.scatter import misstated
 from inercal.aoa.settings import STATES, AoaSettings
@@ -49,11 +47,7 @@ _BESIDE = {
 
 
 def diagnose(
-    recording: Recording,
-    settings: AoaSettings,
-    problem: Problem,
-    filtered: Filtered,
-    gross: Sequence[Finding] | None = None,
+    recording: Recording, settings: AoaSettings, gross: Sequence[Finding] | None = None
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where it is implausible as a whole.
 

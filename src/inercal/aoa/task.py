@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa import filtered, recursion, smoother
+from inercal.aoa import filtered, live, smoother
 from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
 from inercal.aoa.clock import later
@@ -25,7 +25,7 @@ from inercal.aoa.posterior import corrected
 from inercal.aoa.posterior import load as load_posterior
 from inercal.aoa.problem import Problem, problem
 from inercal.aoa.reading import recording_of
-from inercal.aoa.recording import Recording, plain
+from inercal.aoa.recording import Recording
 from inercal.aoa.sensor_fit import Verified, fit
 from inercal.aoa.settings import AoaSettings, Methods
 from inercal.aoa.stated import by_fusion, by_methods
@@ -95,11 +95,8 @@ def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare:
     """Load, or compile, the kernels that `measure` uses, so that they do not count in its time."""
     if methods is not None and not compare:
         return
-    of, t = problem(settings), np.arange(2.0)
-    rows = plain(t, np.full((2, of.count), np.nan), np.full(2, np.nan)).rows
-    out, none = np.empty((0, recursion.OUTPUTS + of.count + 1)), np.empty((0, 2 * of.size))
-    x, P, turns = of.mean.copy(), of.covariance.copy(), np.zeros(of.count + 3)
-    recursion.advance(x, P, turns, t[:0], rows[:0], of.geometry, of.places, of.constants, out, none, 1, 0)
+    of = problem(settings)
+    live.load(of)
     if settings.estimator.smooth or compare:
         smoother.load(of)
 
@@ -155,7 +152,7 @@ def measure(
         found = filtered.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, found)
         progress("looking for faults")
-        findings = [*findings, *diagnose(zeroed, settings, of, found, findings)]
+        findings = [*findings, *diagnose(zeroed, settings, findings)]
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)
