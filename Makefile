@@ -4,7 +4,7 @@ RUN := .venv/run/bin
 DEV := .venv/dev/bin
 DEMO := build/demo
 
-.PHONY: demo test bench lock clean
+.PHONY: demo test coverage docs bench lock clean
 
 demo: .venv/run/installed
 	rm -rf $(DEMO)
@@ -17,18 +17,22 @@ test: .venv/dev/installed
 	$(DEV)/ruff format --check .
 	$(DEV)/ruff check .
 	$(DEV)/mypy
-	$(DEV)/python -m pytest -n 2
+	$(DEV)/python -m pytest -n 2 --dist worksteal
 
+# Compiled lines cannot be counted: short tests of kernels run once more with kernels as plain Python.
+coverage: .venv/dev/installed
+	rm -rf build/coverage
+	$(DEV)/coverage run -m pytest -n 2 --dist worksteal
+	NUMBA_DISABLE_JIT=1 $(DEV)/coverage run -m pytest -n 2 --dist worksteal -m kernels
+	$(DEV)/coverage combine --quiet
+	$(DEV)/coverage report
+
+docs: .venv/dev/installed
+	$(DEV)/python -m sphinx --builder html --fail-on-warning --quiet --doctree-dir build/doctrees docs build/docs
+
+# Some fifteen minutes. What it leaves out, the campaigns that are run alone, is named in benchmarks/run.py.
 bench: .venv/dev/installed
-	$(DEV)/python benchmarks/imu_calibration.py
-	$(DEV)/python benchmarks/sensitivity.py
-	$(DEV)/python benchmarks/ferraris.py
-	$(DEV)/python benchmarks/allan.py
-	$(DEV)/python benchmarks/streaming.py
-	$(DEV)/python benchmarks/aoa_fusion.py
-	$(DEV)/python benchmarks/selfcal_filters.py
-	$(DEV)/python benchmarks/selfcal_command.py
-	$(DEV)/python benchmarks/selfcal_coverage.py --runs 1000
+	$(DEV)/python benchmarks/run.py --out build/bench
 
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network.
 .venv/run/installed: requirements/run.txt pyproject.toml

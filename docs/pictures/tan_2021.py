@@ -1,6 +1,8 @@
 """Draws the pictures of docs/published/tan-2021.md: into this folder, or into the one given."""
 
 import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,13 +10,7 @@ import numpy as np
 from inercal.aoa import lever, static
 from inercal.aoa.arms import axes, centrifugal_arms, tangential_arms
 from inercal.aoa.layout import Layout
-from inercal.report.aoa_published import (
-    Curves,
-    centrifugal_residual,
-    lever_arm_untreated,
-    static_methods,
-    tangential_residual,
-)
+from inercal.report.style import COLOURS, QUIET, WIDTH, envelope, few_powers, figure, svg
 from inercal.units import STANDARD_GRAVITY as G
 
 DEG = np.pi / 180.0
@@ -26,11 +22,23 @@ H, Q, P = axes(LAYOUT), centrifugal_arms(LAYOUT), tangential_arms(LAYOUT)
 DUAL, FREED = lever.dual(LAYOUT, 1.0)
 MICRO, LARGE = (0.01 * DEG, 0.777), (10.0 * DEG, 0.5)
 NAMES = {MICRO: "micro: 0.01° at 0.777 Hz", LARGE: "large: 10° at 0.5 Hz"}
-SENSORS = "a1 (-z) at -0.25 m, a2 (+x) at 0.20 m, a3 (+z) at 0.25 m, 1000 samples a second."
 T = np.arange(0.0, 40.0, 1e-3)  # long enough for the filter and for the frequency
 DRAWN = (T >= 18.0) & (T < 22.0)
 
+SPAN = 1e-5  # part of its highest value down to which a logarithmic axis reaches: errors that change sign have none
+
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Angle errors (n,) [rad] by name, over ``along`` (n,): a time [s], or an angle [rad] where ``sweep``."""
+
+    title: str
+    along: np.ndarray
+    errors: Mapping[str, np.ndarray]
+    sweep: bool = False
+    log: bool = False
 
 
 def motion(amplitude, frequency):
@@ -50,11 +58,11 @@ def errors(read, theta, way="improved"):
     return static.angle(way, read, LAYOUT, G).theta - theta
 
 
-def drawn(title, lines, scale="linear"):
+def sampled(title, lines, log=False):
     """A panel of errors by name, every 16 ms."""
     shown = np.flatnonzero(DRAWN)[::16]
     time = T[shown] - T[shown[0]]
-    return Curves(title, time, {name: line[shown] for name, line in lines.items()}, scale=scale)
+    return Curves(title, time, {name: line[shown] for name, line in lines.items()}, log=log)
 
 
 def centrifugal(of):
@@ -67,7 +75,7 @@ def centrifugal(of):
         made, _ = lever.centrifugal(way, T, read, w + DW, LAYOUT, 1.0, DW)
         still[:, 1] = made[:, 1]
         lines[name] = errors(still, theta)
-    return drawn(NAMES[of], lines, "log")
+    return sampled(NAMES[of], lines, log=True)
 
 
 def tangential(of):
@@ -82,11 +90,38 @@ def tangential(of):
     }
     off = {name: errors(read - np.outer(e, P), theta)[DRAWN].reshape(-1, 50) for name, e in ways.items()}
     rms = {name: np.sqrt(np.mean(each**2, axis=1)) for name, each in off.items()}
-    return Curves(NAMES[of], 0.05 * np.arange(80) + 0.025, rms, scale="log")
+    return Curves(NAMES[of], 0.05 * np.arange(80) + 0.025, rms, log=True)
+
+
+def drawn(panels: Sequence[Curves]) -> str:
+    """Panels side by side, each with its own axes and legend; on a logarithmic axis sizes of the errors."""
+    with figure(WIDTH, 2.6) as page:
+        for axes, panel in zip(page.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+            if panel.log:
+                axes.set_yscale("log")
+            else:
+                axes.axhline(0.0, color=QUIET, lw=0.6)
+            along = np.degrees(panel.along) if panel.sweep else panel.along
+            for k, (name, errors) in enumerate(panel.errors.items()):
+                shown = np.degrees(np.abs(errors) if panel.log else errors)
+                shown = np.where(shown > 0.0, shown, np.nan) if panel.log else shown
+                axes.plot(*envelope(along, shown, 1000), color=COLOURS[k], lw=0.9, label=name)
+            axes.set_xlabel("angle of attack [°]" if panel.sweep else "time [s]")
+            axes.set_ylabel("size of the angle error [°]" if panel.log else "angle error [°]")
+            axes.set_title(panel.title)
+            axes.margins(x=0.01)
+            axes.grid(axis="y")
+            if panel.log:
+                low, high = axes.get_ylim()
+                axes.set_ylim(max(low, high * SPAN), high)
+                few_powers(axes.yaxis)
+                axes.minorticks_off()
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
+        return svg(page)
 
 
 theta, w, al = motion(*LARGE)
-untreated = drawn(
+untreated = sampled(
     f"30° + {NAMES[LARGE].partition(': ')[2]}",
     {
         "both terms": errors(readings(theta, w, al), theta),
@@ -102,27 +137,10 @@ known = readings(theta, 0.0 * w, 0.0 * al) + DA
 freed = (readings(theta, 0.0 * w, al) + DA) @ FREED.T
 oscillating = {f"{way}, al known": np.abs(errors(known, theta, way)) for way in pair}
 oscillating["either, dual"] = np.abs(errors(freed, theta))
-about = f"Motion about 30°. {SENSORS}"
-for number, picture in (
-    (3, lever_arm_untreated(untreated, f"Improved mechanisation, no other errors. {SENSORS}")),
-    (
-        10,
-        centrifugal_residual(
-            centrifugal(MICRO),
-            centrifugal(LARGE),
-            "Ideal: the cosine of the term goes and nothing else; real: an offline filter of all that a2 reads. "
-            f"A gyro that is off by 0.2°/s, no other errors. {about}",
-        ),
-    ),
-    (
-        11,
-        tangential_residual(
-            tangential(MICRO),
-            tangential(LARGE),
-            "Rms of every 50 ms. White noise of 1e-4 g and 0.2°/s in what measures the angular acceleration, no other "
-            f"errors. {about}",
-        ),
-    ),
-    (12, static_methods(sweep, drawn(NAMES[LARGE], oscillating), f"All axes off by +1e-4 g. {about}")),
+for number, panels in (
+    (3, [untreated]),
+    (10, [centrifugal(MICRO), centrifugal(LARGE)]),
+    (11, [tangential(MICRO), tangential(LARGE)]),
+    (12, [sweep, sampled(NAMES[LARGE], oscillating)]),
 ):
-    (folder / f"tan-2021-figure-{number}.svg").write_text(picture.svg, encoding="utf-8")
+    (folder / f"tan-2021-figure-{number}.svg").write_text(drawn(panels), encoding="utf-8")

@@ -1,23 +1,27 @@
 """The README and every page of the documentation run as written.
 
 Studies, maps and recordings (TOML and CSV blocks) that begin with their file's name as a comment are laid into a
-folder. There the Python blocks of the page run in one process, and after them the console blocks line by line: a
-``$`` line is run, ``[exit N]`` after it is the code expected (0 if none is shown), and every other line must begin a
-line of what is printed on standard output or error, or hold the same words if it is a row of a table.
+folder. There the Python blocks of the page run, and after them the console blocks line by line: a ``$`` line is run,
+``[exit N]`` after it is the code expected (0 if none is shown), and every other line must begin a line of what is
+printed on standard output or error, or hold the same words if it is a row of a table.
 """
 
-import os
 import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+import inercal.cli
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"
 FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+EXIT = re.compile(r"\[exit (\d+)\]")
 
 
 def blocks(page: Path, kind: str) -> list[str]:
@@ -35,34 +39,42 @@ def name(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
-def run_python(page: Path, folder: Path) -> None:
-    """Run the Python blocks of a page, if it has any."""
-    if code := "\n\n".join(blocks(page, "python")):
-        command = [sys.executable, "-c", code]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
-        assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize(
-    "page", [p for p in PAGES if blocks(p, "python") and not blocks(p, "console")], ids=name
-)
-def test_python_runs(page, tmp_path):
-    lay_out(page, tmp_path)
-    run_python(page, tmp_path)
-
-
-def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    words = shlex.split(command)
+def run(words: list[str]) -> int:
+    """Run a command of a page here: what it prints is captured, and no process has to load the program again."""
     assert words[0] == "inercal", f"only inercal is run on the pages, found {words[0]}"
-    environment = os.environ | {"COLUMNS": "120"}
-    return subprocess.run(
-        [sys.executable, "-m", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        env=environment,
-        timeout=120,
-    )
+    return inercal.cli.run(words[1:])
+
+
+def run_apart(words: list[str]) -> int:
+    """The same in a process of its own, as its reader does."""
+    done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, timeout=120)
+    print(done.stdout)
+    print(done.stderr, file=sys.stderr)
+    return done.returncode
+
+
+def follow(
+    page: Path, folder: Path, run: Callable[[list[str]], int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Do in a folder, which is the working one, what a page says."""
+    lay_out(page, folder)
+    if code := "\n\n".join(blocks(page, "python")):
+        exec(compile(code, name(page), "exec"), {"__name__": "__main__"})
+    lines = [line for block in blocks(page, "console") for line in block.splitlines() if line.strip()]
+    assert not lines or lines[0].startswith("$ ")
+    while lines:
+        command = lines.pop(0).removeprefix("$ ")
+        expected = []
+        while lines and not lines[0].startswith("$ "):
+            expected.append(lines.pop(0))
+        capsys.readouterr()
+        code = run(shlex.split(command))
+        found = "\n".join(capsys.readouterr())
+        exits = [int(each[1]) for line in expected if (each := EXIT.fullmatch(line.strip()))]
+        assert code == (exits[0] if exits else 0), f"{command}\n{found}"
+        for line in expected:
+            if not EXIT.fullmatch(line.strip()):
+                assert shown(line, found), f"{command}\nexpected: {line}\nfound:\n{found}"
 
 
 def shown(line: str, output: str) -> bool:
@@ -71,26 +83,23 @@ def shown(line: str, output: str) -> bool:
     return any(row.strip().startswith(line.strip()) or row.split() == line.split() for row in rows)
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "console")], ids=name)
-def test_commands_run_and_print_what_the_page_shows(page, tmp_path):
-    lines = [line for block in blocks(page, "console") for line in block.splitlines() if line.strip()]
-    assert lines[0].startswith("$ ")
-    lay_out(page, tmp_path)
-    run_python(page, tmp_path)
-    while lines:
-        command = lines.pop(0).removeprefix("$ ")
-        expected = []
-        while lines and not lines[0].startswith("$ "):
-            expected.append(lines.pop(0))
-        done = run(command, tmp_path)
-        codes = [
-            int(found[1]) for line in expected if (found := re.fullmatch(r"\[exit (\d+)\]", line.strip()))
-        ]
-        assert done.returncode == (codes[0] if codes else 0), f"{command}\n{done.stderr}"
-        for line in expected:
-            if not re.fullmatch(r"\[exit \d+\]", line.strip()):
-                found = f"{done.stdout}\n{done.stderr}"
-                assert shown(line, found), f"{command}\nexpected: {line}\nfound:\n{found}"
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty working folder, and the width of a terminal for which the pages are written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p != APART and (blocks(p, "python") or blocks(p, "console"))], ids=name
+)
+def test_a_page_runs_and_prints_what_it_shows(page, folder, capsys):
+    follow(page, folder, run, capsys)
+
+
+def test_a_page_runs_in_processes_of_their_own_too(folder, capsys):
+    follow(APART, folder, run_apart, capsys)
 
 
 def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
