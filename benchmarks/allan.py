@@ -1,38 +1,26 @@
-"""Time the overlapping Allan deviation against AllanTools on the same samples, in one run.
+"""The overlapping Allan deviation beside AllanTools on the same samples, and beside Stable32's printed digits.
 
-    python benchmarks/allan.py [--runs 7] [--smoke]
+    python benchmarks/allan.py [--quick]
 
-2 million samples of one channel and 50 averaging times from one sample to half the record. Ours includes the
-confidence limits by kind of noise. Both run on one thread. A ratio is that of the medians, with the ratios of single
-runs, the slowest and the fastest, behind it.
+2 million samples of one channel and 50 averaging times from one sample to half the record, on one thread. Ours includes
+the confidence limits by kind of noise; AllanTools is given the same averaging times and gives no such limits.
 """
 
-import argparse
 import os
-import time
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import allantools
 import numpy as np
+from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.instruments.noise import NoiseModel
 from inercal.noise.coefficients import noise_coefficients
 from inercal.noise.deviation import allan_deviation
 
 INTERVAL = 0.01
-
-
-def seconds(work) -> float:
-    """Seconds of one call."""
-    clock = time.perf_counter()
-    work()
-    return time.perf_counter() - clock
-
-
-def shown(times: list[float]) -> str:
-    """Median and spread."""
-    return f"{np.median(times):8.3f} s   ({min(times):.3f} to {max(times):.3f})"
+STABLE32 = Path(__file__).parents[1] / "tests" / "data" / "stable32"
 
 
 def lengths(n: int, count: int) -> np.ndarray:
@@ -43,45 +31,57 @@ def lengths(n: int, count: int) -> np.ndarray:
     return found
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--runs", type=int, default=7)
-    parser.add_argument(
-        "--smoke", action="store_true", help="few samples, one run; no timing is to be judged"
+def noise(n: int) -> np.ndarray:
+    """Samples of one accelerometer at rest."""
+    return 9.81 + NoiseModel(N=1e-3, B=1e-4, K=1e-5).simulate(n, INTERVAL, np.random.default_rng(1))[:, 0]
+
+
+def theirs(x: np.ndarray, tau: np.ndarray) -> tuple:
+    """Averaging times, deviations, errors and counts of AllanTools."""
+    return allantools.oadev(x, rate=1.0 / INTERVAL, data_type="freq", taus=tau)
+
+
+def printed_digits() -> Row:
+    """How far deviations of Stable32's PHASE.DAT are from what it prints, in units of the fifth and last digit."""
+    tau, sigma = np.loadtxt(STABLE32 / "phase_dat_oadev_octave.txt").T[[1, 5]]
+    found = allan_deviation(np.diff(np.loadtxt(STABLE32 / "PHASE.DAT")), 1.0, tau).deviation[:, 0]
+    away = float(np.max(np.abs(found - sigma) / (1e-4 * 10.0 ** np.floor(np.log10(sigma)))))
+    unit = "units of the last digit"
+    return Row(
+        "Allan deviation beside Stable32",
+        "PHASE.DAT, 1001 points",
+        unit,
+        Spread(away, away, away),
+        at_most=0.501,
     )
-    options = parser.parse_args()
-    n, count, runs = (20_000, 20, 1) if options.smoke else (2_000_000, 50, options.runs)
 
-    rng = np.random.default_rng(1)
-    x = 9.81 + NoiseModel(N=1e-3, B=1e-4, K=1e-5).simulate(n, INTERVAL, rng)[:, 0]
-    tau = INTERVAL * lengths(n, count)
-    noise_coefficients(allan_deviation(x[:200], INTERVAL))  # compiles or loads
 
-    def ours():
-        return allan_deviation(x, INTERVAL, tau)
-
-    def theirs():
-        return allantools.oadev(x, rate=1.0 / INTERVAL, data_type="freq", taus=tau)
-
-    found, expected = ours(), theirs()
-    away = np.max(np.abs(found.deviation[:, 0] / expected[1] - 1.0))
+def rows(quick: bool) -> list[Row]:
+    n, count, rounds = (20_000, 20, 1) if quick else (2_000_000, 50, 7)
+    x, tau = noise(n), INTERVAL * lengths(n, count)
+    gaps = np.where(np.random.default_rng(2).random(n) < 1e-4, np.nan, x)
+    found, expected = allan_deviation(x, INTERVAL, tau), theirs(x, tau)
     assert len(found.tau) == len(expected[0]) == count
-    assert away < 1e-6, away
-    pairs = [(seconds(ours), seconds(theirs)) for _ in range(runs)]
-    mine, peer = ([pair[k] for pair in pairs] for k in range(2))
-    ratios = [their / our for our, their in pairs]
-    print(f"{n} samples, {count} averaging times; largest relative difference {away:.1e}")
-    print(f"{'inercal, with limits':28s} {shown(mine)}")
-    print(
-        f"{'AllanTools oadev':28s} {shown(peer)}   ratio {np.median(peer) / np.median(mine):.1f} "
-        f"({min(ratios):.1f} to {max(ratios):.1f})"
+    away = float(np.max(np.abs(found.deviation[:, 0] / expected[1] - 1.0)))
+    seconds = in_turn(
+        {
+            "ours": lambda: allan_deviation(x, INTERVAL, tau),
+            "theirs": lambda: theirs(x, tau),
+            "gaps": lambda: allan_deviation(gaps, INTERVAL, tau),
+            "coefficients": lambda: noise_coefficients(found),
+        },
+        rounds,
     )
-    with_gaps = np.where(rng.random(n) < 1e-4, np.nan, x)
-    gaps = [seconds(lambda: allan_deviation(with_gaps, INTERVAL, tau)) for _ in range(runs)]
-    print(f"{'inercal, 1 in 10^4 lost':28s} {shown(gaps)}")
-    fit = [seconds(lambda: noise_coefficients(found)) for _ in range(2)]
-    print(f"{'coefficients, first time':28s} {fit[0]:8.3f} s, again {fit[1]:.3f} s")
+    size, peer, unit = f"{n} samples, {count} averaging times", named("AllanTools"), ("s", 1.0)
+    what = "Allan deviation with limits"
+    return [
+        row(what, size, unit, seconds["ours"], peer, seconds["theirs"], at_most=1.0),
+        row(f"{what}, 1 in 10⁴ lost", size, unit, seconds["gaps"]),
+        row("Noise coefficients of it", f"{count} averaging times", ("ms", 1e3), seconds["coefficients"]),
+        Row("Allan deviation, relative difference", size, "1", Spread(away, away, away), peer, at_most=1e-6),
+        printed_digits(),
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    alone(rows, __doc__)

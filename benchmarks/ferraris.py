@@ -1,15 +1,12 @@
-"""Time the Ferraris calibration of the shipped session in physical units against imucal, in one run.
+"""The Ferraris calibration of the shipped session in physical units beside imucal.
 
-    python benchmarks/ferraris.py [--runs 30] [--smoke]
+    python benchmarks/ferraris.py [--quick]
 
-Both get the data in memory and the same sections; runs alternate. Ours also gives the covariance of all 33
-coefficients, the budget and the verdict; the noise at rest and the closed form alone are timed beside it.
+Both get the data in memory and the same sections. Ours also gives the covariance of all 33 coefficients, the budget and
+the verdict; the noise at rest and the closed form alone, which is what imucal does and the noise, are beside it.
 """
 
-import argparse
 import os
-import statistics
-import time
 import tomllib
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -17,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import imucal
 import numpy as np
 import pandas as pd
+from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
 from inercal.geometry.site import Site
@@ -31,29 +29,14 @@ from inercal.study.imu_ferraris import FerrarisTable, ferraris_settings
 NAME, RATE, GRAVITY = "ferraris-si", 102.4, 9.81
 
 
-def alternating(works: dict, runs: int) -> dict[str, list[float]]:
-    """Seconds of each work in each of the runs, one after the other."""
-    seconds: dict[str, list[float]] = {name: [] for name in works}
-    for _ in range(runs + 1):
-        for name, work in works.items():
-            clock = time.perf_counter()
-            work()
-            seconds[name].append(time.perf_counter() - clock)
-    return {name: each[1:] for name, each in seconds.items()}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--runs", type=int, default=30)
-    parser.add_argument("--smoke", action="store_true", help="one run; no timing is to be judged")
-    options = parser.parse_args()
-
+def rows(quick: bool) -> list[Row]:
     study = tomllib.loads((FOLDER / f"{NAME}.toml").read_text())
     told = ferraris_settings(FerrarisTable.model_validate(study["imu"]["ferraris"]))
     settings = ImuSettings(Site(GRAVITY))
     record = read([FOLDER / f"{NAME}.csv.gz"], read_map(FOLDER / f"{NAME}-map.toml"))
     data = pd.read_csv(FOLDER / f"{NAME}.csv.gz")
     spans = pd.DataFrame({name: {"start": a, "end": b} for name, (a, b) in told.sections.items()}).T
+    whole = calibrate_ferraris(record, settings, told)
 
     def theirs():
         regions = imucal.ferraris_regions_from_section_list(data, spans)
@@ -61,31 +44,27 @@ def main() -> None:
             regions, RATE, from_acc_unit="m/s^2", from_gyr_unit="deg/s"
         )
 
-    whole = calibrate_ferraris(record, settings, told)
-
     def closed_form():
         readings = read_sections(whole.accelerometer, whole.gyro, whole.sections, settings.site, told)
         return matrices(readings.inputs, readings.weights)
 
-    seconds = alternating(
+    seconds = in_turn(
         {
-            "imucal, values alone": theirs,
-            "inercal, with uncertainties": lambda: calibrate_ferraris(record, settings, told),
-            "inercal, noise and closed form": closed_form,
+            "theirs": theirs,
+            "whole": lambda: calibrate_ferraris(record, settings, told),
+            "values": closed_form,
         },
-        1 if options.smoke else options.runs,
+        1 if quick else 30,
     )
-    beside = seconds["imucal, values alone"]
-    for name, each in seconds.items():
-        ratios = sorted(a / b for a, b in zip(each, beside, strict=True))
-        low, high = ratios[len(ratios) // 10], ratios[-1 - len(ratios) // 10]
-        print(
-            f"{name:34s} {1e3 * statistics.median(each):8.2f} ms ({1e3 * min(each):.2f} to {1e3 * max(each):.2f})   "
-            f"ratio {statistics.median(ratios):6.2f} ({low:.2f} to {high:.2f})"
-        )
-    gain, info = whole.found.force_gain, theirs()
-    print(f"largest difference in K_a R_a: {np.max(np.abs(gain / (info.K_a @ info.R_a) - 1)):.1e}")
+    info = theirs()
+    away = float(np.max(np.abs(whole.found.force_gain / (info.K_a @ info.R_a) - 1)))
+    what, size, peer, unit = "Ferraris calibration", f"{len(data)} rows", named("imucal"), ("ms", 1e3)
+    return [
+        row(f"{what}, with uncertainties", size, unit, seconds["whole"], peer, seconds["theirs"]),
+        row(f"{what}, values and noise", size, unit, seconds["values"], peer, seconds["theirs"]),
+        Row(f"{what}, relative difference", "K_a R_a", "1", Spread(away, away, away), peer, at_most=1e-9),
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    alone(rows, __doc__)

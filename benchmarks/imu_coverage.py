@@ -3,8 +3,8 @@
     python benchmarks/imu_coverage.py --runs 2000 --folder build/coverage
     python benchmarks/imu_coverage.py --runs 2000 --method ferraris
 
-An interrupted campaign with a folder goes on where it stopped. The results are kept in docs/design/coverage.md (by
-hand) and docs/design/imu-methods-coverage.md (the other methods).
+An interrupted campaign with a folder goes on where it stopped. The results are kept in docs/uncertainty/imu.md (by
+hand) and docs/uncertainty/imu-methods.md (the other methods).
 """
 
 import argparse

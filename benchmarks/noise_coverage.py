@@ -2,7 +2,7 @@
 
     python benchmarks/noise_coverage.py --runs 2000
 
-Its result is kept in docs/design/noise-coverage.md.
+Its result is kept in docs/uncertainty/noise.md.
 """
 
 import argparse

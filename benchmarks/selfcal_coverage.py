@@ -3,7 +3,7 @@
     python benchmarks/selfcal_coverage.py --study STUDY.toml --runs 1000 --filter error-state
 
 Without a study it is the paper's (`inercal examples selfcal`). An interrupted campaign with --folder goes on where it
-stopped. Its results are kept in docs/design/self-calibration-coverage.md.
+stopped. Its results are kept in docs/uncertainty/self-calibration.md.
 """
 
 import argparse

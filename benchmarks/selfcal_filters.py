@@ -1,126 +1,76 @@
-"""Time a step of the self-calibration filters beside filterpy's unscented filter with the same model, in one run.
+"""A step of the self-calibration filters beside filterpy's unscented filter with the same model.
 
-    python benchmarks/selfcal_filters.py [--runs 10] [--smoke]
+    python benchmarks/selfcal_filters.py [--quick]
 
-filterpy draws the same 61 points (`plain_filterpy`), with Cholesky's factor first and with the eigen factor; ours run
-on the 540 s record of the paper's path, filterpy on its first steps, one after the other in each run. The
-error-state filter solves the same problem in another way and is set against the faster of the two. The end says how
-far the filters are from each other and what share of a sample interval of 0.2 s a step takes.
+filterpy draws the same 61 points (`plain_filterpy`), with Cholesky's factor first and with the eigen factor, on the
+first steps of the 540 s record of the paper's path; ours run on all of it. The error-state filter solves the same
+problem in another way and is set against the faster of the two. Times are of one processor.
 """
 
-import argparse
 import os
-import statistics
-import time
 from dataclasses import replace
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import plain_filterpy
+from measure import Row, Spread, alone, in_turn, named, row
 
-from inercal.geometry.earth import gravity
-from inercal.geometry.site import Site
-from inercal.selfcal.filtered import Problem, problem
+from inercal.examples import FOLDER
+from inercal.selfcal.filtered import problem
 from inercal.selfcal.filtering import estimate
-from inercal.selfcal.plan import path
-from inercal.selfcal.recording import Recording
-from inercal.selfcal.settings import Filter, Noise, SelfcalSettings
+from inercal.selfcal.settings import Filter
 from inercal.selfcal.simulate import experiment, simulate
+from inercal.study.load import load_selfcal_study
 
-LATITUDE = np.radians(40.0)
-ARCSEC, PER_HOUR, MICRO_G = np.radians(1 / 3600), np.radians(1 / 3600), 9.80665e-6
+CHOLESKY, EIGEN = "Cholesky first", "eigen"
+PEERS = {CHOLESKY: plain_filterpy.cholesky_first, EIGEN: plain_filterpy.eigen}
 
-FILTERPY_CHOLESKY, FILTERPY_EIGEN = "filterpy, Cholesky first", "filterpy, eigen"
-
-#: ours -> kind, factor, and the peer it is set against
+#: ours -> filter, the peer that it is set against, and the ratio and microseconds that are promised
 OURS = {
-    "svd-qukf, Cholesky": (Filter("svd-qukf", factor="cholesky"), FILTERPY_CHOLESKY),
-    "svd-qukf, eigen": (Filter("svd-qukf", factor="eigen"), FILTERPY_EIGEN),
-    "svd-qukf, SVD": (Filter("svd-qukf", factor="svd"), FILTERPY_EIGEN),
-    "mukf": (Filter("mukf"), FILTERPY_CHOLESKY),
-    "gimbal-ukf": (Filter("gimbal-ukf"), FILTERPY_CHOLESKY),
-    "error-state": (Filter("error-state"), FILTERPY_CHOLESKY),
+    "svd-qukf, Cholesky": (Filter("svd-qukf", factor="cholesky"), CHOLESKY, {"at_least": 60.0}),
+    "svd-qukf, eigen": (Filter("svd-qukf", factor="eigen"), EIGEN, {"at_least": 18.0}),
+    "svd-qukf, SVD": (Filter("svd-qukf", factor="svd"), EIGEN, {}),
+    "mukf": (Filter("mukf"), CHOLESKY, {}),
+    "gimbal-ukf": (Filter("gimbal-ukf"), CHOLESKY, {}),
+    "error-state": (Filter("error-state"), CHOLESKY, {"at_least": 150.0}),
 }
 
 
-def paper() -> SelfcalSettings:
-    """The study of the paper, nominal noise."""
-    truth, prior = np.zeros(24), np.ones(24)
-    prior[:18] = np.repeat(
-        [0.3 * PER_HOUR, 300 * ARCSEC, 300 * ARCSEC, 300 * ARCSEC, 500 * MICRO_G, 1500e-6], 3
-    )
-    truth[:18] = 0.3 * prior[:18]
-    return SelfcalSettings(
-        site=Site(float(gravity(LATITUDE)), (), LATITUDE),
-        noise=Noise(5e-4 * np.radians(1.0) / 60.0, 10 * MICRO_G, 2 * ARCSEC),
-        prior=prior,
-        truth=truth,
-        plan=path("paper"),
-    )
-
-
-def compared(recording: Recording, told: Problem, steps: int) -> dict[str, float]:
-    """Processor seconds of a step of each filter, one after the other; the median of three of ours."""
-    seconds = {}
-    for name, factor in (
-        (FILTERPY_CHOLESKY, plain_filterpy.cholesky_first),
-        (FILTERPY_EIGEN, plain_filterpy.eigen),
-    ):
-        clock = time.process_time()
-        plain_filterpy.run(told, recording, steps, factor)
-        seconds[name] = (time.process_time() - clock) / steps
-    for name, (kind, _) in OURS.items():
-        asked, each = replace(told, filter=kind), []
-        for _ in range(3):
-            clock = time.process_time()
-            found = estimate(recording, asked, history=False)
-            each.append((time.process_time() - clock) / found.steps)
-        seconds[name] = statistics.median(each)
-    return seconds
-
-
-def spread(values: list[float]) -> tuple[float, float, float]:
-    """Median, and the ends of the middle 80 %."""
-    values = sorted(values)
-    return statistics.median(values), values[len(values) // 10], values[-1 - len(values) // 10]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--runs", type=int, default=10)
-    parser.add_argument("--steps", type=int, default=500, help="of filterpy")
-    parser.add_argument(
-        "--smoke", action="store_true", help="one run of few steps; no timing is to be judged"
-    )
-    options = parser.parse_args()
-    runs, steps = (1, 20) if options.smoke else (options.runs, options.steps)
-
-    settings = paper()
+def rows(quick: bool) -> list[Row]:
+    rounds, steps = (1, 10) if quick else (5, 500)
+    settings = load_selfcal_study(FOLDER / "selfcal.toml")
     recording = simulate(experiment(settings), np.random.default_rng(1)).recording
     told = problem(settings)
-    compared(recording, told, 5)  # compiles or loads
-    all_runs = [compared(recording, told, steps) for _ in range(runs)]
-    for name in all_runs[0]:
-        step, low, high = spread([1e6 * each[name] for each in all_runs])
-        print(
-            f"{name:26s} {step:8.2f} us a step ({low:.2f} to {high:.2f}), {step / 2e5:.4%} of 0.2 s", end=""
-        )
-        if name in OURS:
-            peer = OURS[name][1]
-            ratio, low, high = spread([each[peer] / each[name] for each in all_runs])
-            print(f"   {ratio:6.1f} times {peer} ({low:.1f} to {high:.1f})", end="")
-        print()
-
+    works = {
+        name: lambda factor=factor: plain_filterpy.run(told, recording, steps, factor)
+        for name, factor in PEERS.items()
+    }
+    chosen = {name: OURS[name] for name in ("svd-qukf, Cholesky", "error-state")} if quick else OURS
+    asked = {name: replace(told, filter=kind) for name, (kind, _, _) in chosen.items()}
+    works |= {name: lambda of=of: estimate(recording, of, history=False) for name, of in asked.items()}
+    seconds = in_turn(works, rounds)
     reference = estimate(recording, told, "error-state", history=False)
-    u = np.sqrt(np.diag(reference.covariance))
-    for name, (kind, _) in OURS.items():
-        found = estimate(recording, replace(told, filter=kind), history=False)
-        gap = np.max(np.abs(found.coefficients - reference.coefficients) / u)
-        print(
-            f"{name:26s} {gap:.1e} standard deviations from the error-state filter, NIS {found.nis_mean:.3f}"
+    u, found, gaps = np.sqrt(np.diag(reference.covariance)), [], []
+    for name, (_, peer, promised) in chosen.items():
+        ours, theirs = (
+            [s / count for s in seconds[of]] for of, count in ((name, reference.steps), (peer, steps))
         )
+        size = f"{reference.steps} steps of 0.2 s"
+        beside = f"{named('filterpy')}, {peer}"
+        found.append(
+            row(f"Self-calibration, {name}", size, ("µs a step", 1e6), ours, beside, theirs, **promised)
+        )
+        if name == "error-state":
+            found.append(row(f"Self-calibration, {name}", size, ("µs a step", 1e6), ours, at_most=5.0))
+        else:
+            got = estimate(recording, asked[name], history=False)
+            gap = float(np.max(np.abs(got.coefficients - reference.coefficients) / u))
+            gaps.append(
+                Row(f"{name} from the error-state filter", size, "u", Spread(gap, gap, gap), at_most=0.05)
+            )
+    return found + gaps
 
 
 if __name__ == "__main__":
-    main()
+    alone(rows, __doc__)

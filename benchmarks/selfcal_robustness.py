@@ -2,7 +2,7 @@
 
     python benchmarks/selfcal_robustness.py --seeds 100
 
-Its results are kept in docs/design/self-calibration-coverage.md.
+Its results are kept in docs/uncertainty/self-calibration.md.
 """
 
 import argparse

@@ -1,22 +1,24 @@
-"""Time the exact analysis of the two-axis table against SALib and a NumPy Monte Carlo, in one run.
+"""The exact analysis of the two-axis table beside SALib and a NumPy Monte Carlo.
 
-    python benchmarks/sensitivity.py [--runs 20] [--smoke]
+    python benchmarks/sensitivity.py [--quick]
 
-Eleven errors of ±2 arcmin, five outputs, first and total order. The peers are run at a few positions, with the
-number of rows below, and their time is scaled up to all positions; both are given the same sample at each position,
-which saves them the drawing.
+Eleven errors of ±2 arcmin, five outputs, first and total order at 36 x 36 positions. The peers are run at a few
+positions and their time is scaled up. Both share one sample for all positions, whose cosines and sines are taken once
+and not timed, one vectorised model that turns rows in place of multiplying matrices, and its values for outputs of one
+reference. SALib is timed as its guide shows it, and with the fewest bootstrap resamples that it takes.
 """
 
-import argparse
 import os
-import time
-from dataclasses import replace
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from measure import PROCESSOR, WALL, Row, alone, in_turn, named, row, spread
+from SALib.analyze import sobol as salib_indices
+from SALib.sample import sobol as salib_sample
+from scipy.stats import qmc
 
-from inercal.rigs.chain import Chain, Error, Joint
+from inercal.rigs.chain import Chain, Joint
 from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
@@ -29,128 +31,120 @@ CHAIN = turntable("two_axis_turntable", uniform(SIZE))
 OUTPUTS = table_outputs(("ax", "ay", "az", "wx", "wy"), 9.8, np.radians(40.0))
 
 
-def best(work, runs: int) -> float:
-    """Seconds of the fastest of several runs: the machine may have other things to do."""
-    seconds = []
-    for _ in range(runs):
-        clock = time.perf_counter()
-        work()
-        seconds.append(time.perf_counter() - clock)
-    return min(seconds)
+class Sample:
+    """Rows of the errors of a chain, (n, errors) [rad], as both peers are given them."""
+
+    def __init__(self, chain: Chain, rows: np.ndarray):
+        self.chain, self.cosines, self.sines = chain, np.cos(rows).T.copy(), np.sin(rows).T.copy()
+
+    def carried(self, reference: np.ndarray, at: np.ndarray) -> list:
+        """Components of a reference after the whole chain at one position, each (n,)."""
+        x, k, j = list(reference), 0, 0
+        for element in self.chain.elements:
+            if isinstance(element, Joint):
+                c, s = np.cos(at[j]), np.sin(at[j])
+                j += 1
+            else:
+                c, s = self.cosines[k], self.sines[k]
+                k += 1
+            b = ("xyz".index(element.axis) + 1) % 3
+            d = (b + 1) % 3
+            x[b], x[d] = c * x[b] + s * x[d], c * x[d] - s * x[b]
+        return x
+
+    def outputs(self, at: np.ndarray) -> list[np.ndarray]:
+        """Each output (n,) at one position; outputs of one reference share it."""
+        known = {}
+        for output in OUTPUTS:
+            key = tuple(output.reference)
+            if key not in known:
+                known[key] = self.carried(output.reference, at)
+        return [known[tuple(output.reference)][int(np.argmax(output.axis))] for output in OUTPUTS]
 
 
-def salib(angles: np.ndarray) -> tuple[float, np.ndarray]:
-    """Seconds of SALib as its guide shows it, and S (outputs, positions, errors); all outputs share the model runs."""
-    from SALib.analyze import sobol as estimate
-    from SALib.sample import sobol as sample
+def salib(angles: np.ndarray, resamples: int = 100, chain: Chain = CHAIN):
+    """A work that gives S (outputs, positions, errors)."""
+    k = len(chain.factors)
+    problem = {"num_vars": k, "names": list(chain.factors), "bounds": [[-SIZE, SIZE]] * k}
+    sample = Sample(chain, salib_sample.sample(problem, ROWS, calc_second_order=False, seed=1))
 
-    problem = {"num_vars": 11, "names": list(CHAIN.factors), "bounds": [[-SIZE, SIZE]] * 11}
-    rows = sample.sample(problem, ROWS, calc_second_order=False, seed=1)
-    clock, first = time.perf_counter(), np.empty((len(OUTPUTS), len(angles), 11))
-    for n, at in enumerate(angles):
-        attitude = CHAIN.attitude(at, rows)
-        for o, output in enumerate(OUTPUTS):
-            values = output.value(attitude)
-            values = (values - values.mean()) / values.std()
-            first[o, n] = estimate.analyze(problem, values, calc_second_order=False, seed=1)["S1"]
-    return time.perf_counter() - clock, first
+    def work() -> np.ndarray:
+        first = np.empty((len(OUTPUTS), len(angles), k))
+        for n, at in enumerate(angles):
+            for o, values in enumerate(sample.outputs(at)):
+                found = salib_indices.analyze(
+                    problem, values, calc_second_order=False, num_resamples=resamples, seed=1
+                )
+                first[o, n] = found["S1"]
+        return first
 
-
-def carried(row: np.ndarray, cosines: np.ndarray, sines: np.ndarray, at: np.ndarray) -> list:
-    """Components of a reference after the whole chain, each (rows of errors)."""
-    x, k, j = list(row), 0, 0
-    for element in CHAIN.elements:
-        if isinstance(element, Joint):
-            c, s = np.cos(at[j]), np.sin(at[j])
-            j += 1
-        else:
-            c, s = cosines[k], sines[k]
-            k += 1
-        b = ("xyz".index(element.axis) + 1) % 3
-        d = (b + 1) % 3
-        x[b], x[d] = c * x[b] + s * x[d], c * x[d] - s * x[b]
-    return x
+    return work
 
 
-def plain_numpy(angles: np.ndarray) -> tuple[float, np.ndarray]:
-    """Seconds of pick and freeze in vectorised NumPy (Saltelli 2010 and Jansen 1999), and S.
-
-    Cosines and sines are taken once for all positions, and rows are turned in place of matrices multiplied.
-    """
-    from scipy.stats import qmc
-
-    k = len(CHAIN.factors)
+def plain_numpy(angles: np.ndarray, chain: Chain = CHAIN):
+    """The same by pick and freeze in vectorised NumPy (Saltelli 2010 and Jansen 1999), without a bootstrap."""
+    k = len(chain.factors)
     ab = SIZE * (2.0 * qmc.Sobol(2 * k, rng=np.random.default_rng(1)).random(ROWS) - 1.0)
     A, B = ab[:, :k], ab[:, k:]
-    rows = np.concatenate([A, B, *(np.where(np.arange(k) == i, B, A) for i in range(k))])
-    cosines, sines = np.cos(rows).T.copy(), np.sin(rows).T.copy()
-    clock, first = time.perf_counter(), np.empty((len(OUTPUTS), len(angles), k))
-    distinct = np.unique(np.array([output.reference for output in OUTPUTS]), axis=0)
-    for n, at in enumerate(angles):
-        read = [carried(row, cosines, sines, at) for row in distinct]
-        for o, output in enumerate(OUTPUTS):
-            which = int(np.flatnonzero((distinct == output.reference).all(axis=1))[0])
-            y = read[which][int(np.argmax(output.axis))].reshape(k + 2, ROWS)
-            y = y - y[:2].mean()
-            variance = y[:2].var()
-            first[o, n] = (y[1] * (y[2:] - y[0])).mean(axis=1) / variance
-            total = 0.5 * np.square(y[0] - y[2:]).mean(axis=1) / variance
-            assert np.all(np.isfinite(total))
-    return time.perf_counter() - clock, first
+    sample = Sample(chain, np.concatenate([A, B, *(np.where(np.arange(k) == i, B, A) for i in range(k))]))
+
+    def work() -> np.ndarray:
+        first = np.empty((len(OUTPUTS), len(angles), k))
+        for n, at in enumerate(angles):
+            for o, y in enumerate(sample.outputs(at)):
+                y = y.reshape(k + 2, ROWS)
+                y = y - y[:2].mean()
+                variance = y[:2].var()
+                first[o, n] = (y[1] * (y[2:] - y[0])).mean(axis=1) / variance
+                total = 0.5 * np.square(y[0] - y[2:]).mean(axis=1) / variance
+                assert np.all(np.isfinite(total))
+        return first
+
+    return work
 
 
-def longer(times: int) -> Chain:
-    """The table with each of its errors there several times."""
-    elements = []
-    for element in CHAIN.elements:
-        copies = times if isinstance(element, Error) else 1
-        elements += [replace(element, name=f"{element.name}{n}") for n in range(copies)]
-    return Chain(tuple(elements))
-
-
-def against(name: str, peer, angles: np.ndarray, few: int, ours: float) -> None:
-    """One peer: time scaled to all positions, ratio, and how far its first-order indices are from the exact ones."""
-    some = angles[np.random.default_rng(0).choice(len(angles), few, replace=False)]
-    seconds, first = peer(some)
-    error = np.abs(first - analyse(CHAIN, OUTPUTS, some).first)
-    scaled = seconds * len(angles) / few
-    print(
-        f"{name:34s} {scaled:10.2f} s   ratio {scaled / ours:9.0f}   "
-        f"error of S: median {np.median(error):.1e}, largest {error.max():.1e}   ({few} positions, scaled)"
-    )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument(
-        "--smoke", action="store_true", help="few positions, one run; no timing is to be judged"
-    )
-    options = parser.parse_args()
-    side, runs = (6, 1) if options.smoke else (36, options.runs)
-
-    analyse(CHAIN, OUTPUTS, np.zeros((2, 2)), second=True)  # compiles or loads
+def rows(quick: bool) -> list[Row]:
+    side, rounds = (6, 1) if quick else (36, 5)
     angles = grid((side, side)).angles
-    ours = best(lambda: analyse(CHAIN, OUTPUTS, angles), runs)
-    print(f"{len(angles)} positions, {len(OUTPUTS)} outputs, {len(CHAIN.factors)} errors; S and ST")
-    print(f"{'inercal, exact':34s} {ours:10.5f} s")
-    one = best(lambda: analyse(CHAIN, OUTPUTS, angles, threads=1), runs)
-    print(f"{'  on one thread':34s} {one:10.5f} s")
-    more = best(lambda: analyse(CHAIN, OUTPUTS, angles, shapley=True, second=True), min(runs, 5))
-    print(f"{'  with Shapley and second order':34s} {more:10.5f} s")
-    against(f"SALib, N = {ROWS}", salib, angles, 1 if options.smoke else 6, ours)
-    against(f"NumPy pick and freeze, N = {ROWS}", plain_numpy, angles, 2 if options.smoke else 60, ours)
-    for times in (1, 2) if options.smoke else (2, 4, 10):
-        more_angles = grid((times * side, times * side)).angles
-        seconds = best(lambda at=more_angles: analyse(CHAIN, OUTPUTS, at), 2)
-        per = 1e6 * seconds / len(more_angles)
-        print(f"{times * side} x {times * side} positions: {seconds:8.4f} s, {per:.2f} us a position")
-    for times in (1, 2, 4):
-        chain = longer(times)
-        seconds = best(lambda chain=chain: analyse(chain, OUTPUTS, angles, threads=1), min(runs, 5))
-        per = 1e9 * seconds / len(angles) / len(chain.factors)
-        print(f"{len(chain.factors)} errors, one thread: {seconds:8.4f} s, {per:.0f} ns a position and error")
+    rng = np.random.default_rng(0)
+    one, few = (angles[rng.choice(len(angles), n, replace=False)] for n in ((1, 2) if quick else (2, 40)))
+    peers = {
+        f"{named('SALib')}, N = {ROWS}": (salib(one), one),
+        f"{named('SALib')}, 2 resamples": (salib(one, 2), one),
+        f"{named('numpy')} pick and freeze, N = {ROWS}": (plain_numpy(few), few),
+    }
+    works = {"ours": lambda: analyse(CHAIN, OUTPUTS, angles, threads=1)}
+    works |= {name: work for name, (work, _) in peers.items()}
+    seconds = in_turn(works, rounds, PROCESSOR, 0.0 if quick else 0.05)
+    what, size, unit = "Exact sensitivity", f"{len(angles)} positions, 5 outputs, 11 errors", ("ms", 1e3)
+    found = []
+    for name, (_, some) in peers.items():
+        scaled = [s * len(angles) / len(some) for s in seconds[name]]
+        found.append(row(f"{what}, one thread", size, unit, seconds["ours"], name, scaled))
+    walls = in_turn(
+        {
+            "": lambda: analyse(CHAIN, OUTPUTS, angles),
+            ", with Shapley and second order": lambda: analyse(
+                CHAIN, OUTPUTS, angles, shapley=True, second=True
+            ),
+        },
+        rounds,
+        WALL,
+    )
+    found += [row(f"{what}, all threads{more}", size, unit, each) for more, each in walls.items()]
+    for name, (work, some) in list(peers.items())[::2]:
+        errors = np.abs(work() - analyse(CHAIN, OUTPUTS, some).first)
+        found.append(
+            Row(
+                "Error of S, median and largest",
+                f"{len(some)} positions",
+                "1",
+                spread(errors.ravel().tolist()),
+                name,
+            )
+        )
+    return found
 
 
 if __name__ == "__main__":
-    main()
+    alone(rows, __doc__)

@@ -1,29 +1,45 @@
-"""Time streams: lines a second through the commands, and a step of the monitor beside the same in plain NumPy.
+"""Streams: lines through the commands, and a step of the monitor beside the same in plain NumPy.
 
-    python benchmarks/streaming.py [--rows 50000] [--smoke]
+    python benchmarks/streaming.py [--quick]
 
-Six channels at 100 Hz. The commands run in processes of their own, from a file to nowhere; their start is taken off
-by a run on ten rows. The plain loop does for each sample what the compiled kernels do, with the window in an array
-that is rolled and octaves that are added up in Python.
+Six channels at 100 Hz. The commands run in processes of their own, from a file to nowhere; their start is taken off by
+a run on ten rows in the same round. The plain loop does for each sample what the compiled kernels do, with the window
+in an array that is shifted and octaves that are added up in Python.
 """
 
-import argparse
+import gzip
 import json
 import os
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from measure import Row, alone, in_turn, named, of_processes, row
 
+from inercal.examples import FOLDER
 from inercal.noise.running import cascade, empty_octaves, empty_window, load_kernels, slide
 
 WINDOW = 101
 TITLES = ("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z")
+COMMANDS = {
+    "apply --stream": ("apply", "cal.json", "--stream"),
+    "apply --stream, a checkpoint each 1000 rows": ("apply", "cal.json", "--stream", "--checkpoint", "state"),
+    "monitor": ("monitor",),
+    'monitor --every "1 s"': ("monitor", "--every", "1 s"),
+}
+
+#: record that ships with inercal -> its streams
+SHIPPED = {
+    "selfcal": {
+        "selfcal --stream": ("selfcal", "--stream"),
+        "selfcal --stream --filter svd-qukf": ("selfcal", "--stream", "--filter", "svd-qukf"),
+    },
+    "sting": {"aoa --stream": ("aoa", "--stream")},
+}
 
 
 def recording(path: Path, rows: int) -> None:
@@ -48,35 +64,31 @@ def calibration(path: Path) -> None:
     path.write_text(json.dumps(whole))
 
 
-def seconds(folder: Path, log: str, *arguments: str) -> float:
-    """Wall time of a command that reads a file as standard input."""
-    clock = time.perf_counter()
+def lines_through(folder: Path, log: str, arguments: tuple[str, ...]) -> None:
+    """A command that reads a file as standard input, to its end."""
+    (folder / "state").unlink(missing_ok=True)
     with open(folder / log, "rb") as stream:
         command = [sys.executable, "-m", "inercal", *arguments, "--quiet"]
         subprocess.run(command, cwd=folder, stdin=stream, stdout=subprocess.DEVNULL, check=True)
-    return time.perf_counter() - clock
 
 
-def compiled(x: np.ndarray) -> float:
-    """Seconds a sample of the kernels."""
+def compiled(x: np.ndarray) -> None:
+    """The kernels over all rows, called once for each."""
     window, octaves = empty_window(WINDOW, x.shape[1]), empty_octaves(x.shape[1])
-    clock = time.perf_counter()
-    for row in x:
-        slide(row, *window)
-        cascade(row, *octaves)
-    return (time.perf_counter() - clock) / len(x)
+    for each in x:
+        slide(each, *window)
+        cascade(each, *octaves)
 
 
-def plain(x: np.ndarray) -> float:
-    """Seconds a sample of the same in NumPy."""
+def plain(x: np.ndarray) -> None:
+    """The same in NumPy."""
     window, last = np.zeros((WINDOW, x.shape[1])), [None] * 40
     squares, count = np.zeros((40, x.shape[1])), np.zeros(40, int)
-    clock = time.perf_counter()
-    for row in x:
+    for each in x:
         window[:-1] = window[1:]
-        window[-1] = row
+        window[-1] = each
         window.mean(axis=0), window.var(axis=0, ddof=1)
-        cluster, octave = row, 0
+        cluster, octave = each, 0
         while True:
             before, last[octave] = last[octave], cluster
             if before is not None:
@@ -85,40 +97,53 @@ def plain(x: np.ndarray) -> float:
             if count[octave] % 2 == 1:
                 break
             cluster, octave = cluster + before, octave + 1
-    return (time.perf_counter() - clock) / len(x)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--rows", type=int, default=50_000)
-    parser.add_argument("--smoke", action="store_true", help="few rows; no timing is to be judged")
-    options = parser.parse_args()
-    rows = 500 if options.smoke else options.rows
+def rate_of(folder: Path, what: str, arguments: tuple[str, ...], log: str, n: int, rounds: int) -> list[Row]:
+    """Processor time of a line of ``log``, of ``n`` lines, and of the start on ``start.csv``."""
+    works = {name: lambda name=name: lines_through(folder, name, arguments) for name in ("start.csv", log)}
+    seconds = in_turn(works, rounds, of_processes)
+    starts = seconds["start.csv"]
+    # a log of few lines may take less than the start varies
+    each = [max(b - a, 0.0) / n for a, b in zip(starts, seconds[log], strict=True)]
+    return [
+        row(f"`{what}`, a line", f"{n} lines", ("µs", 1e6), each),
+        row(f"`{what}`, start", "10 lines", ("s", 1.0), starts),
+    ]
 
+
+def platform_and_sting(folder: Path) -> list[Row]:
+    """Streams of the records that ship with inercal."""
+    found = []
+    for name, streams in SHIPPED.items():
+        lines = gzip.decompress((FOLDER / f"{name}.csv.gz").read_bytes()).splitlines(keepends=True)
+        (folder / f"{name}.csv").write_bytes(b"".join(lines))
+        (folder / "start.csv").write_bytes(b"".join(lines[:11]))
+        for what, arguments in streams.items():
+            told = (*arguments, "--study", str(FOLDER / f"{name}.toml"))
+            found += rate_of(folder, what, told, f"{name}.csv", len(lines) - 1, 3)
+    return found
+
+
+def rows(quick: bool) -> list[Row]:
     load_kernels()
-    x = np.random.default_rng(1).standard_normal((rows, 6))
-    ours, numpy = min(compiled(x) for _ in range(3)), plain(x[: max(500, rows // 10)])
-    print(f"{'a step of the monitor, compiled':40s} {1e6 * ours:8.2f} us")
-    print(f"{'  plain NumPy':40s} {1e6 * numpy:8.2f} us   ratio {numpy / ours:6.1f}")
+    x = np.random.default_rng(1).standard_normal((500 if quick else 5000, 6))
+    steps = in_turn({"ours": lambda: compiled(x), "theirs": lambda: plain(x)}, 1 if quick else 7)
+    ours, theirs = ([s / len(x) for s in steps[name]] for name in ("ours", "theirs"))
+    found = [
+        row("Step of the monitor", "6 channels", ("µs", 1e6), ours, named("numpy"), theirs, at_least=5.0)
+    ]
+    n, commands = (500, list(COMMANDS.items())[:1]) if quick else (20_000, list(COMMANDS.items()))
     with tempfile.TemporaryDirectory() as name:
+        found += platform_and_sting(Path(name)) if not quick else []
         folder = Path(name)
-        recording(folder / "log.csv", rows)
+        recording(folder / "log.csv", n)
         recording(folder / "start.csv", 10)
         calibration(folder / "cal.json")
-        for words, arguments in (
-            ("apply --stream", ["apply", "cal.json", "--stream"]),
-            ("  with a checkpoint each 1000 rows", ["apply", "cal.json", "--stream", "--checkpoint", "a"]),
-            ("monitor", ["monitor"]),
-            ("  with a line each second", ["monitor", "--every", "1 s"]),
-        ):
-            seconds(folder, "start.csv", *arguments)  # compiles or loads
-            Path(folder / "a").unlink(missing_ok=True)
-            start = seconds(folder, "start.csv", *arguments)
-            Path(folder / "a").unlink(missing_ok=True)
-            work = seconds(folder, "log.csv", *arguments) - start
-            rate = f"{rows / work:8.0f} lines a second, {1e6 * work / rows:6.1f} us a line"
-            print(f"{words:40s} {rate}; start {start:.2f} s")
+        for what, arguments in commands:
+            found += rate_of(folder, what, arguments, "log.csv", n, 1 if quick else 3)
+    return found
 
 
 if __name__ == "__main__":
-    main()
+    alone(rows, __doc__)

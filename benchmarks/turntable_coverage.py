@@ -2,7 +2,7 @@
 
     python benchmarks/turntable_coverage.py --runs 2000 --folder build/coverage-turntable
 
-An interrupted campaign goes on where it stopped. Its result is kept in docs/design/turntable-coverage.md.
+An interrupted campaign goes on where it stopped. Its result is kept in docs/uncertainty/turntable.md.
 """
 
 import argparse

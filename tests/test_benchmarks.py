@@ -1,42 +1,155 @@
-"""The benchmarks run: a smoke test, no timing is judged here."""
+"""The benchmarks run, their table and picture are written, and the book's figures of speed are rows of that table.
 
-import subprocess
+No time is judged here.
+"""
+
+import importlib
+import json
+import re
+import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parents[1] / "benchmarks"
+from inercal.estimate import runs
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "benchmarks"
+sys.path.insert(0, str(FOLDER))
+measure, bench, scaling = (importlib.import_module(name) for name in ("measure", "run", "scaling"))
+
+PAGE = ROOT / "docs" / "design" / "benchmarks.md"
+"""Where the table of one run is kept."""
+
+
+@pytest.fixture(scope="module")
+def quick():
+    """Rows of each part, little work each."""
+    return {title: importlib.import_module(script).rows(True) for title, script in bench.PARTS.items()}
+
+
+def column(text, head):
+    """The first cells of all tables of a page whose first head is that."""
+    found, inside = [], False
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+        inside = line.startswith("|") and (inside or cells[0] == head)
+        if inside and cells[0] != head and not cells[0].startswith("---"):
+            found.append(cells)
+    return found
+
+
+def test_each_part_gives_rows(quick):
+    for title, rows in quick.items():
+        assert rows, title
+        for row in rows:
+            assert row.ours.low <= row.ours.median <= row.ours.high
+            assert (row.theirs is None) == (row.ratio is None)
+            assert row.ratio is None or row.peer
+
+
+def test_table_objects_and_picture_are_written(quick, tmp_path):
+    told = {
+        "date": "2026-11-22T00:00:00+00:00",
+        "machine": measure.machine(),
+        "rows": {title: measure.as_objects(rows) for title, rows in quick.items()},
+        "curves": scaling.as_objects(scaling.curves(True)),
+    }
+    told = json.loads(json.dumps(told))
+    bench.written(told, tmp_path)
+    assert json.loads((tmp_path / "results.json").read_text(encoding="utf-8")) == told
+    text = (tmp_path / "results.md").read_text(encoding="utf-8")
+    rows = [row for part in quick.values() for row in part]
+    assert [cells[0] for cells in column(text, "Work")] == [row.what for row in rows]
+    assert [bench.row_of(each) for part in told["rows"].values() for each in part] == rows
+    assert (tmp_path / "cost.svg").read_text(encoding="utf-8").startswith("<svg")
+
+
+def test_a_ratio_is_taken_within_its_round():
+    """A machine that is three times as slow in the second round changes both times, and no ratio."""
+    row = measure.row("work", "1", ("ms", 1e3), [0.1, 0.3], "peer", [0.4, 1.2], at_least=4.0)
+    assert (row.ratio.low, row.ratio.median, row.ratio.high) == pytest.approx((4.0, 4.0, 4.0))
+    assert (row.ours.low, row.ours.high, row.theirs.high) == pytest.approx((100.0, 300.0, 1200.0))
+    assert row.holds is (row.ratio.median >= 4.0)
+    assert replace(row, at_least=4.1).holds is False
+    assert replace(row, at_least=None, at_most=199.0).holds is False
+    assert replace(row, at_least=None).holds is None
+
+
+def test_rounds_alternate_and_the_first_is_not_counted():
+    clock, order = iter(range(1000)), []
+    works = {name: lambda name=name: order.append(name) for name in "ab"}
+    seconds = measure.in_turn(works, 3, lambda: next(clock))
+    assert order == ["a", "b"] * 4
+    assert {name: len(each) for name, each in seconds.items()} == {"a": 3, "b": 3}
+
+
+def test_a_slope_is_the_exponent():
+    """Of the larger sizes: what a work costs at any size is not its growth."""
+    sizes = tuple(10.0**k for k in range(7))
+    curve = scaling.Curve("panel", "size", "work", sizes, tuple(2.0 + 3e-2 * n**2 for n in sizes))
+    assert curve.slope == pytest.approx(2.0, abs=0.01)
+
+
+def test_the_page_has_the_rows_that_the_scripts_give(quick):
+    """By name: the page's table is of the scripts as they are."""
+    known = {cells[0] for cells in column(PAGE.read_text(encoding="utf-8"), "Work")}
+    assert {row.what for rows in quick.values() for row in rows} <= known
+
+
+def test_what_the_book_says_of_speed_has_a_row():
+    """Each claim that the page lists is said where it says, and its row is in the table."""
+    text = PAGE.read_text(encoding="utf-8")
+    known, claims = {cells[0] for cells in column(text, "Work")}, column(text, "Said in")
+    assert claims
+    for link, words, row in (cells[:3] for cells in claims):
+        target = (PAGE.parent / re.search(r"\(([^)]+)\)", link)[1]).resolve()
+        said = " ".join(target.read_text(encoding="utf-8").split())
+        assert words.strip("“”") in said, f"{target.name} does not say {words}"
+        assert row in known, f"no row is named {row}"
+
+
+SPEED = re.compile(r"µs a step|times faster|some [\d ]+ a second")
+
+
+def test_no_other_speed_is_claimed():
+    """Words that claim a speed are on lines that the page's list of claims quotes."""
+    quoted = " ".join(cells[1] for cells in column(PAGE.read_text(encoding="utf-8"), "Said in"))
+    for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
+        if page == PAGE:
+            continue
+        for found in SPEED.findall(" ".join(page.read_text(encoding="utf-8").split())):
+            assert found in quoted, f"{page.name}: {found}"
 
 
 @pytest.mark.parametrize(
     ("command", "says"),
     [
-        (["aoa_bands.py", "--seeds", "1", "--draws", "4", "--scenario", "base"], "smoothed 19"),
-        (["aoa_fusion.py", "--smoke"], "19 states"),
-        (["aoa_fusion.py", "--endless", "20000"], " 0 without an angle"),
-        (["ferraris.py", "--smoke"], "inercal, with uncertainties"),
-        (["imu_calibration.py", "--smoke"], "inercal, solve"),
-        (["imu_coverage.py", "--runs", "2"], "all together"),
-        (["imu_coverage.py", "--runs", "2", "--method", "ferraris", "--by-scatter"], "all together"),
-        (["imu_coverage.py", "--runs", "2", "--method", "aided"], "all together"),
-        (["noise_coverage.py", "--runs", "2"], "weak K"),
-        (["selfcal_command.py", "--smoke"], "to the written report"),
-        (["selfcal_coverage.py", "--runs", "4"], "runs/s"),
-        (["selfcal_robustness.py", "--seeds", "1"], "stuck_encoder 1"),
-        (["selfcal_filters.py", "--smoke"], "svd-qukf, eigen"),
-        (["sensitivity.py", "--smoke"], "inercal, exact"),
-        (["streaming.py", "--smoke"], "lines a second"),
-        (["turntable_coverage.py", "--runs", "2"], "all together"),
+        ("aoa_bands --seeds 1 --draws 4 --scenario base", "smoothed 19"),
+        ("aoa_endless --rows 5000", " 0 without an angle"),
+        ("imu_coverage --runs 2", "all together"),
+        ("imu_coverage --runs 2 --method ferraris --by-scatter", "all together"),
+        ("imu_coverage --runs 2 --method aided", "all together"),
+        ("noise_coverage --runs 2", "weak K"),
+        ("selfcal_coverage --runs 4", "runs/s"),
+        ("turntable_coverage --runs 2", "all together"),
     ],
 )
-def test_a_small_run(command, says, tmp_path):
-    done = subprocess.run(
-        [sys.executable, str(FOLDER / command[0]), *command[1:]],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    assert says in done.stdout
+def test_a_short_campaign(command, says, capsys, monkeypatch):
+    script, *arguments = command.split()
+    monkeypatch.setattr(runs, "Processes", lambda workers: runs.Serial())
+    monkeypatch.setattr(sys, "argv", [script, *arguments])
+    runpy.run_path(str(FOLDER / f"{script}.py"), run_name="__main__")
+    assert says in capsys.readouterr().out
+
+
+def test_a_short_campaign_of_faults(capsys, monkeypatch):
+    """With one of the filters, and two of the faults."""
+    campaign = importlib.import_module("selfcal_robustness")
+    monkeypatch.setattr(campaign, "KINDS", ("error-state",))
+    monkeypatch.setattr(campaign, "FAULTS", ("none", "stuck encoder"))
+    monkeypatch.setattr(sys, "argv", ["selfcal_robustness", "--seeds", "1"])
+    campaign.main()
+    assert "stuck_encoder 1" in capsys.readouterr().out

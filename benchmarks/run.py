@@ -1,0 +1,112 @@
+"""All benchmarks in one run: each script in a process of its own, then the table, its objects and the picture.
+
+    python benchmarks/run.py [--quick] [--out build/bench]
+
+Writes results.md, results.json and cost.svg. The long campaigns are not in it but for the short ones of `accuracy.py`;
+each is run alone, as its first lines say: `imu_coverage.py`, `noise_coverage.py`, `turntable_coverage.py`,
+`selfcal_coverage.py`, `selfcal_robustness.py`, `aoa_bands.py`, `aoa_endless.py`.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from textwrap import fill
+
+from measure import Row, Spread, machine, table
+
+FOLDER = Path(__file__).parent
+
+#: title of each part -> its script
+PARTS = {
+    "IMU by hand": "imu_calibration",
+    "Ferraris": "ferraris",
+    "Noise": "allan",
+    "Sensitivity": "sensitivity",
+    "Self-calibration": "selfcal_filters",
+    "Angle of attack": "aoa_fusion",
+    "Streams": "streaming",
+    "Commands": "commands",
+    "Errors": "accuracy",
+}
+
+
+def objects_of(script: str, quick: bool) -> list[dict]:
+    """What a script says as JSON; it is told on standard error that it runs, and for how long it did."""
+    began = time.perf_counter()
+    print(f"{script:16s}", end="", file=sys.stderr, flush=True)
+    command = [sys.executable, str(FOLDER / f"{script}.py"), *(["--quick"] if quick else [])]
+    if script != "scaling":
+        command.append("--json")
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+    print(f" {time.perf_counter() - began:6.0f} s", file=sys.stderr)
+    return json.loads(done.stdout)
+
+
+def row_of(told: dict) -> Row:
+    """A row from its object."""
+    spreads = {name: told[name] and Spread(**told[name]) for name in ("ours", "theirs", "ratio")}
+    return Row(**{name: value for name, value in told.items() if name != "holds"} | spreads)
+
+
+def as_markdown(results: dict) -> str:
+    """Machine, tables of all parts, and slopes."""
+    made = results["machine"]
+    versions = ", ".join(f"{name} {number}" for name, number in made["versions"].items())
+    load = "unknown" if made["load"] is None else f"{made['load']:.1f}"
+    lines = [
+        "# Benchmarks",
+        fill(
+            f"{results['date']}; {made['system']}, {made['processors']} processors, load {load}, "
+            f"Python {made['python']}, {versions}. Median (least to largest) of the rounds.",
+            120,
+        ),
+    ]
+    for title, rows in results["rows"].items():
+        lines += [f"## {title}", table([row_of(told) for told in rows])]
+    slopes = ["| Cost of | Against | Of | Slope |", "|---|---|---|---|"]
+    for curve in results["curves"]:
+        slope = "" if curve["slope"] is None else f"{curve['slope']:.2f}"
+        slopes.append(f"| {curve['panel']} | {curve['variable']} | {curve['name']} | {slope} |")
+    return "\n\n".join([*lines, "## Cost against size", "\n".join(slopes)]) + "\n"
+
+
+def written(results: dict, folder: Path) -> None:
+    """Write the table, the objects and the picture."""
+    from scaling import Curve, drawn
+
+    folder.mkdir(parents=True, exist_ok=True)
+    curves = [Curve(**{k: v for k, v in told.items() if k != "slope"}) for told in results["curves"]]
+    for name, text in (
+        ("results.json", json.dumps(results, indent=1) + "\n"),
+        ("results.md", as_markdown(results)),
+        ("cost.svg", drawn(curves)),
+    ):
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="little work, once; no figure is to be judged")
+    parser.add_argument("--out", type=Path, default=Path("build/bench"))
+    options = parser.parse_args()
+    results = {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": machine(),
+        "rows": {title: objects_of(script, options.quick) for title, script in PARTS.items()},
+        "curves": objects_of("scaling", options.quick),
+    }
+    written(results, options.out)
+    broken = [told["what"] for rows in results["rows"].values() for told in rows if told["holds"] is False]
+    print(
+        f"{options.out / 'results.md'}: {'all that is promised holds' if not broken else 'does not hold: '}",
+        end="",
+    )
+    print("; ".join(broken))
+
+
+if __name__ == "__main__":
+    main()
