@@ -1,0 +1,23 @@
+"""``inercal validate``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from inercal.cli import process_age
+from inercal.cli.options import ReportOutput, reading
+from inercal.cli.outcome import hand_over
+
+
+def validate(*, output: ReportOutput = ReportOutput()) -> int:  # noqa: B008  (frozen)
+    """Rerun the published and closed-form cases."""
+    from inercal._jit import compiling
+    from inercal.report.validation import page, table
+    from inercal.validate.run import executor
+    from inercal.validate.run import validate as run
+
+    output.check((".json", ".toml"))
+    with compiling("validate", output.say), reading(output, "validating") as progress:
+        found = run(executor(), progress)
+    found = replace(found, timing={**found.timing, "total": process_age()})
+    return hand_over(found, [table(found)], lambda: page(found), output, "record")
