@@ -2,7 +2,8 @@
 
 The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
 as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors; with
-the prior where it was lost because sensors did not cease to contradict it.
+the prior where it was lost because sensors did not cease to contradict it. Over hours what it learned fades
+(`inercal.aoa.fading`).
 Rows must be later than those before them: `inercal.aoa.clock` leaves out those that are not.
 """
 
@@ -14,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa import recursion
+from inercal.aoa import fading, recursion
 from inercal.aoa.model import GRAVITY, GYRO_BIAS, RESONATORS, ROLL, ROLL_COSINE
 from inercal.aoa.problem import START, Problem
 from inercal.aoa.recursion import BESIDE, OUTPUTS
@@ -36,7 +37,7 @@ class State(NamedTuple):
 
     ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (N + 3,) as of `inercal.aoa.recursion.advance`;
     ``t`` [s] of the last row, -inf before the first; ``started``: the filter runs. Until it does ``held`` (k, N + 6)
-    are the rows that wait, time first.
+    are the rows that wait, time first. ``since`` [s] is the row from which it has learned, NaN before.
     """
 
     x: Array
@@ -45,17 +46,19 @@ class State(NamedTuple):
     t: float
     started: bool
     held: Array
+    since: float
 
 
 class Start(NamedTuple):
-    """Where the filter started: the row, counted in the trace, its state before that row's update, and whether all of
-    it is of the prior, as at first and after surprises that did not end."""
+    """Where the filter started: the row, counted in the trace, its state before that row's update, whether all of it is
+    of the prior, as at first and after surprises that did not end, and the stamp [s] from which it has learned."""
 
     row: int
     x: Array
     P: Array
     turns: Array
     anew: bool
+    since: float
 
 
 class Trace(NamedTuple):
@@ -70,7 +73,13 @@ def initial(problem: Problem) -> State:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
     return State(
-        problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3), -math.inf, False, none
+        problem.mean.copy(),
+        problem.covariance.copy(),
+        np.zeros(problem.count + 3),
+        -math.inf,
+        False,
+        none,
+        math.nan,
     )
 
 
@@ -96,7 +105,7 @@ def advance(
     rows = np.ascontiguousarray(rows)
     m, at = len(t), 0
     out = np.full((m, OUTPUTS + problem.count + 1), np.nan)
-    x, P, turns, before, running, _ = state
+    x, P, turns, before, running, _, since = state
     dt, starts = np.diff(t, prepend=before), []
     while at < m:
         if not running:
@@ -109,27 +118,31 @@ def advance(
             if not start(x, P, turns, problem, t[at:end], rows[at:end]):
                 at = end
                 continue
-            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew))
+            since = float(t[at]) if anew or math.isnan(since) else since
+            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew, since))
             dt[at] = 0.0
+        elif steps := fading.due(float(t[at - 1]) if at else before, float(t[at]), since):
+            fading.fade(x, P, problem, steps)
+        stop = fading.next_due(t, at, since)
         done = recursion.advance(
             x,
             P,
             turns,
-            dt[at:],
-            rows[at:],
+            dt[at:stop],
+            rows[at:stop],
             problem.geometry,
             problem.places,
             problem.constants,
-            out[at:],
+            out[at:stop],
             kept,
             every,
             at,
         )
         # what is lost in the row in which it started is no angle
-        at, running = (at + done, at + done == m) if done or running else (end, False)
+        at, running = (at + done, at + done == stop) if done or running else (end, False)
     before = float(t[at - 1]) if at else before
     held = np.column_stack([t[at:], rows[at:]])
-    return State(x, P, turns, before, running, held), Trace(out[:at], tuple(starts))
+    return State(x, P, turns, before, running, held, since), Trace(out[:at], tuple(starts))
 
 
 def unknown(problem: Problem) -> list[int]:
@@ -151,7 +164,7 @@ def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Ar
     new = unknown(problem)
     fresh = new[4:]
     x[fresh] = problem.mean[fresh]
-    together = t - t[0] <= 3.0 * HELD * np.median(np.diff(t, prepend=t[0]))
+    together = t - t[0] <= 3.0 * HELD * _medians(np.diff(t, prepend=t[0])[:, None])[0]
     t, rows = t[together], rows[together]
     level = math.cos(x[problem.places[ROLL]]) if spatial else problem.constants[ROLL_COSINE]
     middle = _medians(rows)
@@ -160,19 +173,21 @@ def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Ar
         return False
     cosine, sine, r, z = problem.geometry[seen].T
     axes = np.stack([cosine, -sine], axis=-1)
+    fit = np.linalg.solve(
+        axes.T @ axes, axes.T
+    )  # forward and upward specific force (2,) that fit readings along axes best
     if math.isfinite(middle[n]) and abs(level) > _ACROSS:
         rate = (middle[n] - x[GYRO_BIAS]) / level
     else:
-        rate = _slope(
-            t, np.array([_angle(_fit(axes, row), level, problem) for row in rows[:, seen] - x[5 + seen]])
-        )
+        forces = (rows[:, seen] - x[5 + seen]) @ fit.T
+        rate = _slope(t, np.array([_angle(force, level, problem) for force in forces]))
     # A = (g sin theta - r w^2) cos lambda - level (g cos theta - level z w^2) sin lambda + arm al
     read = middle[seen] - x[5 + seen] + rate**2 * (cosine * r - sine * level**2 * z)
     arms = -level * (z * cosine + r * sine)
-    arms = arms - axes @ _fit(axes, arms)
+    arms = arms - axes @ (fit @ arms)
     power = float(arms @ arms)
     acceleration = float(arms @ read) / power if power > _NO_ARM**2 else 0.0
-    x[:4] = _angle(_fit(axes, read), level, problem), rate, acceleration, 0.0
+    x[:4] = _angle(fit @ read, level, problem), rate, acceleration, 0.0
     x[0] -= 0.5 * rate * (t[-1] - t[0])
     P[new, :] = 0.0
     P[:, new] = 0.0
@@ -187,24 +202,19 @@ def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Ar
 
 def _medians(rows: Array) -> Array:
     """Medians of the columns; NaN of those without a number."""
-    known = np.isfinite(rows)
-    return np.array([np.median(c[k]) if k.any() else math.nan for c, k in zip(rows.T, known.T, strict=True)])
-
-
-def _fit(axes: Array, read: Array) -> Array:
-    """Forward and upward specific force (2,) that fit readings along axes best; NaN where one is missing."""
-    if not np.isfinite(read).all():
-        return np.full(2, np.nan)
-    return np.asarray(np.linalg.lstsq(axes, read, rcond=None)[0])
+    ordered, count = np.sort(rows, axis=0), np.isfinite(rows).sum(axis=0)  # NaN come last
+    column = np.arange(rows.shape[1])
+    middle = ordered[np.maximum(count - 1, 0) // 2, column], ordered[count // 2, column]
+    return np.asarray(0.5 * (middle[0] + middle[1]))
 
 
 def _angle(force: Array, level: float, problem: Problem) -> float:
-    """Theta that forward and upward specific force (2,) show at rest."""
+    """Theta that forward and upward specific force (2,) show at rest; NaN where they are."""
     forward, up = force.tolist()
     if abs(level) > _ACROSS:
         return math.atan2(forward, up / level)
     g = problem.constants[GRAVITY]
-    return math.asin(min(1.0, max(-1.0, forward / g)))
+    return math.asin(min(1.0, max(-1.0, forward / g))) if math.isfinite(forward) else math.nan
 
 
 def _slope(t: Array, angles: Array) -> float:

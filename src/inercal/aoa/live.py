@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa import fusion, recursion
+from inercal.aoa import fading, fusion, recursion
 from inercal.aoa.clock import PATIENCE, later
 from inercal.aoa.filtered import roll_of
 from inercal.aoa.problem import Problem
@@ -148,6 +148,8 @@ class Live:
         if not (state.started and t > state.t):
             return self._block(np.array([t]), row.copy())
         self._dt[0] = t - state.t
+        if steps := fading.due(state.t, t, state.since):
+            fading.fade(state.x, state.P, problem, steps)
         done = recursion.advance(
             state.x, state.P, state.turns, self._dt, row, problem.geometry, problem.places, problem.constants,
             self._out, self._kept, 1, 0,
@@ -158,7 +160,7 @@ class Live:
             self._fusion = state._replace(started=False, held=np.column_stack([stamp, row]))
             self._waiting = stamp
             return Told(stamp[:0], self._out[:0], self._turned(self._kept[:0]))
-        self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held)
+        self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held, state.since)
         return Told(stamp, self._out.copy(), self._turned(self._kept))
 
     def feed_block(self, recording: Recording) -> Told:
@@ -209,7 +211,7 @@ class Live:
         return rest
 
 
-def load(problem: Problem) -> None:
+def load_kernels(problem: Problem) -> None:
     """Load, or compile, the kernels of the causal fusion."""
     none = np.empty(0)
     rows = np.empty((0, problem.count + BESIDE))

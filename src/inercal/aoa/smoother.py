@@ -9,7 +9,8 @@ filter's rows are gone through backward, each scalar with the row, gain and vari
 and between the row's last scalar and the next row x_s = x - P lam, P_s = P - P Lam P, of the filter's x and P after
 the row: those before it are so wide where the filter starts that digits would be lost. No covariance is inverted. The
 filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, to
-have its rows; so memory goes with the block and not with the recording.
+have its rows; so memory goes with the block and not with the recording. What is known of constants fades between blocks
+(`inercal.aoa.fading`), lam := F^T lam there too.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
-from inercal.aoa import recursion
+from inercal.aoa import fading, recursion
 from inercal.aoa.fusion import Start, unknown
 from inercal.aoa.model import COUNT, MOVING, ROWS, STATES
 from inercal.aoa.problem import Problem
@@ -63,8 +64,7 @@ def smooth(
     end = len(t)
     for begin in reversed(starts):
         part = slice(begin.row, end)
-        dt = np.diff(t[part], prepend=t[begin.row])
-        _stretch(problem, begin, dt, rows[part], lam, Lam, out[part], kept, every)
+        _stretch(problem, begin, t[part], rows[part], lam, Lam, out[part], kept, every)
         forgotten = slice(None) if begin.anew else new
         lam[forgotten] = 0.0
         Lam[forgotten, :] = 0.0
@@ -73,33 +73,38 @@ def smooth(
     return out
 
 
-def load(problem: Problem) -> None:
+def load_kernels(problem: Problem) -> None:
     """Load, or compile, the kernels."""
     x, P = problem.mean.copy(), problem.covariance.copy()
-    start = Start(0, x, P, np.zeros(problem.count + 3), True)
+    start = Start(0, x, P, np.zeros(problem.count + 3), True, 0.0)
     smooth(problem, np.zeros(1), np.full((1, problem.count + recursion.BESIDE), np.nan), (start,))
 
 
 def _stretch(
-    problem: Problem, begin: Start, dt: Array, rows: Array, lam: Array, Lam: Array, out: Array, kept: Array, every: int
+    problem: Problem, begin: Start, t: Array, rows: Array, lam: Array, Lam: Array, out: Array, kept: Array, every: int
 ) -> None:  # fmt: skip
     """Smooth from one start on; ``lam`` and ``Lam`` go from the end of the stretch to its beginning."""
     given = (problem.geometry, problem.places, problem.constants)
-    n = problem.size
+    n, dt = problem.size, np.diff(t, prepend=t[0])
     memory = recursion.memory(min(BLOCK, len(dt)), n, int(problem.places[MOVING]), problem.count)
     causal, none = np.empty((BLOCK, OUTPUTS + problem.count + 1)), np.empty((0, 2 * n))
     x, P, turns = begin.x.copy(), begin.P.copy(), begin.turns.copy()
     heads = []
-    for a in range(0, len(dt), BLOCK):
-        heads.append((a, x.copy(), P.copy(), turns.copy()))
-        block = slice(a, a + BLOCK)
+    a = 0
+    while a < len(dt):
+        steps = fading.due(float(t[a - 1]), float(t[a]), begin.since) if a else 0
+        F = fading.fade(x, P, problem, steps) if steps else None
+        block = slice(a, min(a + BLOCK, fading.next_due(t, a, begin.since)))
+        heads.append((block, x.copy(), P.copy(), turns.copy(), F))
         done = recursion.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0)
         if done < len(dt[block]):
             break
-    for a, x, P, turns in reversed(heads):
-        block = slice(a, a + BLOCK)
+        a = block.stop
+    for block, x, P, turns, F in reversed(heads):
         done = recursion.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0, memory)
-        _backward(lam, Lam, *memory, done, *given[1:], out[block], kept, every, begin.row + a)
+        _backward(lam, Lam, *memory, done, *given[1:], out[block], kept, every, begin.row + block.start)
+        if F is not None:
+            lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
 
 
 @kernel
