@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.estimate.exchange import load
+from inercal.estimate.files import load
 from inercal.examples import FOLDER
 from inercal.instruments.noise import NoiseModel
 

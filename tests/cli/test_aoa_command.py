@@ -15,7 +15,7 @@ import pytest
 from inercal.aoa import settings
 from inercal.cli import aoa as command
 from inercal.cli import run
-from inercal.estimate.exchange import load
+from inercal.estimate.files import load
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 AOA = ["aoa", "model.csv", "--study", "aoa.toml"]

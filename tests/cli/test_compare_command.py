@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.estimate.exchange import load, save
+from inercal.estimate.files import load, save
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate

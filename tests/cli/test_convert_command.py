@@ -8,7 +8,7 @@ import pytest
 from inercal.cli import run
 from inercal.convert.correct import ImuModel
 from inercal.convert.other_tools import CONVENTIONS
-from inercal.estimate.exchange import load, save
+from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 from inercal.instruments.triad import TriadModel
@@ -65,8 +65,8 @@ FILES = {
 def test_to_a_tool_and_back_the_same_samples_come_out_of_apply(folder, capsys, tool, back):
     out = "theirs" + CONVENTIONS[tool].suffixes[0]
     assert run(["convert", "cal.json", "--to", tool, "--out", out]) == 0
-    written = [line for line in capsys.readouterr().err.splitlines() if line.startswith("written: ")]
-    assert written == [f"written: {name}" for name in FILES[tool]]
+    written = [line for line in capsys.readouterr().err.splitlines() if line.startswith(f"{tool}: ")]
+    assert written == [f"{tool}: {name}" for name in FILES[tool]]
     assert run(["convert", *FILES[tool], "--from", tool, "--out", back]) == 0
     assert "not_stated: a file of" in capsys.readouterr().err
     assert run(["apply", back, "log.csv", "--out", "true.csv", "--quiet"]) == 0

@@ -145,7 +145,10 @@ def test_apply_says_what_of_the_calibration_it_does_not_use(folder, capsys):
 def test_every_json_has_the_common_keys(arguments, command, inputs, folder, capsys):
     assert run([*arguments, "--json", "--quiet"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert list(data) == ["inercal", "command", "status", "findings", "inputs", "timing_s", "result"]
+    assert list(data) == [
+        "inercal", "command", "status", "parameters", "covariance", "findings", "statistics", "budget", "model",
+        "conditions", "traceability", "inputs", "timing_s", "provenance", "references", "result",
+    ]  # fmt: skip
     assert data["command"] == command
     assert data["status"]["code"] == "ok"
     assert data["status"]["message"]

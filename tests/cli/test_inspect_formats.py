@@ -69,8 +69,7 @@ def test_a_self_describing_file_needs_no_map(suffix, tmp_path, monkeypatch, caps
     if suffix in SUFFIXES:
         source = Source("", "")
         columns = {
-            name: Column(name, name[:-2], name[-1], parse_unit(UNITS[name]), values, T, source)
-            for name, values in DATA.items()
+            name: Column(name, parse_unit(UNITS[name]), values, T, source) for name, values in DATA.items()
         }
         write_record(Record(columns), path)
     else:

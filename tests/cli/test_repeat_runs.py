@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.estimate.exchange import load
+from inercal.estimate.files import load
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
 from inercal.records.write import write_record
 

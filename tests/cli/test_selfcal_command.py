@@ -17,7 +17,7 @@ from paper_study import TRUTH
 
 from inercal.cli import run
 from inercal.cli.selfcal import Kind
-from inercal.estimate.exchange import load
+from inercal.estimate.files import load
 from inercal.selfcal.coefficients import NAMES
 from inercal.selfcal.settings import KINDS
 from inercal.study.load import load_selfcal_study

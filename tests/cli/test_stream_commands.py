@@ -345,14 +345,3 @@ def test_a_damaged_or_another_state_is_one_sentence(here, tmp_path):
     refused(here("apply", "cal.json", "--stream", *command[1:]), "expected one of apply")
     state.write_bytes(state.read_bytes()[:-1])
     refused(here(*command), "damaged")
-
-
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root writes anywhere")
-def test_a_folder_that_cannot_be_written_is_said_before_any_line_is_read(folder, tmp_path):
-    tmp_path.chmod(0o500)
-    process = subprocess.Popen(
-        [*COMMAND, "monitor", "--checkpoint", str(tmp_path / "state")], cwd=folder, stdin=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    assert process.wait(60) == 2
-    assert "cannot be written" in process.stderr.read()

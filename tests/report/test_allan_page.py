@@ -50,9 +50,8 @@ def noise(*names, unit="deg/s", n=4000, path="static.csv"):
     model = NoiseModel(N=0.01, K=0.002)
     columns = {}
     for name in names:
-        sensor, _, axis = name.partition("_")
         values = model.simulate(n, 0.01, rng)[:, 0]
-        columns[name] = Column(name, sensor, axis, parse_unit(unit), values, t, source)
+        columns[name] = Column(name, parse_unit(unit), values, t, source)
     return noise_of(Record(columns, sources=(source,)))
 
 
@@ -60,9 +59,16 @@ def test_numbers_are_those_of_the_estimate_in_units_of_the_field():
     found = noise("gyro_x", "gyro_y", "gyro_z")
     text = page(found)
     shown = Page(text)
-    assert ["channel", "N [deg/√h]", "B [deg/h]", "K [deg/h/√h]", "R [deg/h/h]", "Q [arcsec]"] in [
-        [" ".join(cell.split()) for cell in row] for row in shown.rows
+    heads = [
+        "channel",
+        "N [deg/√h]",
+        "B [deg/h]",
+        "K [deg/h/√h]",
+        "R [deg/h/h]",
+        "Q [arcsec]",
+        "N of a sample [deg/h]",
     ]
+    assert heads in [[" ".join(cell.split()) for cell in row] for row in shown.rows]
     for name in ("gyro_x", "gyro_y", "gyro_z"):
         row = next(row for row in shown.rows if row and row[0] == name)
         value, _, u = row[1].partition(" ± ")
@@ -70,6 +76,10 @@ def test_numbers_are_those_of_the_estimate_in_units_of_the_field():
         size = np.radians(1.0) / 60.0
         assert float(value) == pytest.approx(p.value / size, abs=0.6 * float(u))
         assert float(u) == pytest.approx(p.u / size, rel=0.06)
+        interval = found.channels[0].curve.interval  # white noise of density N^2, averaged over an interval
+        assert float(row[-1]) == pytest.approx(
+            p.value / np.sqrt(interval) / np.radians(1.0 / 3600.0), rel=6e-3
+        )
 
 
 def test_a_coefficient_that_is_not_seen_is_a_limit():
@@ -131,7 +141,7 @@ def test_the_page_needs_nothing_but_itself_and_escapes_what_it_is_given():
 
 def test_a_channel_without_noise_is_drawn_too():
     t, source = np.arange(500) / 100.0, Source("a.csv", "0" * 64)
-    dead = Column("acc_x", "acc", "x", parse_unit("g"), np.ones(500), t, source)
+    dead = Column("acc_x", parse_unit("g"), np.ones(500), t, source)
     text = page(noise_of(Record({"acc_x": dead}, sources=(source,))))
     assert "acc_x: the output never changes" in text
     assert next(row for row in Page(text).rows if row and row[0] == "acc_x")[1:6] == ["–"] * 5

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.exchange import from_json, to_json
+from inercal.estimate.files import from_json, to_json
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.estimate.status import Status
 from inercal.instruments.terms import TERMS

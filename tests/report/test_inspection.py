@@ -9,10 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from inercal.estimate.result import without_parameters
+from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.record import Column, Record, Source
 from inercal.report.inspection import (
+    channels_table,
     inspection_pictures,
+    norms,
     render_inspection,
     sparkline,
     summary,
@@ -27,9 +31,7 @@ def record(columns, t=None, findings=(), unit="m/s^2"):
     t = np.arange(n) / 100.0 if t is None else t
     return Record(
         {
-            name: Column(
-                name, *name.partition("_")[::2], parse_unit(unit), np.asarray(x, dtype=float), t, SOURCE
-            )
+            name: Column(name, parse_unit(unit), np.asarray(x, dtype=float), t, SOURCE)
             for name, x in columns.items()
         },
         findings,
@@ -70,7 +72,7 @@ def test_bad_data_is_described_and_drawn_without_a_warning(values, t):
     rows = summary(r)
     assert rows[0].samples == len(values)
     assert len(sparkline(np.array(values))) == len(values)
-    render_inspection(r, rows, inspection_pictures(r))
+    render_inspection(r, told(r), inspection_pictures(r))
 
 
 values = arrays(float, st.integers(0, 200), elements=st.floats() | st.just(np.nan))
@@ -148,9 +150,14 @@ class Text(HTMLParser):
         self.words.append(data)
 
 
+def told(r):
+    """What the command brings back of a record, without its numbers."""
+    return without_parameters("inspect", Status.OK, "", inputs=r.sources, findings=r.findings)
+
+
 def test_page():
     r = record({"acc_x": [1.0, 2.0, np.nan, 6.0]}, findings=(Finding("nan", "acc_x: <i>1 missing", "row 3"),))
-    text = render_inspection(r, summary(r), inspection_pictures(r))
+    text = render_inspection(r, told(r), inspection_pictures(r))
     words = " ".join(" ".join(Text(text).words).split())
     for expected in (
         "Recording a <b>.csv",
@@ -160,12 +167,22 @@ def test_page():
     ):
         assert expected in words
     assert "http" not in text
-    assert text == render_inspection(r, summary(r), inspection_pictures(r))
+    assert text == render_inspection(r, told(r), inspection_pictures(r))
+
+
+def test_the_norm_of_a_whole_triad_is_told_and_of_no_other():
+    """(3, 0, 4) has length 5; a triad that lacks an axis, or has two units, has none; a missing sample is missing."""
+    whole = {"acc_x": [3.0, np.nan], "acc_y": [0.0, 0.0], "acc_z": [4.0, 1.0], "gyro_x": [1.0, 1.0]}
+    (norm,) = norms(record(whole))
+    assert (norm.name, norm.mean, norm.missing) == ("|acc|", 5.0, 1)
+    assert "|acc|" in channels_table(record(whole)).text()
+    del whole["acc_z"]
+    assert norms(record(whole)) == ()
 
 
 def test_page_of_nothing():
     empty = Record({})
-    assert "no channels" in render_inspection(empty, summary(empty), inspection_pictures(empty))
+    assert "no channels" in render_inspection(empty, told(empty), inspection_pictures(empty))
 
 
 def test_a_million_rows_stay_small():
@@ -180,4 +197,4 @@ def test_a_million_rows_stay_small():
     )
     pictures = inspection_pictures(r)
     assert all(len(picture.svg) < 300_000 for picture in pictures)
-    assert len(render_inspection(r, summary(r), pictures)) < 1_000_000
+    assert len(render_inspection(r, told(r), pictures)) < 1_000_000

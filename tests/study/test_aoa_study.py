@@ -79,7 +79,7 @@ def test_all_that_settings_hold_is_reached():
     found = study(
         prior={
             "lever_common": "4 mm", "lever": "2 mm", "height": "1 cm", "gyro_scale": "0.2 %", "gyro_delay": "1 ms",
-            "vertical": {"frequency": "7 Hz", "damping": 0.2, "level": "0.02 g"}, "axial": {"level": "1 mg"},
+            "heave": {"frequency": "7 Hz", "damping": 0.2, "level": "0.02 g"}, "axial": {"level": "1 mg"},
         },
         timing={"gyro_delay": "-2 ms", "common_delay": "1 ms"},
         estimator={"states": 8, "smooth": True, "snap": "2e6 rad^2/s^7", "gate": 9},
@@ -98,10 +98,8 @@ def test_all_that_settings_hold_is_reached():
     prior, two_pi = found.prior, 2.0 * math.pi
     assert (prior.lever_common, prior.lever, prior.height) == pytest.approx((4e-3, 2e-3, 1e-2))
     assert (prior.gyro_scale, prior.gyro_delay) == pytest.approx((2e-3, 1e-3))
-    vertical = prior.vertical
-    assert (vertical.frequency, vertical.damping, vertical.level) == pytest.approx(
-        (7 * two_pi, 0.2, 0.02 * G)
-    )
+    heave = prior.heave
+    assert (heave.frequency, heave.damping, heave.level) == pytest.approx((7 * two_pi, 0.2, 0.02 * G))
     assert (prior.axial.frequency, prior.axial.level) == pytest.approx((12 * two_pi, 1e-3 * G))
     assert (found.timing.gyro_delay, found.timing.common_delay) == pytest.approx((-2e-3, 1e-3))
     assert found.timing.common_delay_u == 0.0
@@ -178,10 +176,10 @@ REFUSED = {
     "noise.accelerometer=1e-4 deg": "noise.accelerometer: found '1e-4 deg', which is of angle",
     "prior.lever=0 mm": "prior.lever: .*above zero",
     "prior.lever=3 m": "prior.lever: .*mm given as m",
-    "prior.vertical.damping=1": "prior.vertical.damping: .*below 1",
-    "prior.verticl.damping=0.1": "prior.verticl: unknown key, did you mean vertical?",
+    "prior.heave.damping=1": "prior.heave.damping: .*below 1",
+    "prior.heav.damping=0.1": "prior.heav: unknown key, did you mean heave?",
     "motion.kind=wobble": "motion.kind: found 'wobble', expected 'static'",
-    "motion.kind=chirp": "motion: frequency: found with kind = 'chirp', expected it with sine or two-tone only",
+    "motion.kind=chirp": "motion: low: missing, expected it with kind = 'chirp'",
     "motion.rms=1 deg": "motion: rms: found with kind = 'sine', expected it with pitch-pause or buffet only",
     "motion.frequency=0 Hz": "motion.frequency: .*a frequency above zero",
     "motion.duration=1e9 s": "motion: found 1e.12 samples, expected 2 to 2e.07",

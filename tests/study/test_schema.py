@@ -1,5 +1,8 @@
 """The JSON Schema of studies: valid, strict, described, and of one mind with the reader."""
 
+import re
+from itertools import combinations
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -8,7 +11,8 @@ from jsonschema import Draft202012Validator
 from inercal.errors import StudyError
 from inercal.study.imu import imu_study
 from inercal.study.schema import json_schema
-from inercal.units import _TABLE
+from inercal.study.ways import DISTRIBUTIONS
+from inercal.units import _TABLE, parse_unit
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -31,6 +35,81 @@ def test_it_is_a_schema_and_the_full_study_fits():
     Draft202012Validator.check_schema(SCHEMA)
     assert VALIDATOR.is_valid(GOOD)
     assert imu_study(GOOD, "study.toml").static_start == 50.0
+
+
+def keys(kind):
+    """Dotted name -> schema of every key of a kind of study, those of its tables too."""
+    found = {}
+
+    def walk(path, schema):
+        if "$ref" in schema:
+            schema = SCHEMA["$defs"][schema["$ref"].rsplit("/", 1)[-1]]
+        for one in schema.get("anyOf", ()):
+            walk(path, one)
+        for key, value in schema.get("properties", {}).items():
+            found[f"{path}.{key}".lstrip(".")] = value
+            walk(f"{path}.{key}", value)
+
+    walk("", SCHEMA["$defs"][f"{kind}StudyFile"])
+    return found
+
+
+def dimensions(schema):
+    """What the quantities that a key takes measure: of its example, of the examples of a list or of one of several."""
+    parts = [schema, *schema.get("anyOf", ()), schema.get("items", {})]
+    examples = [part["examples"][0] for part in parts if "pattern" in part]
+    units = [re.sub(r"^[+-]?[0-9.]+(\([0-9.]+\))?(e[+-]?[0-9]+)?", "", text).strip() for text in examples]
+    return {parse_unit(unit).dimension if unit else "number" for unit in units}
+
+
+KINDS = {kind: keys(kind) for kind in ("Imu", "Turntable", "Selfcal", "Aoa")}
+OWN_TABLES = ("rig", "noise", "prior", "disturbances", "design", "timing")
+"""Tables that are of each kind of study what its rig, instruments and search need."""
+
+TWO_DIMENSIONS = {
+    "step": "time from row to row of a path, angle of a move of a pitch-pause",
+    "start": "angles at which a path begins, time at which a stretch does",
+    "rms": "of an angle, or of an acceleration",
+    "range": "of an accelerometer, of a gyro",
+    "z": "height of a sensor, limits of a gimbal",
+    **dict.fromkeys(DISTRIBUTIONS, "errors of a table that are angles, and the offset of its axes"),
+}
+
+
+def test_a_key_that_several_kinds_have_is_one_key():
+    """Outside the tables of each kind's own what has one dotted name has one schema, and so one meaning."""
+    for one, other in combinations(KINDS.values(), 2):
+        shared = {name for name in one.keys() & other.keys() if name.partition(".")[0] not in OWN_TABLES}
+        assert {"schema", "site.gravity", "traceability.reference", "conditions.temperature"} <= shared
+        for name in shared - {"site"}:  # described by what stands there
+            assert one[name] == other[name], name
+
+
+def test_a_key_measures_the_same_wherever_it_is():
+    """One word, one dimension, but for those that say why not; samples per second are always `sample_rate`."""
+    measured = {}
+    for found in KINDS.values():
+        for name, schema in found.items():
+            measured.setdefault(name.rpartition(".")[2], set()).update(dimensions(schema))
+    assert {name for name, of in measured.items() if len(of) > 1} == TWO_DIMENSIONS.keys()
+    assert {name for name, of in measured.items() if "frequency" in of} == {
+        *("sample_rate", "frequency", "second_frequency", "low", "high", "bandwidth"),
+    }
+
+
+def test_what_is_simulated_and_what_is_known_before_have_the_same_names():
+    """A disturbance that the filter allows for, and the key of [prior] that says how much."""
+    names = [{key.split(".")[1] for key in KINDS["Aoa"] if key.startswith(f"{table}.")} for table in
+             ("prior", "disturbances", "timing")]  # fmt: skip
+    prior, disturbances, timing = names
+    assert prior & disturbances == {"heave", "axial", "gyro_scale", "gyro_delay"}
+    assert timing <= disturbances
+    truth, before, goal = (
+        {key for key in KINDS["Selfcal"] if key.startswith(f"{table}.")}
+        for table in ("truth", "prior", "goal")
+    )
+    assert len(truth) == 8
+    assert {key[6:] for key in truth} == {key[6:] for key in before} == {key[5:] for key in goal}
 
 
 def test_every_table_and_key_has_title_and_description():

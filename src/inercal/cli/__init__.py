@@ -35,10 +35,11 @@ def process_age() -> float:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 interrupted."""
+    """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 interrupted, by Ctrl-C or SIGTERM."""
     gc.set_threshold(50_000, 20, 20)  # loading and drawing make many objects that stay: a tenth of the time
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
+    for signum in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(signum) is not signal.SIG_IGN:
+            signal.signal(signum, _interrupt)
     code = run(arguments)
     if code == EXIT_INTERRUPTED and hasattr(signal, "pthread_sigmask"):
         # an interrupt within `exec` of a text, as in a dataclass being made, is sent once more by Python at its end
@@ -47,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _interrupt(signum: int, frame: FrameType | None) -> None:
-    """Interrupt as Python does, and remember it."""
+    """Interrupt as Python does on Ctrl-C, and remember it."""
     _ASKED.append(True)
     raise KeyboardInterrupt
 
@@ -68,12 +69,13 @@ def run(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         _say("interrupted")
         return EXIT_INTERRUPTED
-    except BrokenPipeError:
-        problem = "standard output was closed before everything was written, expected a reader to the end"
+    except (BrokenPipeError, SystemExit):  # of a help text, whose reader has left
+        abandon_output()
+        return 0
     except InercalError as error:
         problem = str(error)
     except MemoryError:
-        problem = "not enough memory for this recording"
+        problem = "not enough memory for what was asked"
     except OSError as error:
         problem = f"{error.filename or 'standard output'}: {error.strerror or error}"
     except Exception as error:
@@ -109,6 +111,14 @@ def _say(text: str) -> None:
 
     with contextlib.suppress(OSError, ValueError):
         print(f"inercal: {text}", file=sys.stderr, flush=True)
+
+
+def show(text: str) -> None:
+    """Print a result; a reader that has left, as `head` does, has had what it wanted."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        abandon_output()
 
 
 def abandon_output() -> None:

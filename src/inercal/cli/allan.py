@@ -8,7 +8,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli import process_age
 from inercal.cli.options import Files, MapFile, ReportOutput, read_record, working
 from inercal.cli.outcome import hand_over
 
@@ -39,7 +38,7 @@ def allan(
     with working(output) as progress:
         progress("noise")
         noise = noise_of(record, {f"{name}_s": value for name, value in span.items() if value is not None})
-    timing = {"read": read_s, "solve": noise.estimate.timing["solve"], "total": process_age()}
+    timing = {"read": read_s, "solve": noise.estimate.timing["solve"]}
     estimate = replace(noise.estimate, timing=timing)
     noise = replace(noise, estimate=estimate)
     return hand_over(

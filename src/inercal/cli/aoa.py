@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli import process_age
 from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
 from inercal.cli.outcome import hand_over
-from inercal.cli.streaming import Every, StreamOptions, interval_of, run_stream
-from inercal.errors import InputError, StudyError, UsageError
+from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
+from inercal.errors import InputError, StudyError
 
 if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
     from inercal.aoa.task import Measurement
-    from inercal.records.findings import Finding
     from inercal.records.record import Record
+    from inercal.stream.lines import Lines
 
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
@@ -109,17 +108,12 @@ def aoa(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Measure the angle of attack of a wind-tunnel model."""
-    paths = files or []
     keys = [*(overrides or ()), *how.keys]
     how.check(stream)
     if stream:
-        _live(paths, study, map_file, keys, interval_of(every), streaming, output)
+        _live(streamed(files), study, map_file, keys, interval_of(every), streaming, output)
         return 0
-    if not paths:
-        raise UsageError("aoa: FILES is missing, expected a recording, or --stream")
-    for option, given in (("--checkpoint", streaming != StreamOptions()), ("--every", every is not None)):
-        if given:
-            raise InputError(option, "found without --stream, expected them together")
+    paths = recorded("aoa", files, streaming, every)
 
     from inercal._jit import compiling
     from inercal.aoa.task import load_kernels, measure
@@ -138,7 +132,7 @@ def aoa(
         load_kernels(settings, methods, how.compare)
     with of_study(study), working(output) as progress:
         found = measure(record, settings, methods, how.compare, progress)
-    timing = {"read": read_s, "solve": found.estimate.timing["solve"], "total": process_age()}
+    timing = {"read": read_s, "solve": found.estimate.timing["solve"]}
     inputs = (*found.estimate.inputs, source_of(study))
     found = replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs))
     return _handed_over(found, how, output)
@@ -157,8 +151,8 @@ def _one_run(records: Sequence[Record]) -> Record:
 
 def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -> int:
     """Write what was asked for, say what was found, and give the exit code."""
-    from inercal.aoa.display import delays, use_of_fit
-    from inercal.aoa.tables import all_tables
+    from inercal.aoa.display import delays, rest_of_fit, use_of_fit
+    from inercal.aoa.tables import answer, on_terminal
 
     def page() -> str:
         from inercal.aoa.figures import angle_page
@@ -176,14 +170,15 @@ def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -
         )
         write_record(record, path)
 
-    points = found.points if how.points else ()
-    shown = [f"{table.title}\n{table.text()}" for table in all_tables(found.estimate, points, found.settings)]
-    shown += [text for text in (delays(found.estimate), use_of_fit(found.estimate)) if text]
-    return hand_over(found.estimate, shown, page, output, "angles", rows)
+    estimate, points = found.estimate, found.points if how.points else ()
+    tables = [*answer(estimate, points, found.settings), *on_terminal(estimate)]
+    shown = [f"{table.title}\n{table.text()}" for table in tables]
+    shown += [rest_of_fit(estimate), delays(estimate), use_of_fit(estimate)]
+    return hand_over(estimate, shown, page, output, "angles", rows)
 
 
 def _live(
-    paths: list[Path],
+    file: Path | None,
     study: Path,
     map_file: Path | None,
     keys: list[str],
@@ -193,25 +188,23 @@ def _live(
 ) -> None:
     """Measure row by row."""
     from inercal._jit import compiling
-    from inercal.aoa.live import load
+    from inercal.aoa.live import load_kernels
     from inercal.aoa.problem import problem
     from inercal.stream.aoa import Aoa
     from inercal.study.load import load_aoa_study
 
-    if len(paths) > 1:
-        raise InputError("--stream", f"found {len(paths)} files, expected one or standard input")
-    file = paths[0] if paths else None
     streaming.check(output, (file, map_file, study))
     settings = load_aoa_study(study, keys)
-
-    def say(finding: Finding) -> None:
-        output.say_findings([finding])
-
     with of_study(study):
         if settings.estimator.smooth:
             raise StudyError(
                 "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
             )
         with compiling("aoa", output.say):
-            load(problem(settings))
-        run_stream(lambda lines: Aoa(lines, settings, interval, say), file, map_file, output, streaming)
+            load_kernels(problem(settings))
+
+    def measurement(lines: Lines) -> Aoa:
+        with of_study(study):
+            return Aoa(lines, settings, interval, output.say_finding)
+
+    run_stream(measurement, file, map_file, output, streaming)

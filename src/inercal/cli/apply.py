@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, MapFile, envelope, read_record, reading
-from inercal.cli.streaming import StreamOptions, run_stream
-from inercal.errors import InputError, UsageError
+from inercal.cli.options import FileOutput, MapFile, read_record, reading
+from inercal.cli.outcome import emit, told
+from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
+from inercal.errors import InputError
 from inercal.records.findings import Finding
 
 if TYPE_CHECKING:
@@ -35,13 +36,10 @@ def apply(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Correct a recording with a calibration."""
-    paths = files or []
     if stream:
         from inercal.stream.apply import Apply
 
-        if len(paths) > 1:
-            raise InputError("--stream", f"found {len(paths)} files, expected one or standard input")
-        file = paths[0] if paths else None
+        file = streamed(files)
         streaming.check(output, (calibration, file, map_file))
         model, findings = _model(calibration)
         output.say_findings(findings)
@@ -52,12 +50,9 @@ def apply(
     from inercal.records.read import source_of
     from inercal.records.write import SUFFIXES, write_record
 
-    if not paths:
-        raise UsageError("apply: FILES is missing, expected recordings, or --stream")
+    paths = recorded("apply", files, streaming)
     if output.out is None:
         raise InputError("--out", "missing, expected the file to write, such as corrected.csv")
-    if streaming != StreamOptions():
-        raise InputError("--checkpoint", "found without --stream, expected them together")
     output.check(SUFFIXES, (calibration, *paths, map_file))
     model, findings = _model(calibration)
     record = apply_to(read_record(paths, map_file, output), model, invert)
@@ -68,7 +63,7 @@ def apply(
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
-    output.emit(envelope("apply", words, result, inputs, findings), words)
+    emit(told("apply", words, result, inputs, findings), words, output)
 
 
 def _said_of(record: Record, model: Model) -> tuple[Finding, ...]:
@@ -84,7 +79,7 @@ def _said_of(record: Record, model: Model) -> tuple[Finding, ...]:
 def _model(calibration: Path) -> tuple[Model, tuple[Finding, ...]]:
     """The instrument of a calibration, and what to say of that: a bad verdict, terms that are not applied."""
     from inercal.convert import correct, platform
-    from inercal.estimate.exchange import load
+    from inercal.estimate.files import load
     from inercal.estimate.status import Status
 
     estimate = load(calibration)

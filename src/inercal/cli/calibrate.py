@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from inercal.cli import process_age
 from inercal.cli.options import (
     Files,
     MapFile,
@@ -170,7 +169,7 @@ def _solve(
             of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
             found = calibrate(record, told, lambda text, of_run=of_run: progress(of_run + text))  # type: ignore[misc]
             estimate = found.estimate
-            timing = {"read": read_s, "solve": estimate.timing["solve"], "total": process_age()}
+            timing = {"read": read_s, "solve": estimate.timing["solve"]}
             inputs = (*estimate.inputs, *map(source_of, studied))
             solved.append((found, replace(estimate, timing=timing, inputs=inputs)))
     return solved

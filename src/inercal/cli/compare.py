@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli import process_age
 from inercal.cli.options import ReportOutput
 from inercal.cli.outcome import hand_over
 
@@ -29,7 +28,7 @@ def compare(
     """Compare two calibrations of one instrument."""
     from inercal.estimate.compare import Saved
     from inercal.estimate.compare import compare as compared
-    from inercal.estimate.exchange import load
+    from inercal.estimate.files import load
     from inercal.records.read import source_of
     from inercal.report.comparison import page, table
 
@@ -39,7 +38,7 @@ def compare(
     inputs = (source_of(first), source_of(second))
     read = time.perf_counter()
     estimate = compared(*files)
-    timing = {"read": read - clock, "solve": time.perf_counter() - read, "total": process_age()}
+    timing = {"read": read - clock, "solve": time.perf_counter() - read}
     estimate = replace(estimate, inputs=inputs, timing=timing)
     shown = _of_field(estimate) if files[0].estimate.command == "selfcal" else estimate
     return hand_over(estimate, [table(shown)], lambda: page(shown), output, "comparison")

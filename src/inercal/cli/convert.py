@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli import EXIT_BAD_VERDICT, process_age
+from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import FileOutput
+from inercal.cli.outcome import WHOLE, emit
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,13 +39,13 @@ def convert(
 ) -> int:
     """Convert a calibration to or from another tool's."""
     from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
-    from inercal.estimate.exchange import load
+    from inercal.estimate.files import load
     from inercal.estimate.status import Status
     from inercal.records.read import source_of
 
     if to is None and source is None:
         raise InputError("--to", "missing, expected --to or --from and one of " + ", ".join(CONVENTIONS))
-    output.check((".json", ".toml") if to is None else CONVENTIONS[to].suffixes, files)
+    output.check(WHOLE if to is None else CONVENTIONS[to].suffixes, files)
     units = {sensor: unit for sensor, unit in (("acc", acc_unit), ("gyro", gyro_unit)) if unit is not None}
     if source is None:
         if units:
@@ -62,25 +63,24 @@ def convert(
     if to is None:
         _write_calibration(estimate, output)
     else:
-        _write_texts(to_tool(estimate, to, files[0]), files, output)
+        _write_texts(to_tool(estimate, to, files[0]), to, files, output)
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
 
 
 def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
     """The calibration, to its file and as a table."""
-    from inercal.estimate.exchange import save, to_json
+    from inercal.estimate.files import save
 
     output.say_findings(estimate.findings)
     if output.out is not None:
         save(estimate, output.out)
         output.say(f"calibration: {output.out}")
-    output.emit(to_json(_timed(estimate)), f"{estimate.table()}\n\n{estimate.message}")
+    emit(replace(estimate, timing={}), f"{estimate.table()}\n\n{estimate.message}", output)
 
 
-def _write_texts(converted: Converted, files: list[Path], output: FileOutput) -> None:
+def _write_texts(converted: Converted, tool: Tool, files: list[Path], output: FileOutput) -> None:
     """The files of the tool and the table of their terms; without --out their texts instead."""
     from inercal._files import write_text
-    from inercal.estimate.exchange import to_json
 
     estimate = converted.estimate
     output.say_findings(estimate.findings)
@@ -96,16 +96,11 @@ def _write_texts(converted: Converted, files: list[Path], output: FileOutput) ->
             replace(output, out=path).spare(files)
         for path, content in written.items():
             write_text(path, content)
-            output.say(f"written: {path}")
+            output.say(f"{tool}: {path}")
         text = f"{estimate.table()}\n\n{estimate.model}"
     result = {
         **estimate.result,
         "texts": list(converted.texts.values()),
         "files": [str(path) for path in written],
     }
-    output.emit(to_json(_timed(replace(estimate, result=result))), text)
-
-
-def _timed(estimate: Estimate) -> Estimate:
-    """The estimate with the time of the whole process."""
-    return replace(estimate, timing={"total": process_age()})
+    emit(replace(estimate, result=result, timing={}), text, output)

@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from inercal.cli.options import Overrides, ReportOutput, Study, envelope, of_study, reading, working
+from inercal.cli.options import Overrides, ReportOutput, Study, of_study, reading, working
+from inercal.cli.outcome import WHOLE, hand_over, told
 
 if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
     from inercal.records.findings import Finding
     from inercal.selfcal.plan import Plan
+    from inercal.selfcal.settings import SelfcalSettings
     from inercal.turntable.settings import TurntableSettings
 
 
@@ -42,12 +45,13 @@ def design_positions(
     *,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
-) -> None:
+) -> int:
     """Find the positions of a turntable that calibrate best."""
+    from inercal._files import write_text
     from inercal.study.load import files_of, load_turntable_study
     from inercal.turntable.task import design
 
-    output.check((".json", ".csv"), (study,))
+    output.check((*WHOLE, ".csv"), (study,))
     clock = time.perf_counter()
     settings = load_turntable_study(study, overrides or ())
     inputs = files_of(study, settings.given)
@@ -57,14 +61,17 @@ def design_positions(
     with of_study(study), working(output) as progress:
         designed = design(settings, progress)
     timing = {"read": read_s, "solve": time.perf_counter() - clock}
+    estimate = _told("design positions", designed, timing, inputs, settings)
 
     def page() -> str:
         from inercal.turntable.figures import design_page
 
-        return design_page(designed, settings)
+        return design_page(designed, settings, estimate)
 
-    rows = _positions(designed.result["positions"], settings)
-    _hand_over("design positions", designed, timing, inputs, output, "positions", rows, page)
+    def rows(path: Path) -> None:
+        write_text(path, _positions(designed.result["positions"], settings))
+
+    return hand_over(estimate, [designed.table()], page, output, "positions", rows)
 
 
 def design_selfcal(
@@ -73,8 +80,9 @@ def design_selfcal(
     *,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
-) -> None:
+) -> int:
     """Find the path on which a platform calibrates itself best."""
+    from inercal._files import write_text
     from inercal._jit import compiling
     from inercal.selfcal.bounds import bounds
     from inercal.selfcal.filtered import problem
@@ -93,42 +101,33 @@ def design_selfcal(
         with reading(output, "searching") as progress:
             designed = design(settings, *(() if progress is None else (progress,)))
     timing = {"read": read_s, "solve": time.perf_counter() - clock}
+    estimate = _told("design selfcal", designed, timing, (study,), settings)
 
     def page() -> str:
         from inercal.selfcal.figures import design_page
 
-        return design_page(designed, settings)
+        return design_page(designed, settings, estimate)
 
-    plan = _plan(designed.plan, designed.message)
-    _hand_over("design selfcal", designed, timing, (study,), output, "plan", plan, page)
+    def plan(path: Path) -> None:
+        write_text(path, _plan(designed.plan, designed.message))
+
+    return hand_over(estimate, [designed.table()], page, output, "plan", plan, whole=(".json",))
 
 
-def _hand_over(
+def _told(
     command: str,
     designed: Designed,
     timing: Mapping[str, float],
     inputs: Iterable[Path],
-    output: ReportOutput,
-    what: str,
-    text: str,
-    page: Callable[[], str],
-) -> None:
-    """Write what was asked for, the whole object as JSON or ``text``, which is ``what`` in a word; and print it."""
-    from inercal._files import write_text
+    settings: TurntableSettings | SelfcalSettings,
+) -> Estimate:
+    """What was designed as a result."""
     from inercal.records.read import source_of
 
-    output.say_findings(designed.findings)
-    data = envelope(
-        command, designed.message, designed.result, map(source_of, inputs), designed.findings, timing=timing
+    sources = map(source_of, inputs)
+    return told(
+        command, designed.message, designed.result, sources, designed.findings, timing, settings.given
     )
-    if output.out is not None:
-        whole = output.out.suffix.lower() == ".json"
-        write_text(output.out, json.dumps(data, indent=1, ensure_ascii=False) + "\n" if whole else text)
-        output.say(f"{what}: {output.out}")
-    if output.report is not None:
-        write_text(output.report, page())
-        output.say(f"report: {output.report}")
-    output.emit(data, f"{designed.table()}\n\n{designed.message}")
 
 
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, envelope
+from inercal.cli.options import FileOutput
+from inercal.cli.outcome import emit, told
 from inercal.errors import InputError
 
 
@@ -19,16 +20,15 @@ def examples(
     """List the recordings that ship with inercal, or copy one."""
     from pathlib import Path
 
-    from inercal._files import write_bytes
-    from inercal.examples import EXAMPLES, FOLDER
-    from inercal.records.read import source_of
+    from inercal._files import read_bytes, write_bytes
+    from inercal.examples import EXAMPLES, FOLDER, shipped
 
     if name is None:
         if output.out is not None:
             raise InputError("--out", "found no example to copy, expected its name before")
         rows = [{"name": e.name, "title": e.title, "files": list(e.files)} for e in EXAMPLES.values()]
         text = "\n".join(f"{e.name:11s} {e.title}" for e in EXAMPLES.values())
-        output.emit(envelope("examples", f"{len(rows)} examples", {"examples": rows}), text)
+        emit(told("examples", f"{len(rows)} examples", {"examples": rows}), text, output)
         return
     if name not in EXAMPLES:
         raise InputError(name, f"no such example, expected one of {', '.join(EXAMPLES)}")
@@ -39,12 +39,11 @@ def examples(
         raise InputError(folder, f"cannot be made ({error.strerror})") from error
     for file in example.files:
         target = folder / Path(file).name
-        if target.exists():
+        if target.exists() and read_bytes(target) != read_bytes(FOLDER / file):
             raise InputError(target, "exists already, expected a new folder (--out)")
     for file in example.files:
-        write_bytes(folder / Path(file).name, (FOLDER / file).read_bytes())
+        write_bytes(folder / Path(file).name, read_bytes(FOLDER / file))
     result = {"folder": str(folder), "run": example.command(str(folder))}
-    data = envelope(
-        "examples", f"copied to {folder}", result, [source_of(FOLDER / file) for file in example.files]
-    )
-    output.emit(data, f"copied to {folder}; now run\n{result['run']}")
+    sources = map(shipped, example.files)
+    estimate = told("examples", f"copied to {folder}", result, sources)
+    emit(estimate, f"{estimate.message}; now run\n{result['run']}", output)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, envelope
+from inercal.cli.options import FileOutput
+from inercal.cli.outcome import emit, told
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -99,4 +100,4 @@ def _new(
     words = "\n".join(f"{path}: look it over and correct it" for path in written)
     if column_map is not None and not _mapped(column_map):
         words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
-    output.emit(envelope(f"new {kind}", words, result, map(source_of, files)), words)
+    emit(told(f"new {kind}", words, result, map(source_of, files)), words, output)

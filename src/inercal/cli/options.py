@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from inercal.cli import process_age
+from inercal.cli import show
 from inercal.errors import InputError, StudyError
 
 if TYPE_CHECKING:
+    from cyclopts import Token
+
     from inercal.records.findings import Finding
-    from inercal.records.record import Record, Source
+    from inercal.records.record import Record
 
 Files = Annotated[
     list[Path], Parameter(help="Recordings; several files with distinct channels are one record.")
@@ -38,6 +40,10 @@ Study = Annotated[Path, Parameter(help="Study file (TOML); `inercal new` writes 
 Overrides = Annotated[
     list[str] | None, Parameter(name="--set", help="Override one study key: key=value. May be repeated.")
 ]
+
+
+_LONG = 10.0
+"""Time [s] after which a command that has no terminal to show its progress on says that it is at work."""
 
 
 @Parameter(name="*")
@@ -68,17 +74,21 @@ class Output:
     def say_findings(self, findings: Iterable[Finding]) -> None:
         """Findings for people, one a line."""
         for finding in findings:
-            where = f" ({finding.where})" if finding.where else ""
-            self.say(f"{finding.code}: {finding.message}{where}")
+            self.say_finding(finding)
+
+    def say_finding(self, finding: Finding) -> None:
+        """A finding for people."""
+        where = f" ({finding.where})" if finding.where else ""
+        self.say(f"{finding.code}: {finding.message}{where}")
 
     def emit(self, data: Mapping[str, Any], text: str) -> None:
         """The result on standard output: the JSON object, or the text for people."""
         if self.json:
-            print(json.dumps(data, indent=1, allow_nan=False), flush=True)
+            show(json.dumps(data, indent=1, allow_nan=False))
             for message in self._unsaid:
                 self.say_now(message)
         elif text:
-            print(text)
+            show(text)
 
 
 @Parameter(name="*")
@@ -94,8 +104,11 @@ class FileOutput(Output):
         return () if self.out is None else (self.out,)
 
     def check(self, suffixes: Sequence[str], inputs: Iterable[str | Path | None] = ()) -> None:
-        """Fail before any work is done where a result could not be written; raises `InputError`."""
-        if self.out is not None and self.out.suffix.lower() not in suffixes:
+        """Fail before any work is done where a result could not be written; raises `InputError`.
+
+        Without ``suffixes`` a file may have any.
+        """
+        if self.out is not None and suffixes and self.out.suffix.lower() not in suffixes:
             raise InputError(
                 self.out, f"found the suffix {self.out.suffix!r} for --out, expected {' or '.join(suffixes)}"
             )
@@ -133,32 +146,6 @@ class ReportOutput(FileOutput):
         super().check(suffixes, inputs)
 
 
-def envelope(
-    command: str,
-    message: str,
-    result: Mapping[str, Any],
-    inputs: Iterable[Source] = (),
-    findings: Iterable[Finding] = (),
-    timing: Mapping[str, float] | None = None,
-) -> dict[str, Any]:
-    """The JSON object of a command that ended well, with the keys that all have in common."""
-    from inercal import __version__
-    from inercal.estimate.exchange import plain_objects
-
-    whole: dict[str, Any] = plain_objects(
-        {
-            "inercal": __version__,
-            "command": command,
-            "status": {"code": "ok", "message": message},
-            "findings": [{"code": f.code, "message": f.message, "where": f.where} for f in findings],
-            "inputs": [{"path": s.path, "sha256": s.sha256} for s in inputs],
-            "timing_s": {**(timing or {}), "total": process_age()},
-            "result": result,
-        }
-    )
-    return whole
-
-
 def read_record(files: Sequence[Path], map_file: Path | None, output: FileOutput) -> Record:
     """Read recordings, with a progress bar where it takes long."""
     from inercal.records.maps import read_map
@@ -183,6 +170,15 @@ def read_repeats(files: Sequence[Path], map_file: Path | None, output: FileOutpu
     return records
 
 
+def whole_number(kind: object, tokens: Sequence[Token]) -> int:
+    """What was typed for an option as a whole number, which 1.5 is not; raises `InputError`."""
+    (typed,) = tokens
+    try:
+        return int(typed.value)
+    except ValueError as error:
+        raise InputError(typed.keyword, f"found {typed.value!r}, expected a whole number") from error
+
+
 @contextmanager
 def of_study(path: Path) -> Iterator[None]:
     """Name the study where a task finds fault with one of its keys; what is wrong with a recording stays as it is."""
@@ -196,9 +192,9 @@ def of_study(path: Path) -> Iterator[None]:
 
 @contextmanager
 def working(output: Output) -> Iterator[Callable[[str], None]]:
-    """A callback (text) that says on a terminal what is being done, and leaves nothing behind."""
+    """A callback (text) that shows on a terminal what is being done, and leaves nothing; elsewhere see `_once`."""
     if output.quiet or not sys.stderr.isatty():
-        yield lambda _: None
+        yield _once(output)
         return
     from rich.console import Console
 
@@ -206,11 +202,28 @@ def working(output: Output) -> Iterator[Callable[[str], None]]:
         yield status.update
 
 
+def _once(output: Output) -> Callable[[str], None]:
+    """A callback (text) that says one line in a log, and only of what lasts."""
+    due = time.perf_counter() + _LONG
+
+    def say(text: str) -> None:
+        nonlocal due
+        if time.perf_counter() > due:
+            due = float("inf")
+            output.say_now(f"still at it: {text}")
+
+    return say
+
+
 @contextmanager
 def reading(output: Output, what: str = "reading") -> Iterator[Callable[[int, int], None] | None]:
-    """A callback (done, total) that shows a bar on standard error once a second has passed."""
-    if output.quiet or not sys.stderr.isatty():
+    """A callback (done, total) that shows a bar on a terminal once a second has passed; elsewhere see `_once`."""
+    if output.quiet:
         yield None
+        return
+    if not sys.stderr.isatty():
+        say = _once(output)
+        yield lambda done, total: say(f"{what}, {done} of {total}")
         return
     began = time.perf_counter()
     bar: Any = None

@@ -1,16 +1,58 @@
-"""An estimate going out of a command: file, report, words, and the exit code."""
+"""What a command brings back going out: file, report, words, and the exit code."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import ReportOutput
+from inercal.cli import EXIT_BAD_VERDICT, process_age
+from inercal.cli.options import FileOutput, ReportOutput
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
+    from inercal.records.findings import Finding
+    from inercal.records.record import Source
+
+WHOLE = (".json", ".toml")
+"""Suffixes of a file that holds the whole result."""
+
+
+def told(
+    command: str,
+    message: str,
+    result: Mapping[str, Any],
+    inputs: Iterable[Source] = (),
+    findings: Iterable[Finding] = (),
+    timing: Mapping[str, float] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    seed: int | None = None,
+) -> Estimate:
+    """What a command that estimates no coefficients brings back: the one type of result, ended well.
+
+    ``settings`` are the keys of a study as they were given, for `Estimate.provenance`.
+    """
+    from inercal.estimate.result import provenance, without_parameters
+    from inercal.estimate.status import Status
+
+    return without_parameters(
+        command,
+        Status.OK,
+        message,
+        result=result,
+        inputs=tuple(inputs),
+        findings=tuple(findings),
+        timing=timing or {},
+        provenance={} if settings is None else {**provenance(settings), "seed": seed},
+    )
+
+
+def emit(estimate: Estimate, text: str, output: FileOutput) -> None:
+    """The result on standard output: the JSON object with the time of the whole process, or the text for people."""
+    from inercal.estimate.files import to_json
+
+    output.emit(to_json(timed(estimate)), text)
 
 
 def hand_over(
@@ -20,18 +62,20 @@ def hand_over(
     output: ReportOutput,
     what: str = "calibration",
     write: Callable[[Path], None] | None = None,
+    whole: tuple[str, ...] = WHOLE,
 ) -> int:
     """Write what was asked for, say the verdict, and give the exit code.
 
     People see the ``tables`` that are not empty; ``what`` the file is, in a word. ``write`` writes it where its
-    suffix is neither .json nor .toml.
+    suffix is not one of ``whole``.
     """
     from inercal._files import write_text
-    from inercal.estimate.exchange import save, to_json
+    from inercal.estimate.files import save
     from inercal.estimate.status import Status
 
+    estimate = timed(estimate)
     if output.out is not None:
-        if write is not None and output.out.suffix.lower() not in (".json", ".toml"):
+        if write is not None and output.out.suffix.lower() not in whole:
             write(output.out)
         else:
             save(estimate, output.out)
@@ -42,8 +86,13 @@ def hand_over(
         if path is not None:
             output.say(f"{written}: {path}")
     text = "".join(f"{table}\n\n" for table in tables if table)
-    output.emit(to_json(estimate), f"{text}{estimate.status.value}: {estimate.message}")
+    emit(estimate, f"{text}{estimate.status.value}: {estimate.message}", output)
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
+
+
+def timed(estimate: Estimate) -> Estimate:
+    """The estimate with the time of the process until now."""
+    return replace(estimate, timing={**estimate.timing, "total": process_age()})
 
 
 def printed(estimate: Estimate) -> str:

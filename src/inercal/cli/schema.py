@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inercal.cli import show
 from inercal.cli.options import FileOutput
 
 
@@ -17,6 +18,6 @@ def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen
     if output.out is not None:
         write_text(output.out, json.dumps(found, indent=1) + "\n")
     if output.json or output.out is None:
-        print(json.dumps(found, indent=1), flush=True)
+        show(json.dumps(found, indent=1))
     if output.out is not None:
         output.say_now(f"schema: {output.out}")

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli import process_age
 from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
 from inercal.cli.outcome import hand_over, printed
-from inercal.cli.streaming import Every, StreamOptions, interval_of, run_stream
-from inercal.errors import InputError, UsageError
+from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
+from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.records.findings import Finding
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.selfcal.task import Calibration
+    from inercal.stream.lines import Lines
 
 Kind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
 
@@ -48,18 +47,13 @@ def selfcal(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate a gimbaled platform while it turns."""
-    paths = files or []
     keys = [*(overrides or ()), *([f"filter.kind={kind}"] if kind is not None else [])]
     if stream:
         if compare:
             raise InputError("--compare", "found with a stream, expected one estimator")
-        _live(paths, study, map_file, keys, interval_of(every), streaming, output)
+        _live(streamed(files), study, map_file, keys, interval_of(every), streaming, output)
         return 0
-    if not paths:
-        raise UsageError("selfcal: FILES is missing, expected recordings, or --stream")
-    for option, given in (("--checkpoint", streaming != StreamOptions()), ("--every", every is not None)):
-        if given:
-            raise InputError(option, "found without --stream, expected them together")
+    paths = recorded("selfcal", files, streaming, every)
 
     from inercal._jit import compiling
     from inercal.records.read import source_of
@@ -84,7 +78,7 @@ def selfcal(
         for number, record in enumerate(records, start=1):
             of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
             found = calibrate(record, settings, compare, lambda text, of_run=of_run: progress(of_run + text))  # type: ignore[misc]
-            timing = {"read": read_s, "solve": found.estimate.timing["solve"], "total": process_age()}
+            timing = {"read": read_s, "solve": found.estimate.timing["solve"]}
             inputs = (*found.estimate.inputs, source_of(study))
             runs.append(replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs)))
     return _one(runs[0], settings, output) if len(runs) == 1 else _repeated(runs, output)
@@ -129,7 +123,7 @@ def _repeated(runs: Sequence[Calibration], output: ReportOutput) -> int:
 
 
 def _live(
-    paths: list[Path],
+    file: Path | None,
     study: Path,
     map_file: Path | None,
     keys: list[str],
@@ -141,23 +135,20 @@ def _live(
     from inercal._jit import compiling
     from inercal.selfcal.base_search import stated_well
     from inercal.selfcal.filtered import problem
-    from inercal.stream.selfcal import Selfcal, filter_of, load
+    from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
     from inercal.study.load import load_selfcal_study
 
-    if len(paths) > 1:
-        raise InputError("--stream", f"found {len(paths)} files, expected one or standard input")
-    file = paths[0] if paths else None
     streaming.check(output, (file, map_file, study))
     settings = load_selfcal_study(study, keys)
     with of_study(study):
         stated_well(settings, "a stream")
-    told = problem(settings)
-
-    def say(finding: Finding) -> None:
-        output.say_findings([finding])
-
-    with of_study(study):
+        told = problem(settings)
         filter_of(told)
         with compiling(f"selfcal stream {told.filter.kind}", output.say):
-            load(told)
-        run_stream(lambda lines: Selfcal(lines, told, interval, say), file, map_file, output, streaming)
+            load_kernels(told)
+
+    def calibration(lines: Lines) -> Selfcal:
+        with of_study(study):
+            return Selfcal(lines, told, interval, output.say_finding)
+
+    run_stream(calibration, file, map_file, output, streaming)

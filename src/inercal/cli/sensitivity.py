@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
-from inercal.cli.options import Overrides, ReportOutput, Study, envelope, of_study, reading
+from inercal.cli.options import Overrides, ReportOutput, Study, of_study, reading
+from inercal.cli.outcome import WHOLE, hand_over, told
 
 
 def sensitivity(
@@ -13,13 +15,13 @@ def sensitivity(
     *,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
-) -> None:
+) -> int:
     """Say which error of a turntable matters."""
     from inercal.records.read import source_of
     from inercal.study.load import files_of, load_turntable_study
     from inercal.turntable.analysis import analyse, result, table
 
-    output.check((".nc", ".npz"), (study,))
+    output.check((*WHOLE, ".nc", ".npz"), (study,))
     clock = time.perf_counter()
     settings = load_turntable_study(study, overrides or ())
     inputs = files_of(study, settings.given)
@@ -30,17 +32,23 @@ def sensitivity(
         analysed = analyse(settings, maps_wanted, output.say_now, progress)
     if analysed.note:
         output.say(analysed.note)
-    if output.out is not None:
-        from inercal.turntable.maps import write_maps
+    estimate = told(
+        "sensitivity",
+        analysed.message,
+        result(analysed),
+        map(source_of, inputs),
+        timing={"read": read_s, "solve": analysed.solve},
+        settings=settings.given,
+    )
 
-        write_maps(analysed, output.out)
-        output.say(f"maps: {output.out}")
-    if output.report is not None:
-        from inercal._files import write_text
+    def page() -> str:
         from inercal.turntable.figures import sensitivity_page
 
-        write_text(output.report, sensitivity_page(analysed, settings))
-        output.say(f"report: {output.report}")
-    timing = {"read": read_s, "solve": analysed.solve}
-    data = envelope("sensitivity", analysed.message, result(analysed), map(source_of, inputs), timing=timing)
-    output.emit(data, f"{table(analysed)}\n\n{analysed.message}")
+        return sensitivity_page(analysed, settings, estimate)
+
+    def maps(path: Path) -> None:
+        from inercal.turntable.maps import write_maps
+
+        write_maps(analysed, path)
+
+    return hand_over(estimate, [table(analysed)], page, output, "maps", maps)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, envelope, of_study, reading
+from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, of_study, reading, whole_number
+from inercal.cli.outcome import WHOLE, emit, hand_over, told
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +21,12 @@ if TYPE_CHECKING:
 
     from inercal.records.record import Record
 
-Seed = Annotated[int, Parameter(help="Seed of the random numbers, 0 or more; 1 if absent.")]
+Seed = Annotated[
+    int, Parameter(converter=whole_number, help="Seed of the random numbers, 0 or more; 1 if absent.")
+]
+
+_MOST_RUNS = 1_000_000
+"""Runs whose results fit into memory; hours of work."""
 
 
 def simulate_turntable(
@@ -40,7 +45,7 @@ def simulate_turntable(
     settings = load_turntable_study(study, overrides or ())
     inputs = files_of(study, settings.given)
     output.spare(inputs)
-    _write("turntable", partial(simulate, settings), study, inputs, seed, output)
+    _write("turntable", partial(simulate, settings), study, inputs, settings.given, seed, output)
 
 
 def simulate_selfcal(
@@ -50,7 +55,10 @@ def simulate_selfcal(
     seed: Seed = 1,
     runs: Annotated[
         int | None,
-        Parameter(help="Simulate and calibrate so often instead, and judge the stated uncertainties."),
+        Parameter(
+            converter=whole_number,
+            help="Simulate and calibrate so often instead, and judge the stated uncertainties.",
+        ),
     ] = None,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
@@ -70,7 +78,7 @@ def simulate_selfcal(
     def simulate(rng: Generator) -> Record:
         return to_record(simulate_run(experiment(settings), rng).recording)
 
-    _write("selfcal", simulate, study, (study,), seed, output)
+    _write("selfcal", simulate, study, (study,), settings.given, seed, output)
     return 0
 
 
@@ -83,8 +91,8 @@ def simulate_aoa(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Simulate a wind-tunnel model that moves as its study plans."""
-    from inercal.aoa.record import to_record
     from inercal.aoa.simulate import simulate as simulate_run
+    from inercal.aoa.simulate import to_record
     from inercal.study.load import load_aoa_study
 
     _check(study, seed, output)
@@ -96,23 +104,23 @@ def simulate_aoa(
     def simulate(rng: Generator) -> Record:
         return to_record(simulate_run(settings, rng).recording, settings)
 
-    _write("aoa", simulate, study, inputs, seed, output)
+    _write("aoa", simulate, study, inputs, settings.given, seed, output)
 
 
 def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
-    from inercal._files import write_text
     from inercal._jit import compiling
+    from inercal.estimate.status import Status
     from inercal.records.read import source_of
     from inercal.selfcal.campaign import campaign
     from inercal.selfcal.filtered import problem
     from inercal.selfcal.filtering import load_kernels
     from inercal.study.load import load_selfcal_study
 
-    if runs < 2:
-        raise InputError("--runs", f"found {runs}, expected 2 or more")
+    if not 2 <= runs <= _MOST_RUNS:
+        raise InputError("--runs", f"found {runs}, expected 2 to {_MOST_RUNS:,}")
     _not_negative(seed)
-    output.check((".json",), (study,))
+    output.check(WHOLE, (study,))
     settings = load_selfcal_study(study, overrides)
     with of_study(study):
         with compiling(f"campaign {settings.filter.kind}", output.say_now):
@@ -121,20 +129,18 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
         with reading(output, "simulating") as progress:
             found = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
     timing = {"solve": time.perf_counter() - clock}
-    message = f"{found.verdict}: {found.attempted} runs, {found.runs} of them converged"
-    data = envelope("simulate selfcal", message, found.result, [source_of(study)], timing=timing)
-    if not found.passed:
-        data["status"]["code"] = "inconsistent"
-    if output.out is not None:
-        write_text(output.out, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
-        output.say(f"campaign: {output.out}")
-    if output.report is not None:
+    sources = [source_of(study)]
+    estimate = told(
+        "simulate selfcal", found.message, found.result, sources, (), timing, settings.given, seed
+    )
+    estimate = estimate if found.passed else replace(estimate, status=Status.INCONSISTENT)
+
+    def page() -> str:
         from inercal.selfcal.figures import campaign_page
 
-        write_text(output.report, campaign_page(found, settings))
-        output.say(f"report: {output.report}")
-    output.emit(data, f"{found.table()}\n\n{message}")
-    return 0 if found.passed else EXIT_BAD_VERDICT
+        return campaign_page(found, settings, estimate)
+
+    return hand_over(estimate, [found.table()], page, output, "campaign")
 
 
 def _check(study: Path, seed: int, output: FileOutput) -> None:
@@ -158,6 +164,7 @@ def _write(
     simulate: Callable[[Generator], Record],
     study: Path,
     inputs: Sequence[Path],
+    given: Mapping[str, Any],
     seed: int,
     output: FileOutput,
 ) -> None:
@@ -175,4 +182,5 @@ def _write(
     rows = len(next(iter(record.columns.values())).t)
     words = f"{rows} rows written to {output.out}"
     result = {"out": str(output.out), "rows": rows, "seed": seed, "columns": list(record.columns)}
-    output.emit(envelope(f"simulate {kind}", words, result, map(source_of, inputs)), words)
+    sources = map(source_of, inputs)
+    emit(told(f"simulate {kind}", words, result, sources, settings=given, seed=seed), words, output)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import abandon_output
-from inercal.cli.options import FileOutput, Output, ReportOutput
-from inercal.errors import InputError, RecordError
+from inercal.cli.options import FileOutput, Output, ReportOutput, whole_number
+from inercal.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:
     from inercal.stream.lines import Lines
@@ -51,7 +51,9 @@ class StreamOptions:
     checkpoint: Annotated[
         Path | None, Parameter(help="Save the state to this file, and go on from it where it exists.")
     ] = None
-    checkpoint_every: Annotated[int, Parameter(help="Rows from one save to the next; 1000 if absent.")] = 1000
+    checkpoint_every: Annotated[
+        int, Parameter(converter=whole_number, help="Rows from one save to the next; 1000 if absent.")
+    ] = 1000
 
     def check(self, output: Output, inputs: Iterable[Path | None]) -> None:
         """Fail before any work is done where lines or state could not be written; raises `InputError`."""
@@ -73,6 +75,33 @@ class StreamOptions:
                 file.write(b"0")
         except OSError as error:
             raise InputError(self.checkpoint, f"cannot be written ({error.strerror or error})") from error
+
+
+def streamed(files: list[Path] | None) -> Path | None:
+    """The file that a stream is read from, None for standard input; raises `InputError` where several are named."""
+    if files and len(files) > 1:
+        raise InputError("--stream", f"found {len(files)} files, expected one or standard input")
+    return files[0] if files else None
+
+
+def recorded(
+    command: str, files: list[Path] | None, options: StreamOptions, every: str | None = None
+) -> list[Path]:
+    """The recordings of a command that is not to read a stream.
+
+    Raises
+    ------
+    UsageError
+        There are none.
+    InputError
+        An option is there that only a stream has.
+    """
+    if not files:
+        raise UsageError(f"{command}: FILES is missing, expected recordings, or --stream")
+    for option, given in (("--checkpoint", options != StreamOptions()), ("--every", every is not None)):
+        if given:
+            raise InputError(option, "found without --stream, expected them together")
+    return files
 
 
 def run_stream(
@@ -99,7 +128,7 @@ def run_stream(
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # as in a file
     with _opened(file) as stream:
         where = _STANDARD_INPUT if file is None else str(file)
-        lines = Lines(stream, where, record_map, lambda finding: output.say_findings([finding]))
+        lines = Lines(stream, where, record_map, output.say_finding)
         try:
             run(estimator(lines), lines, _write, saving, output.say)
         except BrokenPipeError:

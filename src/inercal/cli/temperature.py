@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli import process_age
 from inercal.cli.options import MapFile, ReportOutput, read_record
 from inercal.cli.outcome import hand_over, printed
 from inercal.errors import InputError
@@ -50,7 +49,7 @@ def temperature(
         read_s = time.perf_counter() - clock
         model = fit_recording(record, reference)
     solve_s = time.perf_counter() - clock - read_s
-    timing = {"read": read_s, "solve": solve_s, "total": process_age()}
+    timing = {"read": read_s, "solve": solve_s}
     estimate = replace(model.estimate, timing=timing)
 
     def page() -> str:
@@ -64,7 +63,7 @@ def temperature(
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
     """The model of saved calibrations, in the order given."""
-    from inercal.estimate.exchange import load
+    from inercal.estimate.files import load
     from inercal.imu.temperature.calibrations import fit_calibrations
     from inercal.records.read import source_of
 

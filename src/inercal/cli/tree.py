@@ -178,10 +178,26 @@ COMMANDS = {
         "goes on where it was stopped.",
         "inercal monitor log.csv --every '1 s'",
     ),
+    ("validate", ""): (
+        "inercal.cli.validate:validate",
+        "Rerun the published and closed-form cases that ship with inercal, for the validation of software in a "
+        "laboratory.\n\nOne line for each case: what was found, what was expected within which limit, and from which "
+        "source. --out saves the record with versions (.json or .toml), --report writes a page to sign and to file. "
+        "Exit code 1: a case failed.",
+        "inercal validate --report validation.html",
+    ),
     ("schema", ""): (
         "inercal.cli.schema:schema",
         "Print one JSON Schema that covers every kind of study file, for editors and checkers.",
         "inercal schema --out inercal.schema.json",
+    ),
+    ("completion", ""): (
+        "inercal.cli.completion:completion",
+        "Print the script by which a shell completes commands, options, choices and file names.\n\nBash reads it from "
+        "~/.local/share/bash-completion/completions/inercal, zsh from the file _inercal in a folder of $fpath, fish "
+        "from ~/.config/fish/completions/inercal.fish: write it there with --out. For one session of bash: "
+        "source <(inercal completion bash).",
+        "inercal completion bash --out inercal.bash",
     ),
     ("examples", ""): (
         "inercal.cli.examples:examples",
@@ -236,13 +252,29 @@ def call(arguments: list[str]) -> int | None:
     kinds = [kind for verb, kind in COMMANDS if kind and verb == (arguments or [""])[0]]
     if kinds and all(word.startswith("-") and word not in ("-h", "--help") for word in arguments[1:]):
         raise UsageError(f"{arguments[0]}: found no kind, expected {' or '.join(kinds)} after it")
+    root = app()
+    if {"-h", "--help"} & {*arguments}:
+        for verb, kind in COMMANDS:
+            if arguments[0] == verb and kind in ("", *arguments[1:2]):
+                asked = root[verb][kind] if kind else root[verb]
+                asked.usage = usage(asked, verb, kind)
     try:
-        code: int | None = app()(arguments)
+        code: int | None = root(arguments)
     except MissingArgumentError as error:
         raise UsageError(_missing(error)) from error
     except CycloptsError as error:
         raise UsageError(str(error)) from error
     return code
+
+
+def usage(command: App, verb: str, kind: str) -> str:
+    """How a command is called: its arguments, in brackets where they may be absent, and the options that it needs."""
+    given = [each for each in command.assemble_argument_collection() if each.show]
+    arguments = [each for each in given if not each.name.startswith("-")]
+    options = [each for each in given if each.name.startswith("-") and each.required]
+    parts = [each.name if each.required else f"[{each.name}]" for each in arguments]
+    parts += [f"{each.name} {each.hint.__name__.upper()}" for each in options]
+    return " ".join(["inercal", verb, *([kind] if kind else []), *parts, "[OPTIONS]"])
 
 
 def _missing(error: MissingArgumentError) -> str:

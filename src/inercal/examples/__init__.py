@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inercal.records.record import Source
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -32,6 +36,13 @@ class Example:
         words += [f"--map {prefix}{self.map}"] if self.map else []
         words += [f"--study {prefix}{self.study}"] if self.study else []
         return " ".join(words)
+
+
+def shipped(file: str) -> Source:
+    """A file of `FOLDER` as an input of a result: by its name in the package, which is the same wherever that lies."""
+    from inercal.records.read import source_of
+
+    return replace(source_of(FOLDER / file), path=f"{FOLDER.name}/{file}")
 
 
 EXAMPLES: dict[str, Example] = {

@@ -1,4 +1,4 @@
-"""The one table of terms: symbol, long name, unit, order.
+"""The one table of terms: symbol, long name, unit, order. `term` finds the row of any name in a result.
 
 API names, JSON, plots and reports all use these symbols ("IEEE-style" names). Units are those of the value
 in a result; ``output`` stands for the unit of the instrument's output (m/s^2, deg/s, count, ...).
@@ -6,7 +6,8 @@ in a result; ``output`` stands for the unit of the instrument's output (m/s^2, d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -204,3 +205,71 @@ def noise_shown(symbol: str, channel_unit: str) -> str:
     if channel_unit in _NOISE_UNITS:
         return _NOISE_UNITS[channel_unit][symbol][1]
     return noise_term(symbol, channel_unit)
+
+
+#: sensors of a model that pitches: those of which there is one
+MODEL_TERMS = {
+    term.symbol: term
+    for term in (
+        Term("b_g", "bias of the gyro", "rad/s"),
+        Term("b_roll", "bias of the roll gyro", "rad/s"),
+        Term("b_yaw", "bias of the yaw gyro", "rad/s"),
+        Term("k_g", "scale of the gyro", "1"),
+        Term("tau_g", "delay of the gyro", "s"),
+        Term("tau", "delay of all sensors against the reference", "s"),
+    )
+}
+
+#: and those that are numbered: how the name begins
+NUMBERED_TERMS = {
+    term.symbol: term
+    for term in (
+        Term("b", "bias of accelerometer {}", "m/s^2"),
+        Term("dr", "position of accelerometer {}, forward", "m"),
+        Term("zo", "position of accelerometer {}, up", "m"),
+        Term("S", "scale of accelerometer {}, less 1", "1"),
+        Term("dlambda", "axis of accelerometer {}, towards down", "rad"),
+    )
+}
+
+#: ending of a coefficient of a temperature model -> what it is of its term, and its unit over that of the term
+_OVER_TEMPERATURE = {
+    "T1": (", per kelvin", "/K"),
+    "T2": (", per kelvin squared", "/K^2"),
+    "T3": (", per kelvin cubed", "/K^3"),
+    "hyst": (", rising less falling temperature", ""),
+}
+
+_CHANNEL = r"(?:acc|gyro|y)_[xyz]|a\d+|gyro(?:_roll|_yaw)?"
+
+
+def term(name: str) -> Term | None:
+    """The row of the table for a name in a result; None if there is none.
+
+    Beside those of `TERMS` names may carry a sensor's number (``b_2``), a channel after the symbol of its noise
+    (``N_gyro_x``), or a power of the temperature after a term or channel (``K0_x_T1``, ``gyro_x_hyst``).
+
+    Examples
+    --------
+    >>> term("b_2").name
+    'bias of accelerometer 2'
+    >>> term("D_F_x_T1").unit_for("count")
+    'count/K'
+    """
+    if name in TERMS or name in MODEL_TERMS:
+        return TERMS.get(name) or MODEL_TERMS[name]
+    begun, _, end = name.rpartition("_")
+    if end in _OVER_TEMPERATURE and (of := term(begun) or _output(begun)) is not None:
+        words, unit = _OVER_TEMPERATURE[end]
+        return Term(name, of.name + words, of.unit + unit)
+    if begun in NUMBERED_TERMS and end.isdigit():
+        return replace(NUMBERED_TERMS[begun], symbol=name, name=NUMBERED_TERMS[begun].name.format(end))
+    symbol, _, channel = name.partition("_")
+    if symbol in NOISE_TERMS and re.fullmatch(_CHANNEL, channel):
+        return replace(NOISE_TERMS[symbol], symbol=name, name=f"{channel}: {NOISE_TERMS[symbol].name}")
+    return _output(name)
+
+
+def _output(channel: str) -> Term | None:
+    """The output of a channel at rest, as of a temperature model; None if there is no such channel."""
+    return Term(channel, f"{channel}: output at rest", "output") if re.fullmatch(_CHANNEL, channel) else None

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.result import rounded
-from inercal.estimate.status import Status
 from inercal.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.noise.outcome import ChannelNoise, Noise
@@ -64,6 +63,17 @@ def cells(channel: ChannelNoise, noise: Noise) -> list[str]:
     return found
 
 
+def of_a_sample(channel: ChannelNoise) -> str:
+    """Standard deviation of N in one sample, N over the root of the interval, in the unit of B: as studies state it."""
+    if channel.fit is None:
+        return "–"
+    size = shown_units(channel.unit)[0][1] * float(np.sqrt(channel.curve.interval))
+    if "N" in channel.fit.names:
+        return f"{channel.fit.values[channel.fit.names.index('N')] / size:.3g}"
+    limit = channel.fit.bounds["N"] / size
+    return f"< {rounded(limit, limit)[1]}"
+
+
 def by_unit(channels: Iterable[ChannelNoise]) -> dict[str, list[ChannelNoise]]:
     """Channels by unit (SI), in the order read."""
     groups: dict[str, list[ChannelNoise]] = {}
@@ -79,7 +89,9 @@ def table(noise: Noise) -> str:
         heads = [
             f"{symbol} [{text}]" for symbol, (text, _) in zip(SYMBOLS, shown_units(unit)[1], strict=True)
         ]
-        rows = [["", *heads], *([channel.name, *cells(channel, noise)] for channel in channels)]
+        heads.append(f"N of a sample [{shown_units(unit)[0][0]}]")
+        rows = [["", *heads]]
+        rows += [[channel.name, *cells(channel, noise), of_a_sample(channel)] for channel in channels]
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         parts.append(
             "\n".join(
@@ -249,15 +261,20 @@ def page(noise: Noise) -> str:
     files = ", ".join(Path(s.path).name for s in estimate.inputs if not s.path.endswith(".toml"))  # no maps
     return template(
         "allan.html",
-        title=f"Noise of {files}" if files else "Noise at rest",
-        estimate=estimate,
-        mood="good" if estimate.status is Status.OK else "bad",
+        estimate,
+        f"Noise of {files}" if files else "Noise at rest",
         words={symbol: term.name for symbol, term in NOISE_TERMS.items()},
         tables=[
             (
                 {"rad/s": "Rate", "m/s^2": "Acceleration"}.get(unit, f"Output in {unit}"),
-                [(symbol, text) for symbol, (text, _) in zip(SYMBOLS, shown_units(unit)[1], strict=True)],
-                [(channel, cells(channel, noise)) for channel in channels],
+                [
+                    *(
+                        (symbol, text)
+                        for symbol, (text, _) in zip(SYMBOLS, shown_units(unit)[1], strict=True)
+                    ),
+                    ("N of a sample", shown_units(unit)[0][0]),
+                ],
+                [(channel, [*cells(channel, noise), of_a_sample(channel)]) for channel in channels],
             )
             for unit, channels in by_unit(noise.channels).items()
         ],

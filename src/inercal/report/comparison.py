@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.estimate.result import Estimate, rounded
 from inercal.estimate.status import Status
-from inercal.instruments.terms import TERMS
+from inercal.instruments.terms import term
 from inercal.report.html import Picture
 from inercal.report.html import page as template
 from inercal.report.style import ALARM, COLOURS, QUIET, WIDTH, figure, svg
@@ -39,6 +39,12 @@ def _numbers(row: Mapping[str, Any]) -> tuple[str, ...]:
     """Both values, difference, its u and E_n as texts; the values to the digits that the difference needs."""
     first, second = (rounded(row[way], min(row[f"u_{way}"], row["u"]))[0] for way in ("first", "second"))
     return first, second, *rounded(row["difference"], row["u"])[:2], f"{row['normalised_error']:.2f}"
+
+
+def _words(name: str) -> str:
+    """What a coefficient is."""
+    of = term(name)
+    return "" if of is None else of.name
 
 
 def _mark(row: Mapping[str, Any]) -> str:
@@ -87,24 +93,21 @@ def picture(estimate: Estimate) -> Picture:
 def page(estimate: Estimate) -> str:
     """The page of a comparison: HTML that needs nothing but itself."""
     result, given = estimate.result, estimate.provenance["settings"]
+    facts = []
+    for way in ("first", "second"):
+        known = (Path(given[way]).name, *(estimate.conditions[way][key] for key in ("date", "temperature")))
+        facts.append((way, "", ", ".join(filter(None, known))))
+    facts += [(name, "", text) for name, text in estimate.traceability.items() if text]
     return template(
         "comparison.html",
-        title="Two calibrations compared",
-        estimate=estimate,
-        mood="good" if estimate.status is Status.OK else "bad",
-        ways=[
-            (
-                way,
-                Path(given[way]).name,
-                estimate.conditions[way]["date"],
-                estimate.conditions[way]["temperature"],
-            )
-            for way in ("first", "second")
-        ],
+        estimate,
+        "Two calibrations compared",
+        facts,
+        f"the two calibrations {'agree' if estimate.status is Status.OK else 'differ'}",
         rows=[
             (
                 row["name"],
-                TERMS[row["name"]].name if row["name"] in TERMS else "",
+                _words(row["name"]),
                 *_numbers(row),
                 _mark(row),
                 row,

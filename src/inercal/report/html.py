@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.exchange import plain_objects
-from inercal.estimate.result import Estimate, Parameter, rounded
+from inercal.estimate.files import plain_objects
+from inercal.estimate.result import Estimate, Parameter, in_degrees, rounded
 from inercal.estimate.status import Status
 from inercal.estimate.table import Table
-from inercal.instruments.terms import TERMS
+from inercal.instruments.terms import term
 from inercal.report.style import plain_unit
 
 _INFINITE = 1e6
@@ -36,21 +36,14 @@ class Picture:
 
 #: group of terms -> how their symbols begin
 _GROUPS = {
-    "Accelerometers": ("K", "M_"),
-    "Gyro": ("D_F_", "D_R_", "S_", "T_", "G_"),
+    "Sensors of the model": ("b_", "dr_", "zo_", "k_g", "tau"),
+    "Accelerometers": ("K", "M_", "acc_"),
+    "Gyro": ("D_F_", "D_R_", "S_", "T_", "G_", "gyro_"),
     "Axis X": ("DX_", "k_"),
     "Axis Y": ("DY_", "kY_"),
     "Platform gyros": ("kg0_", "ds_", "do_", "kg1_"),
     "Platform accelerometers": ("eta_", "ka0_", "ka1_"),
     "Encoders": ("beta_",),
-}
-
-#: ending of a coefficient of a temperature model -> what it is of its term
-_OVER_TEMPERATURE = {
-    "T1": ", per kelvin",
-    "T2": ", per kelvin squared",
-    "T3": ", per kelvin cubed",
-    "hyst": ", rising less falling temperature",
 }
 
 #: key -> plain name and unit, where the key alone does not say them
@@ -87,7 +80,13 @@ _UNITS = {
 }
 
 
-def render(estimate: Estimate, pictures: Sequence[Picture], title: str, tables: Sequence[Table] = ()) -> str:
+def render(
+    estimate: Estimate,
+    pictures: Sequence[Picture],
+    title: str,
+    tables: Sequence[Table] = (),
+    answer: Sequence[Table] = (),
+) -> str:
     """The report of an estimate.
 
     Parameters
@@ -100,6 +99,10 @@ def render(estimate: Estimate, pictures: Sequence[Picture], title: str, tables: 
         Heading of the page.
     tables : sequence of Table
         What else there is to tell, ahead of the pictures.
+    answer : sequence of Table
+        What was asked for, where that is not the coefficients: ahead of these.
+
+    A table of the result with the title of one of these is not shown again among the details.
 
     Returns
     -------
@@ -107,35 +110,55 @@ def render(estimate: Estimate, pictures: Sequence[Picture], title: str, tables: 
         HTML that needs nothing but itself: no script, no network, no font.
     """
     result = plain_objects(estimate.result)
+    shown = {table.title.lower() for table in (*answer, *tables)}
     return page(
         "estimate.html",
-        title=title,
-        estimate=estimate,
-        heading=_heading(estimate),
-        mood={Status.OK: "good", Status.ILL_CONDITIONED: "doubtful"}.get(estimate.status, "bad"),
+        estimate,
+        title,
+        meaning=estimate.status.meaning,
         groups=_groups(estimate),
         conditions=[
             (*_labelled(keys), text)
-            for keys, text in _leaves(plain_objects(estimate.conditions))
+            for keys, text in _leaves(plain_objects(_with_units(estimate)))
             if keys != ("date",)
         ],
+        answer=answer,
         given_tables=tables,
         pictures=pictures,
         sources=estimate.budget,
-        tables=[_table(key, value) for key, value in result.items() if _is_table(value)],
-        statistics=[(*_labelled((key,)), _short(value)) for key, value in estimate.statistics.items()],
-        provenance=[
-            ("command", estimate.command),
-            *((key, value) for key, value in result.items() if isinstance(value, str)),
-            *((".".join(keys), text) for keys, text in _leaves(plain_objects(estimate.provenance))),
+        tables=[
+            _table(key, value)
+            for key, value in result.items()
+            if _is_table(value) and _labelled((key,))[0] not in shown
         ],
     )
 
 
-def page(template: str, **content: Any) -> str:
-    """A page of this package made from one of its templates; whatever is put in is escaped.
+def page(
+    template: str,
+    estimate: Estimate,
+    title: str,
+    facts: Sequence[tuple[str, str, str]] | None = None,
+    meaning: str = "",
+    **content: Any,
+) -> str:
+    """A page of this package: its one frame, and in it what a template makes of ``content``.
 
-    Bytes in file names that no encoding knew are read as UTF-8, and what that does not know is replaced.
+    The frame is the title, who did what, the verdict, the findings, and at the end how it was done. Whatever is put in
+    is escaped. Bytes in file names that no encoding knew are read as UTF-8, and what that does not know is replaced.
+
+    Parameters
+    ----------
+    template : str
+        Name of a file in ``templates``.
+    estimate : Estimate
+        The result of the command.
+    title : str
+        Heading of the page.
+    facts : sequence of (name, unit, text), optional
+        What was looked at, where there is no instrument to trace; `Estimate.traceability` if absent.
+    meaning : str
+        What the verdict says, ahead of the message of the estimate.
     """
     import jinja2
 
@@ -155,17 +178,43 @@ def page(template: str, **content: Any) -> str:
         "index": _index,
         "sentence": _sentence,
     }
-    environment.globals["version"] = __version__
-    text = environment.get_template(template).render(**content)
+    result = plain_objects(estimate.result)
+    text = environment.get_template(template).render(
+        version=__version__,
+        estimate=estimate,
+        title=title,
+        facts=_heading(estimate) if facts is None else facts,
+        mood={Status.OK: "good", Status.ILL_CONDITIONED: "doubtful"}.get(estimate.status, "bad"),
+        meaning=meaning,
+        statistics=[(*_labelled((key,)), _short(value)) for key, value in estimate.statistics.items()],
+        provenance=[
+            ("command", estimate.command),
+            *((key, value) for key, value in result.items() if isinstance(value, str)),
+            *((".".join(keys), text) for keys, text in _leaves(plain_objects(estimate.provenance))),
+        ],
+        **content,
+    )
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
-def _heading(estimate: Estimate) -> list[tuple[str, str]]:
+def _with_units(estimate: Estimate) -> dict[str, Any]:
+    """The conditions with angles in degrees, and the unit of the gyro's output where its range is stated."""
+    shown = in_degrees(estimate.conditions)
+    if "gyro_output" in shown.get("ranges", {}) and "D_F_x" in estimate.names:
+        unit = estimate["D_F_x"].unit
+        shown["ranges"] = {
+            (f"{key} [{unit}]" if key == "gyro_output" else key): ends
+            for key, ends in shown["ranges"].items()
+        }
+    return shown
+
+
+def _heading(estimate: Estimate) -> list[tuple[str, str, str]]:
     """Who calibrated what, when, against which reference: the four that must be there, and any others."""
     given = estimate.traceability
     first = ("instrument", "date", "operator", "reference")
-    return [(key, given.get(key, "")) for key in first] + [
-        (key, text) for key, text in given.items() if key not in first
+    return [(key, "", given.get(key, "")) for key in first] + [
+        (key, "", text) for key, text in given.items() if key not in first
     ]
 
 
@@ -186,8 +235,7 @@ def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
     """The coefficients by instrument, each with its printed numbers and its shares of the budget."""
     groups: dict[str, list[_Row]] = {}
     for p in estimate.parameters.values():
-        term, _ = _term(p.name)
-        begun = (name for name, ways in _GROUPS.items() if term in TERMS and p.name.startswith(ways))
+        begun = (name for name, ways in _GROUPS.items() if term(p.name) and p.name.startswith(ways))
         group = next(begun, "Coefficients")
         groups.setdefault(group, []).append(_row(p, estimate.budget))
     return list(groups.items())
@@ -196,16 +244,10 @@ def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
 def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _Row:
     """One coefficient, rounded as in `Estimate.table`."""
     value, u, U = rounded(p.value, p.u, p.U)
-    term, order = _term(p.name)
-    name = TERMS[term].name + order if term in TERMS else ""
+    of = term(p.name)
+    name = "" if of is None else of.name
     dof = "∞" if p.dof >= _INFINITE else f"{p.dof:.{0 if p.dof >= 100 else 1}f}"
     return _Row(p, name, value, u, U, dof, tuple(item.share.get(p.name) for item in budget))
-
-
-def _term(name: str) -> tuple[str, str]:
-    """The term that a coefficient belongs to, and what of it, in words, where it follows a temperature."""
-    term, _, end = name.rpartition("_")
-    return (term, _OVER_TEMPERATURE[end]) if end in _OVER_TEMPERATURE else (name, "")
 
 
 def _percent(share: float) -> str:

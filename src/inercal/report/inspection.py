@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.estimate.result import Estimate
+from inercal.estimate.table import Table
 from inercal.records.clocks import counted_rows
 from inercal.records.findings import Finding
 from inercal.records.record import Column, Record
@@ -48,6 +50,49 @@ def summary(record: Record) -> tuple[ChannelSummary, ...]:
     counted = counted_rows(record.columns)
     rates = {key: float("nan") if counted else _rate(t) for key, t in clocks.items()}
     return tuple(_summary(column, rates[id(column.t)]) for column in record.columns.values())
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def norms(record: Record) -> tuple[ChannelSummary, ...]:
+    """The length of each whole triad of accelerometers or gyros in numbers: at rest that of ``acc`` is gravity."""
+    counted = counted_rows(record.columns)
+    found = []
+    for sensor in ("acc", "gyro"):
+        axes = [record.columns[name] for axis in "xyz" if (name := f"{sensor}_{axis}") in record.columns]
+        x = axes[0] if len(axes) == 3 else None
+        if x is None or any(axis.t is not x.t or axis.unit != x.unit for axis in axes):
+            continue
+        length = replace(x, name=f"|{sensor}|", values=np.linalg.norm([axis.values for axis in axes], axis=0))
+        found.append(_summary(length, float("nan") if counted else _rate(x.t)))
+    return tuple(found)
+
+
+def channels_table(record: Record) -> Table:
+    """The channels of a record and the norms of its triads, for people."""
+    rows = [(row, sparkline(record[row.name].values)) for row in summary(record)]
+    rows += [(row, "") for row in norms(record)]
+    heads = ("samples", "missing"), ("mean", "sd", "min", "max")
+    columns = (
+        *((name, "") for name in ("channel", "", "unit", *heads[0])),
+        ("rate", "Hz"),
+        *((name, "") for name in heads[1]),
+    )
+    cells = tuple(
+        (
+            row.name,
+            line,
+            row.unit,
+            str(row.samples),
+            str(row.missing),
+            "–" if np.isnan(row.rate) else f"{row.rate:.5g}",
+            *(
+                "–" if np.isnan(x) else f"{x:.{digits}g}"
+                for x, digits in ((row.mean, 6), (row.deviation, 3), (row.minimum, 6), (row.maximum, 6))
+            ),
+        )
+        for row, line in rows
+    )
+    return Table("Channels", "", columns, cells, 3)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -148,8 +193,8 @@ def _marks(column: Column, findings: Sequence[Finding]) -> list[tuple[int, tuple
     return marks
 
 
-def render_inspection(record: Record, rows: Sequence[ChannelSummary], pictures: Sequence[Picture]) -> str:
-    """The page of a recording: its channels in numbers (see `summary`), findings and pictures.
+def render_inspection(record: Record, estimate: Estimate, pictures: Sequence[Picture]) -> str:
+    """The page of a recording: its findings, channels in numbers (see `summary`) and pictures.
 
     Returns
     -------
@@ -158,5 +203,10 @@ def render_inspection(record: Record, rows: Sequence[ChannelSummary], pictures: 
     """
     files = ", ".join(Path(source.path).name for source in record.sources)
     return page(
-        "inspection.html", title=f"Recording {files}".strip(), record=record, rows=rows, pictures=pictures
+        "inspection.html",
+        estimate,
+        f"Recording {files}".strip(),
+        (),
+        rows=(*summary(record), *norms(record)),
+        pictures=pictures,
     )

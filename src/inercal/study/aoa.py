@@ -27,7 +27,15 @@ from inercal.aoa.settings import (
     Zero,
 )
 from inercal.errors import StudyError
-from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_of
+from inercal.study.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_of,
+)
 from inercal.study.fields import QuantityText, positive, refusal
 from inercal.study.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
 from inercal.study.ratios import ExactText
@@ -147,8 +155,8 @@ class SensorPriorTable(Strict):
     gyro_delay: _Time | None = Field(
         default=None, description="of the gyro's delay, where it is estimated; 5 ms if absent"
     )
-    vertical: FlexureTable = Field(
-        default=FlexureTable(), title="Vertical", description="flexure along z: 9 Hz, damping 0.3 if absent"
+    heave: FlexureTable = Field(
+        default=FlexureTable(), title="Heave", description="flexure along z: 9 Hz, damping 0.3 if absent"
     )
     axial: FlexureTable = Field(
         default=FlexureTable(), title="Axial", description="flexure along x: 12 Hz, damping 0.5 if absent"
@@ -240,7 +248,7 @@ class ZeroTable(Strict):
 class AoaStudyFile(Strict):
     """A study of inertial angle of attack, for `inercal simulate aoa` and `aoa`."""
 
-    version: Literal[1] = Field(default=1, alias="schema", description="version of the study format")
+    version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the tunnel stands")
     rig: StingTable = Field(title="Rig", description="what carries the model")
     sensors: SensorsTable = Field(title="Sensors", description="the sensors, by the names of their columns")
@@ -262,29 +270,15 @@ class AoaStudyFile(Strict):
     model: ModelTable = Field(default=ModelTable(), title="Model", description="how the model lies")
     flow: FlowTable = Field(default=FlowTable(), title="Flow", description="angularity of the flow")
     zero: ZeroTable | None = Field(default=None, title="Zero", description="a stretch at a known angle")
-    traceability: TraceabilityTable = Field(
-        default=TraceabilityTable(), title="Traceability", description="free texts that go with the result"
-    )
-    conditions: ConditionsTable = Field(
-        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
-    )
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
 
 
 def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
-    """Check the parsed TOML of a study and put it in SI.
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
-    Parameters
-    ----------
-    data : mapping
-        As parsed from TOML.
-    path : str or Path
-        Where it came from; named in the error. Files that the study names are taken from its folder; those of motion
-        and prior are read only where they are needed.
-
-    Raises
-    ------
-    StudyError
-        The first thing wrong: file, key, what was found, what was expected.
+    ``path`` is where it came from; files that the study names lie beside it, and those of motion and
+    prior are read only where they are needed.
     """
     file = check(AoaStudyFile, data, path, StudyError)
     layout, sensors = layout_of(file.sensors), calibrations_of(file.sensors, path)
@@ -324,7 +318,7 @@ def _prior(table: SensorPriorTable) -> Prior:
     usual = Prior()
     return Prior(
         **_given(table),
-        vertical=_flexure(table.vertical, usual.vertical),
+        heave=_flexure(table.heave, usual.heave),
         axial=_flexure(table.axial, usual.axial),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -69,6 +69,17 @@ class ConditionsTable(Strict):
     """Conditions during the recording."""
 
     temperature: Temperature | None = Field(default=None, description="temperature of the instrument")
+
+
+# Keys of every kind of study, at its beginning and its end.
+
+Version = Annotated[Literal[1], Field(alias="schema", description="version of the study format")]
+Traceability = Annotated[
+    TraceabilityTable, Field(title="Traceability", description="free texts that go with the result")
+]
+Conditions = Annotated[
+    ConditionsTable, Field(title="Conditions", description="conditions during the recording")
+]
 
 
 def site_of(table: SiteTable, where: object) -> Site:

@@ -53,7 +53,7 @@ class QuantityText:
     def parse(self, text: object) -> Quantity:
         """Read one value; what is wrong goes to pydantic, which knows the key."""
         try:
-            quantity = parse_quantity(text, self.dimension, "quantity")
+            quantity = parse_quantity(text, self.dimension, "quantity", self.example)
         except QuantityError as error:
             raise refusal(error.message) from error
         if self.accepts(quantity.value):

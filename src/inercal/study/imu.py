@@ -13,7 +13,15 @@ from inercal.errors import StudyError
 from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
-from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_of
+from inercal.study.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_of,
+)
 from inercal.study.fields import Duration, RelativeUncertainty, refusal
 from inercal.study.imu_aided import AidedTable, aided_settings
 from inercal.study.imu_ferraris import FerrarisTable, ferraris_settings
@@ -68,31 +76,17 @@ class ImuTable(Strict):
 class ImuStudyFile(Strict):
     """A study for ``inercal calibrate imu``."""
 
-    version: Literal[1] = Field(default=1, alias="schema", description="version of the study format")
+    version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
     imu: ImuTable = Field(default=ImuTable(), title="Imu", description="how to calibrate the IMU")
-    traceability: TraceabilityTable = Field(
-        default=TraceabilityTable(), title="Traceability", description="free texts that go with the result"
-    )
-    conditions: ConditionsTable = Field(
-        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
-    )
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
 
 
 def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
-    """Check the parsed TOML of a study and put it in SI.
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
-    Parameters
-    ----------
-    data : mapping
-        As parsed from TOML.
-    path : str or Path
-        Where it came from; named in the error.
-
-    Raises
-    ------
-    StudyError
-        The first thing wrong: file, key, what was found, what was expected.
+    ``path`` is where it came from; files that the study names lie beside it.
     """
     file = check(ImuStudyFile, data, path, StudyError)
     method: FerrarisSettings | AidedSettings | None = None

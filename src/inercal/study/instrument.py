@@ -27,6 +27,9 @@ Typed = Annotated[
 
 Rate = Annotated[Quantity, QuantityText("frequency", "10 Hz", positive, "a frequency above zero")]
 
+MOST_SAMPLES = 1_000_000_000
+"""Samples in a dwell that somebody may wait for."""
+
 #: terms of a gyro that only a rate test has
 RATE_TERMS = tuple(f"{symbol}_{axis}" for axis in "xyz" for symbol in ("S_asym", "S2", "S3", "S_hyst"))
 
@@ -61,7 +64,7 @@ class InstrumentTable(Strict):
         default_factory=lambda: parse_quantity("60 s", "time", "dwell"),
         description="time in each position; 60 s if absent",
     )
-    rate: Rate | None = Field(
+    sample_rate: Rate | None = Field(
         default=None, description="samples per second of a simulation; one row a position if absent"
     )
     earth_rate: Literal["fitted", "stated"] | None = Field(
@@ -109,6 +112,12 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
         values[symbol] = value
         if u > 0.0:
             uncertainties[symbol] = u
+    if table.sample_rate is not None and table.sample_rate.value * table.dwell.value > MOST_SAMPLES:
+        raise StudyError(
+            where,
+            f"instrument.sample_rate: found {table.sample_rate.value * table.dwell.value:.4g} samples in a dwell, "
+            f"expected at most {MOST_SAMPLES:.0e}",
+        )
     return Instrument(
         kind=table.kind,
         unit=unit,
@@ -117,7 +126,7 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
         coefficients_u=uncertainties,
         noise=None if table.noise is None else _noise(table.noise, unit, table.dwell.value, where),
         dwell=table.dwell.value,
-        rate=None if table.rate is None else table.rate.value,
+        sample_rate=None if table.sample_rate is None else table.sample_rate.value,
         earth_rate=table.earth_rate,
     )
 

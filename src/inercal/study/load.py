@@ -74,17 +74,7 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
 def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> TurntableSettings:
     """Read the study of a turntable: of its sensitivity analysis, design, simulation and calibration.
 
-    Parameters
-    ----------
-    path : str or Path
-        The TOML file.
-    overrides : iterable of str
-        As for `load_imu_study`.
-
-    Raises
-    ------
-    StudyError
-        One sentence: file and key, what was found, what was expected.
+    Parameters and errors as of `load_imu_study`.
     """
     from inercal.study.turntable import turntable_study
 
@@ -94,17 +84,7 @@ def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> Tur
 def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> SelfcalSettings:
     """Read the study of a self-calibration: of its simulation, path design and estimation.
 
-    Parameters
-    ----------
-    path : str or Path
-        The TOML file.
-    overrides : iterable of str
-        As for `load_imu_study`.
-
-    Raises
-    ------
-    StudyError
-        One sentence: file and key, what was found, what was expected.
+    Parameters and errors as of `load_imu_study`.
     """
     from inercal.study.selfcal import selfcal_study
 
@@ -114,17 +94,7 @@ def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> Selfc
 def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettings:
     """Read the study of ``inercal aoa`` and ``inercal simulate aoa``.
 
-    Parameters
-    ----------
-    path : str or Path
-        The TOML file.
-    overrides : iterable of str
-        As for `load_imu_study`.
-
-    Raises
-    ------
-    StudyError
-        One sentence: file and key, what was found, what was expected.
+    Parameters and errors as of `load_imu_study`.
     """
     from inercal.study.aoa import aoa_study
 
@@ -154,7 +124,7 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
             path,
             f"found a study for `inercal calibrate imu`, expected {_EXPECTED[command]}, with a table [rig]",
         )
-    for override in overrides:
+    for override in sorted(overrides, key=lambda each: not each.startswith("motion.kind")):  # it makes room
         _put(data, override, Path(path).parent)
     return data
 
@@ -173,9 +143,11 @@ def _put(data: dict[str, Any], override: str, folder: Path) -> None:
             raise StudyError(where, f"{'.'.join(keys[:depth])} is no table, expected the key of a value")
         _make_room(table, ".".join(keys[:depth]), keys[depth])
     value = _value(text.strip())
+    if keys == ["motion", "kind"]:
+        _make_room_for_motion(table, value)
     is_file = re.fullmatch(_FILES, ".".join(keys)) and isinstance(value, str)
     # typed on a command line, and so beside where one is; what a study names lies beside the study
-    table[keys[-1]] = os.path.relpath(value, folder) if is_file else value
+    table[keys[-1]] = os.path.relpath(value, folder) if is_file and value else value
 
 
 def _make_room(table: dict[str, Any], name: str, key: str) -> None:
@@ -185,6 +157,14 @@ def _make_room(table: dict[str, Any], name: str, key: str) -> None:
             for other in keys:
                 if other != key:
                     table.pop(other, None)
+
+
+def _make_room_for_motion(table: dict[str, Any], kind: object) -> None:
+    """Take out of the motion of a study what belongs to other kinds alone."""
+    from inercal.study.motion import of_other_kinds
+
+    for key in of_other_kinds(kind):
+        table.pop(key, None)
 
 
 def _value(text: str) -> Any:

@@ -62,6 +62,14 @@ _Shift = Annotated[
 ]
 
 
+def of_other_kinds(kind: object) -> frozenset[str]:
+    """The keys that a motion of that kind does not heed, but others do; none where there is no such kind."""
+    if kind not in _KEYS:
+        return frozenset()
+    every = {key for keys in _KEYS.values() for part in keys for key in part}
+    return frozenset(every.difference(*_KEYS[str(kind)]))
+
+
 class MotionTable(Strict):
     """Pitch of the model in a simulation: its kind, and the keys of that kind."""
 

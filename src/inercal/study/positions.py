@@ -201,7 +201,7 @@ def _of_file(name: str, chain: Chain, where: object) -> Plan:
     path = Path(str(where)).parent / name
     key = f"positions.file: {shown(name)}"
     head = ",".join(f"{joint} [deg]" for joint in chain.joints)
-    if not path.is_file():
+    if not path.exists():
         raise StudyError(
             where, f"{key}: no such file beside the study, expected a CSV with the header {head}"
         )

@@ -57,7 +57,10 @@ StandardDeviation = Annotated[
     ),
 ]
 Shift = Annotated[
-    Quantity, QuantityText("length", "10 um", lambda d: d > 0.0, f"a length above 0; {_LEAVE_OUT}")
+    Quantity,
+    QuantityText(
+        "length", "10 um", lambda d: 0.0 < d <= 1.0, f"a length above 0 and up to 1 m; {_LEAVE_OUT}"
+    ),
 ]
 _SCOPE = "how long a value lasts: until the next sample, position or mounting, or for good (rig)"
 
@@ -167,7 +170,9 @@ class ErrorsTable(_BY_NAME):  # type: ignore[misc]
 class BaseTable(Strict):
     """Known attitude of the table's base, turned in this order."""
 
-    azimuth: Angle | None = Field(default=None, description="about up; 0 if absent")
+    azimuth: Angle | None = Field(
+        default=None, description="about up, north towards west positive; 0 if absent"
+    )
     tilt_north: Angle | None = Field(default=None, description="about north; 0 if absent")
     tilt_west: Angle | None = Field(default=None, description="about west; 0 if absent")
 

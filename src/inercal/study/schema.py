@@ -17,7 +17,7 @@ from inercal.study.turntable import TurntableStudyFile
 STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile, SelfcalStudyFile, AoaStudyFile)
 
 
-class _TomlSchema(GenerateJsonSchema):
+class TomlSchema(GenerateJsonSchema):
     """TOML has no null: a key is there or absent."""
 
     def nullable_schema(self, schema: core_schema.NullableSchema) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def json_schema() -> dict[str, Any]:
         Unknown keys are rejected. Whether a unit exists and a value makes sense is checked on reading.
     """
     references, definitions = models_json_schema(
-        [(file, "validation") for file in STUDY_FILES], schema_generator=_TomlSchema
+        [(file, "validation") for file in STUDY_FILES], schema_generator=TomlSchema
     )
     return {
         "$schema": GenerateJsonSchema.schema_dialect,

@@ -27,7 +27,15 @@ from inercal.selfcal.settings import (
     Search,
     SelfcalSettings,
 )
-from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_on_earth
+from inercal.study.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_on_earth,
+)
 from inercal.study.fields import Duration, QuantityText, Several, SeveralTexts, positive
 from inercal.study.gimbals import GimbalsTable, base_of, gimbals_of, limits_of
 from inercal.study.rig import Angle
@@ -217,7 +225,7 @@ class SearchTable(Strict):
 class SelfcalStudyFile(Strict):
     """A study of a self-calibration, for `inercal simulate selfcal`, `design selfcal` and `selfcal`."""
 
-    version: Literal[1] = Field(default=1, alias="schema", description="version of the study format")
+    version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the platform stands")
     rig: GimbalsTable = Field(title="Rig", description="the gimbals and their base")
     plan: PlanTable | None = Field(
@@ -236,28 +244,14 @@ class SelfcalStudyFile(Strict):
         default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
     )
     design: SearchTable = Field(default=SearchTable(), title="Design", description="the search for a path")
-    traceability: TraceabilityTable = Field(
-        default=TraceabilityTable(), title="Traceability", description="free texts that go with the result"
-    )
-    conditions: ConditionsTable = Field(
-        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
-    )
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
 
 
 def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
-    """Check the parsed TOML of a study and put it in SI.
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
-    Parameters
-    ----------
-    data : mapping
-        As parsed from TOML.
-    path : str or Path
-        Where it came from; named in the error.
-
-    Raises
-    ------
-    StudyError
-        The first thing wrong: file, key, what was found, what was expected.
+    ``path`` is where it came from; files that the study names lie beside it.
     """
     file = check(SelfcalStudyFile, data, path, StudyError)
     base, limits = base_of(file.rig), limits_of(file.rig, path)

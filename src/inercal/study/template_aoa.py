@@ -61,7 +61,7 @@ gyro_bias = "5 deg/h"               # of the gyros' biases [deg/h]
 # gyro_scale = "0.1 %"              # of the gyro's scale [%]
 # gyro_delay = "5 ms"               # of the gyro's delay, where it is estimated [ms]
 
-[prior.vertical]                    # flexure of the sting along z
+[prior.heave]                       # flexure of the sting along z
 # frequency = "9 Hz"                # of its resonance [Hz]
 # damping = "0.3"                   # relative to critical
 # level = "0.01 g"                  # standard deviation of the acceleration [g]

@@ -11,16 +11,13 @@ from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.errors import StudyError
-from inercal.selfcal.plan import JointName, Move, Plan, Rest, Turn, path
+from inercal.selfcal.plan import MOST_ROWS, JointName, Move, Plan, Rest, Turn, path
 from inercal.study.fields import Duration, QuantityText, Several, SeveralTexts, positive, refusal
 from inercal.study.rig import Limits
 from inercal.units import Quantity, shown
 
 FEWEST = 10
 """Rows of a plan below which there is nothing to find out."""
-
-MOST = 5_000_000
-"""Rows of a plan that fit into memory with all that is computed from them."""
 
 _ANGLE = QuantityText("angle", "180 deg", lambda angle: angle != 0.0, "an angle other than 0")
 _RATE = QuantityText("rate", "1 deg/s", positive, "a rate above zero")
@@ -121,9 +118,9 @@ def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
         x, y, z = table.start.values
         plan = replace(plan, start=(x, y, z))
     rows = plan.duration / plan.step
-    if not FEWEST <= rows <= MOST:
+    if not FEWEST <= rows <= MOST_ROWS:
         raise StudyError(
-            where, f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {MOST:,}"
+            where, f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {MOST_ROWS:,}"
         )
     if beyond := plan.beyond(limits):
         low, high = limits[beyond[0]]

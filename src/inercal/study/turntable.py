@@ -12,7 +12,15 @@ from pydantic import Field, StrictBool, StrictInt
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
 from inercal.rigs.chain import Chain
-from inercal.study.common import ConditionsTable, SiteTable, TraceabilityTable, site_on_earth
+from inercal.study.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_on_earth,
+)
 from inercal.study.fields import QuantityText, RelativeUncertainty, positive
 from inercal.study.instrument import InstrumentTable, instrument_of
 from inercal.study.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
@@ -108,7 +116,7 @@ class RateTestTable(Strict):
 class TurntableStudyFile(Strict):
     """A study of a turntable, for `inercal sensitivity`, `design positions`, `simulate` and `calibrate turntable`."""
 
-    version: Literal[1] = Field(default=1, alias="schema", description="version of the study format")
+    version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the table stands")
     rig: RigTable = Field(title="Rig", description="the turntable and its errors")
     positions: PositionsTable = Field(
@@ -124,28 +132,14 @@ class TurntableStudyFile(Strict):
     rate_test: RateTestTable | None = Field(
         default=None, title="Rate test", description="a rate test; none if absent"
     )
-    traceability: TraceabilityTable = Field(
-        default=TraceabilityTable(), title="Traceability", description="free texts that go with the result"
-    )
-    conditions: ConditionsTable = Field(
-        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
-    )
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
 
 
 def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSettings:
-    """Check the parsed TOML of a study and put it in SI.
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
-    Parameters
-    ----------
-    data : mapping
-        As parsed from TOML.
-    path : str or Path
-        Where it came from; named in the error.
-
-    Raises
-    ------
-    StudyError
-        The first thing wrong: file, key, what was found, what was expected.
+    ``path`` is where it came from; files that the study names lie beside it.
     """
     file = check(TurntableStudyFile, data, path, StudyError)
     site = site_on_earth(file.site, path, "table")
