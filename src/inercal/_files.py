@@ -1,7 +1,8 @@
-"""Files out: whole or not at all."""
+"""Files out: whole or not at all. Small files in: no pipes."""
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +13,19 @@ from typing import IO, Any
 from inercal.errors import InputError
 
 
+def is_pipe(path: str | Path) -> bool:
+    """True for a pipe, a socket or a device: what can be read once, and may be waited for without end."""
+    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """The bytes of a file; raises `OSError`, also for what `is_pipe`."""
+    if is_pipe(path):
+        raise OSError(errno.ESPIPE, "it is a pipe or a device, not a file", str(path))
+    with open(path, "rb") as file:
+        return file.read()
+
+
 @contextmanager
 def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
     """Open a temporary file beside ``path`` that takes its place only when the block ends without error.
@@ -20,7 +34,7 @@ def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
     Raises `InputError` where the folder is missing or cannot be written, or the disk is full.
     """
     encoding = None if "b" in mode else "utf-8"
-    if os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path):
+    if is_pipe(path):
         try:
             with open(path, mode, encoding=encoding) as file:
                 yield file

@@ -44,13 +44,14 @@ def _user_caches() -> Iterator[Path]:
 
 
 def _usable(folder: Path) -> bool:
-    """Make the folder; true if it is ours and a file can be written there."""
+    """Make the folder; true if it is ours and a file, as large as that of a kernel, can be written there."""
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         # In a shared temporary folder somebody else could have planted code under our name.
         if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
             return False
-        with tempfile.TemporaryFile(dir=folder):
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(1 << 20))
             return True
     except OSError:
         return False
@@ -87,4 +88,5 @@ def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
         say("compiling kernels, once")
     yield
     if done is not None:
-        done.touch()
+        with suppress(OSError):  # it would be said once more
+            done.touch()

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from inercal._files import read_bytes
 from inercal.errors import InputError
 from inercal.units import shown
 
@@ -28,7 +29,7 @@ def read_toml(path: str | Path, error: type[InputError]) -> dict[str, Any]:
     """Parse a TOML file; raises ``error`` naming file, line and column."""
     text = ""
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
+        text = read_bytes(path).decode("utf-8-sig")
         return tomllib.loads(text)
     except OSError as problem:
         raise error(path, f"cannot be read ({problem.strerror}), expected a TOML file") from problem
@@ -96,6 +97,8 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: found {shown(found)}, expected a list in brackets"
         case "too_short":
             return f"{key}: found {shown(found)}, expected {first['ctx']['min_length']} or more in it"
+        case "string_too_short":
+            return f"{key}: found {shown(found)}, expected a text that is not empty"
         case "int_type" | "int_from_float":
             return f"{key}: found {shown(found)}, expected a whole number"
         case "bool_type":

@@ -227,7 +227,11 @@ _QUANTITY = re.compile(
 )
 
 
-def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
+#: a quantity that is larger, or smaller than its inverse, is a slip, and its square might be lost in rounding
+_LARGEST = 1e60
+
+
+def parse_quantity(text: object, dimension: str, where: object, example: str = "") -> Quantity:
     """Read ``"9.81744(2) m/s^2"``: a number, perhaps its standard uncertainty, and a unit.
 
     The uncertainty is written in the last digits (``9.81744(2)``) or after ``±`` (or ``+/-``). A bare
@@ -241,6 +245,8 @@ def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
         What it must measure: ``"acceleration"``, ``"angle"``, ``"time"``, ... (a key of the unit table).
     where : object
         Named in the error: usually the study key.
+    example : str
+        A good text for it, for the error; one of the dimension if absent.
 
     Raises
     ------
@@ -248,8 +254,8 @@ def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
         Not a quantity, or one of another dimension.
     """
     kind = "a number" if dimension == "number" else f"a quantity with a unit of {dimension}"
-    expected = f"{kind}, such as {_example(dimension)}"
-    if isinstance(text, int | float) and not isinstance(text, bool) and abs(text) < 1e60:
+    expected = f"{kind}, such as {_example(dimension, example)}"
+    if isinstance(text, int | float) and not isinstance(text, bool) and abs(text) < _LARGEST:
         text = repr(text)
     match = _QUANTITY.match(text) if isinstance(text, str) else None
     if match is None or (match["digits"] and match["plusminus"]):
@@ -264,7 +270,7 @@ def parse_quantity(text: object, dimension: str, where: object) -> Quantity:
         raise QuantityError(where, f"found {shown(text)}, which is of {unit.dimension}, expected {expected}")
     value = float(match["number"] + (match["power"] or "")) * unit.factor + unit.zero
     u = _typed_u(match) * unit.factor
-    if not (math.isfinite(value) and math.isfinite(u)):
+    if any(size != 0.0 and not 1.0 / _LARGEST < size < _LARGEST for size in (abs(value), u)):
         raise QuantityError(where, f"found {shown(text)}, which is out of range, expected {expected}")
     return Quantity(value, u, unit, text.strip())
 
@@ -289,9 +295,9 @@ def _typed_u(match: re.Match[str]) -> float:
     return float(match["digits"]) * last * float("1" + (match["power"] or ""))
 
 
-def _example(dimension: str) -> str:
-    """A quantity of that dimension, for error messages."""
-    return f'"{_EXAMPLES.get(dimension, "1.5 " + _TABLE[dimension][0])}"'
+def _example(dimension: str, example: str) -> str:
+    """A quantity of that dimension, for error messages: the example if there is one."""
+    return f'"{example or _EXAMPLES.get(dimension, "1.5 " + _TABLE[dimension][0])}"'
 
 
 _EXAMPLES = {

@@ -186,7 +186,5 @@ def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
     for triad in triads:
         for i, axis in enumerate("xyz"):
             name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(found[triad.sensor][:, i])
-            columns[name] = Column(
-                name, triad.sensor, axis, correct.units[triad.sensor], values, triad.t, triad.source
-            )
+            columns[name] = Column(name, correct.units[triad.sensor], values, triad.t, triad.source)
     return Record(columns, record.findings, record.sources, record.labels)

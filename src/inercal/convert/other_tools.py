@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal._files import read_bytes
 from inercal.convert import imu_tk, imucal, kalibr, psins
 from inercal.convert.convention import Convention, Units, flat, in_si_outputs, output_unit
 from inercal.convert.correct import ImuModel, imu_model
@@ -177,7 +178,7 @@ def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None 
 def _text(path: Path, name: str) -> str:
     """The text of a file."""
     try:
-        return path.read_text(encoding="utf-8")
+        return read_bytes(path).decode()
     except OSError as error:
         raise InputError(
             path, f"cannot be read ({error.strerror}), expected a calibration of {name}"

@@ -49,12 +49,12 @@ class Channel:
     @property
     def sensor(self) -> str:
         """``acc`` of ``acc_x``; the name itself where there is no axis."""
-        return _sensor_and_axis(self.name)[0]
+        return sensor_and_axis(self.name)[0]
 
     @property
     def axis(self) -> str:
         """``x`` of ``acc_x``; empty where there is no axis."""
-        return _sensor_and_axis(self.name)[1]
+        return sensor_and_axis(self.name)[1]
 
 
 def is_channel(name: str) -> bool:
@@ -101,7 +101,7 @@ def _dimensions(name: str) -> tuple[tuple[str, ...], str | None]:
     return next((dimensions, gained) for names, dimensions, gained in _CHANNELS if re.fullmatch(names, name))
 
 
-def _sensor_and_axis(name: str) -> tuple[str, str]:
+def sensor_and_axis(name: str) -> tuple[str, str]:
     """("acc", "x") for acc_x, ("gyro", "roll") for gyro_roll, ("theta_ref", "") for theta_ref."""
     match = re.fullmatch(r"(\w+)_(x|y|z|roll|yaw)", name)
     return (match[1], match[2]) if match else (name, "")

@@ -8,8 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inercal.errors import RecordError
 from inercal.records.channels import of_a_table
 from inercal.records.record import Array, Column, Record
+
+SHORTEST, LONGEST = 1e-6, 1e6
+"""Intervals [s] between which samples of inertial sensors come."""
+
+
+def usable_interval(interval: float, where: object) -> float:
+    """A sample interval [s] that recordings have; raises `RecordError` for any other, as of stamps in a wrong unit."""
+    if not SHORTEST <= interval <= LONGEST:
+        raise RecordError(
+            where,
+            f"t: found a row every {interval:.3g} s, expected {SHORTEST:g} s to {LONGEST:g} s (check the unit of t)",
+        )
+    return interval
 
 
 @dataclass(frozen=True)

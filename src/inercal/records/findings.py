@@ -12,6 +12,7 @@ CODES: dict[str, str] = {
     "nan": "values are missing or not numbers",
     "bad_row": "rows that cannot be read as numbers",
     "truncated": "the file ends within a row",
+    "file_changed": "a file was written to while it was read",
     "saturation": "a sensor sits at an extreme of its range",
     "dead_channel": "a channel never changes",
     "rate_change": "the sample rate changes",
@@ -63,6 +64,7 @@ CODES: dict[str, str] = {
     "prior_suspect": "a value is far outside what its prior allows",
     "filter_fails": "an estimator fails on a sound recording",
     "perhaps_common": "sources that may act alike in two calibrations",
+    "failed_case": "a case of the validation did not pass",
 }
 
 

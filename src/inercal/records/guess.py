@@ -266,6 +266,8 @@ def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
             units[name] = _axes_unit(guesses)
         elif name.startswith("gyro"):
             units[name] = _gyro_unit(guesses, acc[0])
+        elif fits(name, "1"):
+            units[name] = ("1", "a number without a unit")
         else:
             units[name] = (next(unit for unit in _EVERYDAY if fits(name, unit)), "the unit is an example")
         if guess.unit is not None and name not in ("label", "position"):

@@ -19,11 +19,19 @@ from inercal.units import parse_quantity, parse_unit, shown
 class ColumnEntry(Strict):
     """``[columns.NAME]``: where the column is found, its unit, sign and scale."""
 
-    origin: Any = Field(alias="from")
-    unit: str | None = None
-    sign: Literal[1, -1] = 1
-    scale: float = 1.0
-    kind: Literal["rate", "increment"] = "rate"
+    origin: Any = Field(
+        alias="from",
+        description="column number from 0, name in the header, or the variable (channel path) and its column",
+        examples=[1, "ax", ["imu", 0]],
+    )
+    unit: str | None = Field(
+        default=None, description="unit of the numbers in the file, times scale; none for labels and indices"
+    )
+    sign: Literal[1, -1] = Field(default=1, description="-1 for a reversed axis")
+    scale: float = Field(default=1.0, description="what the numbers are multiplied by")
+    kind: Literal["rate", "increment"] = Field(
+        default="rate", description="increment: angle or velocity gained since the last row"
+    )
 
     @field_validator("origin")
     @classmethod
@@ -52,11 +60,15 @@ class ColumnEntry(Strict):
 class FileEntry(Strict):
     """``[file]``: how the files are laid out; what is left out is found out."""
 
-    delimiter: str | None = None
-    decimal: Literal[".", ","] | None = None
-    comment: str | None = None
-    skip: int = Field(default=0, ge=0)
-    variable: str | None = None
+    delimiter: str | None = Field(default=None, description="what parts the fields; found out if absent")
+    decimal: Literal[".", ","] | None = Field(default=None, description="decimal mark; found out if absent")
+    comment: str | None = Field(
+        default=None, description="what begins a line that is passed over; # and % if absent"
+    )
+    skip: int = Field(default=0, ge=0, description="lines before the header or the numbers")
+    variable: str | None = Field(
+        default=None, description="variable, group or topic that holds the columns, where a file has several"
+    )
 
     @field_validator("delimiter")
     @classmethod
@@ -78,23 +90,25 @@ class FileEntry(Strict):
 class NamedFileEntry(FileEntry):
     """``[file.NAME]``: one of several files, or of the clocks of one, with its own layout and columns."""
 
-    path: str = Field(min_length=1)
-    columns: dict[str, ColumnEntry] = Field(min_length=1)
+    path: str = Field(min_length=1, description="the file, beside the map")
+    columns: dict[str, ColumnEntry] = Field(min_length=1, description="its channels, each a table as above")
 
 
 class TimeEntry(Strict):
     """``[time]``: the sample rate of files without a time column, or whose stamps can't be trusted."""
 
-    rate: str | None = None
-    ignore: bool = False
+    rate: str | None = Field(
+        default=None, description="sample rate, for files without a time column", examples=["100 Hz"]
+    )
+    ignore: bool = Field(default=False, description="take the rate in the place of stamps not to be trusted")
 
 
 class MapEntry(Strict):
     """A whole map file, less its ``[file.NAME]`` tables."""
 
-    columns: dict[str, ColumnEntry] = Field(default_factory=dict)
-    time: TimeEntry = TimeEntry()
-    file: FileEntry = FileEntry()
+    columns: dict[str, ColumnEntry] = Field(default_factory=dict, description="the channels, by name")
+    time: TimeEntry = Field(default=TimeEntry(), description="the sample rate, where stamps do not give it")
+    file: FileEntry = Field(default=FileEntry(), description="how the file is laid out")
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError
+from inercal.records.channels import sensor_and_axis
 from inercal.records.findings import Finding
 from inercal.units import Unit
 
@@ -32,19 +33,27 @@ class Column:
     """One channel.
 
     ``values`` (n,) are in ``unit``, sign and scale of the map already applied; ``t`` (n,) [s] is the time
-    axis of its file, the same object for all columns of that file. ``sensor``, ``axis`` and ``frame`` label
-    it: ``acc``, ``x``, ``b``. ``increment``: a rate that was recorded as what was gained since the row before.
+    axis of its file, the same object for all columns of that file. ``frame`` is that of its axis.
+    ``increment``: a rate that was recorded as what was gained since the row before.
     """
 
     name: str
-    sensor: str
-    axis: str
     unit: Unit
     values: Array
     t: Array
     source: Source
     frame: str = "b"
     increment: bool = False
+
+    @property
+    def sensor(self) -> str:
+        """``acc`` of ``acc_x``; the name itself where there is no axis."""
+        return sensor_and_axis(self.name)[0]
+
+    @property
+    def axis(self) -> str:
+        """``x`` of ``acc_x``; empty where there is no axis."""
+        return sensor_and_axis(self.name)[1]
 
     def si(self) -> Array:
         """Values (n,) in SI units; raises `RecordError` for raw counts and volts."""

@@ -10,8 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from inercal._files import is_pipe
 from inercal.errors import InputError, MapError, RecordError
 from inercal.records.checks import check
+from inercal.records.findings import Finding
 from inercal.records.read.join import FileTable, join
 from inercal.records.read.table import Format, Part
 from inercal.records.record import Record, Source
@@ -231,11 +233,23 @@ def canonical_units(paths: Sequence[Path]) -> dict[str, Unit] | None:
 def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], None]) -> list[FileTable]:
     """The wanted columns of one file, a table for each clock, and the hash of its bytes."""
     try:
+        before = _state(path)
         tables = form.read(path, part.options, part.channels, progress)
+        source = source_of(path)
+        changed = _state(path) != before
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
-    source = source_of(path)
+    if changed:
+        said = Finding(
+            "file_changed", "the file was written to while it was read: the checksum is not of its rows"
+        )
+        tables = [replace(table, findings=(*table.findings, said)) for table in tables]
     return [FileTable(path, source, part, table) for table in tables]
+
+
+def _state(path: Path) -> list[tuple[int, int]]:
+    """Size and time of the last change of a file, or of those of a folder."""
+    return [(file.stat().st_size, file.stat().st_mtime_ns) for file in _files(path)]
 
 
 def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
@@ -252,8 +266,9 @@ def format_of(path: Path) -> Format:
     for suffix, module in FORMATS.items():
         if name.endswith(suffix):
             if not path.is_file():
-                found = "a folder" if path.is_dir() else "no such file"
-                raise RecordError(path, f"found {found}, expected a recording")
+                there = "a pipe or a device" if is_pipe(path) else "no such file"
+                found = "a folder" if path.is_dir() else there
+                raise RecordError(path, f"found {found}, expected a recording in a file")
             return _module(module)
     if path.is_dir():
         raise RecordError(

@@ -19,7 +19,7 @@ from inercal.records.channels import Channel
 from inercal.records.checks import missing, too_long
 from inercal.records.findings import Finding
 from inercal.records.read.canonical import bare, canonical
-from inercal.records.read.table import FileOptions, Sample, Table
+from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
 from inercal.records.record import Array
 from inercal.units import parse_unit
 
@@ -291,14 +291,14 @@ def _single(contents: Contents, options: FileOptions, path: Path) -> str | None:
 
 
 def _numbers(column: NDArray[Any]) -> Array:
-    """As float64, dates as seconds since 1970; NaN where infinite."""
+    """As float64, dates as seconds since 1970; NaN where infinite or beyond `LARGEST`."""
     if column.dtype.kind in "Mm":
         known = ~np.isnat(column)
         kind = "datetime64[ns]" if column.dtype.kind == "M" else "timedelta64[ns]"
         whole, rest = np.divmod(column.astype(kind).astype(np.int64), 10**9)
         return np.where(known, whole + 1e-9 * rest, np.nan)
     numbers = np.ascontiguousarray(column, dtype=np.float64)
-    return np.where(np.isfinite(numbers), numbers, np.nan)
+    return np.where(np.abs(numbers) < LARGEST, numbers, np.nan)
 
 
 def _rounded(column: NDArray[Any]) -> NDArray[np.int64]:

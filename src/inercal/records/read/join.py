@@ -169,7 +169,7 @@ def _column(channel: Channel, file: FileTable, t: Array, rate: float | None) -> 
         if factor != 1.0:
             values = values * factor
     gained = channel.increment
-    return Column(channel.name, channel.sensor, channel.axis, unit, values, t, file.source, increment=gained)
+    return Column(channel.name, unit, values, t, file.source, increment=gained)
 
 
 def _interval(t: Array, path: Path) -> float:

@@ -12,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 
 from inercal.errors import RecordError
-from inercal.records.read.table import FileOptions
+from inercal.records.read.table import LARGEST, FileOptions
 
 _SAMPLE = 100
 _DELIMITERS = ("\t", ";", ",", None)
@@ -67,12 +67,13 @@ class Layout:
 
 
 def parse_number(text: str) -> float | None:
-    """The number of a text, NaN where it is empty or says so; None if it is no number."""
+    """The number of a text, NaN where it is empty, says so or is beyond `LARGEST`; None if it is no number."""
     text = text.strip()
     try:
-        return None if "_" in text else float(text)
+        value = None if "_" in text else float(text)
     except ValueError:
-        return float("nan") if text.lower() in _MISSING else None
+        value = math.nan if text.lower() in _MISSING else None
+    return value if value is None or abs(value) < LARGEST else math.nan
 
 
 def is_rounded(text: str, value: float) -> bool:

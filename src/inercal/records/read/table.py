@@ -11,6 +11,9 @@ from inercal.records.channels import Channel
 from inercal.records.findings import Finding
 from inercal.records.record import Array
 
+LARGEST = 1e30
+"""What no sensor reads, in any unit: it counts as missing, as infinity does, and its powers overflow nowhere."""
+
 
 @dataclass(frozen=True)
 class FileOptions:
@@ -46,8 +49,8 @@ class Table:
     """Raw columns of one file, or those of one clock where a file has several.
 
     ``values`` holds an array (n,) for each channel found, as in the file, before sign, scale and unit; what
-    is missing or infinite is NaN and is in ``findings``, with rows that could not be read. ``contents``
-    says in words what the file holds, for the error about a channel that is not there.
+    is missing, infinite or beyond `LARGEST` is NaN and is in ``findings``, with rows that could not be read.
+    ``contents`` says in words what the file holds, for the error about a channel that is not there.
     ``clock`` (n,) [s] is the time axis that the file states for these columns, where no column t is wanted.
     """
 

@@ -24,7 +24,7 @@ from inercal.records.places import counted, places
 from inercal.records.read.canonical import EXAMPLE, bare, canonical
 from inercal.records.read.layout import Layout, find_layout, is_rounded
 from inercal.records.read.lines import Block, blocks
-from inercal.records.read.table import FileOptions, Sample, Table
+from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
 from inercal.records.record import Array
 from inercal.units import shown
 
@@ -182,7 +182,7 @@ def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | 
         rows: Array = np.loadtxt(lines, delimiter=delimiter, usecols=indices, comments=None, ndmin=2)
     except ValueError:
         return None
-    return rows if len(rows) == len(lines) and np.isfinite(rows).all() else None
+    return rows if len(rows) == len(lines) and (np.abs(rows) < LARGEST).all() else None
 
 
 def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, _Flaws]:
@@ -201,7 +201,6 @@ def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
             rows[len(lines)] = [math.nan if value is None else value for value in found]
         lines.append(number)
     rows = rows[: len(lines)]
-    rows[~np.isfinite(rows)] = np.nan
     place, badly = np.array(lines, np.int64), np.array(bad, np.int64)
     empty = np.isnan(rows) & ~np.isin(place, badly)[:, np.newaxis]
     return rows, _Flaws(badly, tuple(place[column] for column in empty.T))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Callable
 from itertools import repeat
@@ -41,8 +42,8 @@ def write(record: Record, axes: Clocks, file: IO[bytes], progress: Callable[[int
 
 
 def number(value: float) -> str:
-    """A number in the fewest digits that read back the same; nothing for NaN."""
-    return "" if value != value else repr(value)
+    """A number in the fewest digits that read back the same; nothing for what is no number, or lost in overflow."""
+    return repr(value) if math.isfinite(value) else ""
 
 
 def quoted(label: str) -> str:
