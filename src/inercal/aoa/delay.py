@@ -111,10 +111,15 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     missing = np.convolve(missing, np.ones(_BRIDGED + 1), "same") > _BRIDGED + 0.5
     shown, gyro = (np.interp(grid, t[k], x[k]) for x, k in ((x, np.isfinite(x)) for x in (shown, gyro)))
     size = round(min(max((t[-1] - t[0]) / _SEGMENTS, _SHORTEST), _LONGEST) / step)
+    if not 2 <= size <= len(grid):
+        return None
     tau, found = 0.0, None
     for _ in range(_ROUNDS):
         # beside a line of the spectrum the phase is that of the line: only where all is aligned is it the right one
-        turned = np.gradient(_bridged(grid, _interpolated(grid, gyro, grid + tau)), step)
+        moved = _interpolated(grid, gyro, grid + tau)
+        if not np.isfinite(moved).any():
+            return None
+        turned = np.gradient(_bridged(grid, moved), step)
         found = _most_likely(*_spectra(shown, turned, missing, size), 1.0 / (size * step))
         if found is None:
             return None

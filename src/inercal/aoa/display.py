@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.settings import GYROS
 from inercal.estimate.result import Estimate, in_degrees, rounded
+from inercal.instruments.terms import term
 from inercal.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -27,21 +28,6 @@ _OF_FIELD = {
 
 #: unit -> that of larger things, how many of the former it is, and from where on it is taken
 _LARGE = {"deg/h": ("deg/s", 3600.0, 0.01), "ug": ("mg", 1000.0, 1.0)}
-
-#: how the name of a coefficient begins -> what it is
-_WORDS = {
-    "b_g": "bias of the gyro",
-    "b_roll": "bias of the roll gyro",
-    "b_yaw": "bias of the yaw gyro",
-    "b_": "bias of accelerometer {}",
-    "dr_": "position of accelerometer {}, forward",
-    "zo_": "position of accelerometer {}, up",
-    "k_g": "scale of the gyro",
-    "tau_g": "delay of the gyro",
-    "S_": "scale of accelerometer {}, less 1",
-    "dlambda_": "axis of accelerometer {}, towards down",
-    "tau": "delay of all sensors against the reference",
-}
 
 _STATISTICS = {
     "residual_rms": "root-mean-square normalised innovation",
@@ -68,8 +54,8 @@ def sized(u: float, si: str) -> tuple[float, str]:
 
 def in_words(name: str) -> str:
     """What a coefficient is: ``b_2`` the bias of accelerometer 2."""
-    begun, words = next((begun, words) for begun, words in _WORDS.items() if name.startswith(begun))
-    return words.format(name.removeprefix(begun))
+    of = term(name)
+    return "" if of is None else of.name
 
 
 def displayed(estimate: Estimate) -> Estimate:
@@ -122,6 +108,35 @@ def use_of_fit(estimate: Estimate) -> str:
         'To use the fit to theta_ref: write this result by --out result.json, and put prior = "result.json" under '
         "[estimator] of the study; scales and axes are then put right, and the rest is what is known before."
     )
+
+
+def off_stated(parameter: Mapping[str, Any]) -> float:
+    """A coefficient of such a fit less what it is where a sensor is as the study states: 1 of a scale, else 0."""
+    return float(parameter["value"] - (1.0 if parameter["name"].startswith("S_") else 0.0))
+
+
+def off_statement(fit: Mapping[str, Any]) -> list[str]:
+    """Names of the coefficients that such a fit sees off what the study states, by more than two u."""
+    return [
+        each["name"]
+        for each in fit["parameters"]
+        if each["name"] not in fit["unseen"] and abs(off_stated(each)) > 2.0 * each["u"]
+    ]
+
+
+def rest_of_fit(estimate: Estimate) -> str:
+    """The coefficients of such a fit that are not `off_statement`, by name; nothing where there are none."""
+    fit = estimate.result.get("verified")
+    if fit is None:
+        return ""
+    off, unseen = off_statement(fit), list(fit["unseen"])
+    stated = [each["name"] for each in fit["parameters"] if each["name"] not in (*off, *unseen)]
+    told = (
+        (stated, "within two u of what the study states"),
+        (unseen, "not seen in this motion"),
+    )
+    parts = [f"{words}: {', '.join(names)}" for names, words in told if names]
+    return f"Fitted to theta_ref, but not listed: {'; '.join(parts)}." if parts else ""
 
 
 def delays(estimate: Estimate) -> str:

@@ -15,7 +15,7 @@ from inercal.aoa.display import delays, displayed, shown_unit
 from inercal.aoa.flow import alpha_beta, stated
 from inercal.aoa.outcome import unit_of
 from inercal.aoa.pauses import at_rest
-from inercal.aoa.tables import all_tables
+from inercal.aoa.tables import answer, on_page
 from inercal.aoa.task import in_order
 from inercal.aoa.verification import REFERENCE_U
 from inercal.report import sting
@@ -47,9 +47,12 @@ _NO_FORCE = 1e-3
 def angle_page(measurement: Measurement, settings: AoaSettings) -> str:
     """The report of a measurement as one self-contained HTML page, with or without other methods and a reference."""
     estimate = measurement.estimate
-    tables = all_tables(estimate, measurement.points, settings)
     return render(
-        displayed(estimate), pictures(measurement, settings), "Angle of a wind-tunnel model", tables
+        displayed(estimate),
+        pictures(measurement, settings),
+        "Angle of a wind-tunnel model",
+        on_page(estimate),
+        answer(estimate, measurement.points, settings),
     )
 
 
@@ -316,7 +319,7 @@ def _flexure(seen: Measurement, found: Filtered, settings: AoaSettings, marks: M
     if "flexure_z" not in names or len(found.kept_t) < 2:
         return []
     panels = []
-    for axis, word, of in (("z", "across", prior.vertical), ("x", "along", prior.axial)):
+    for axis, word, of in (("z", "across", prior.heave), ("x", "along", prior.axial)):
         k = names.index(f"flexure_{axis}")
         value, u, level = found.states[:, k] / _MG, found.states_u[:, k] / _MG, 2.0 * of.level / _MG
         title = f"{word} the model: {rms(value):.2g} mg rms, u {middle(u):.2g} mg; prior {0.5 * level:.2g} mg"

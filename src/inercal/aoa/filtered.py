@@ -15,6 +15,7 @@ from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.recursion import OUTPUTS
 from inercal.aoa.smoother import smooth
+from inercal.geometry.rotations import principal
 
 Array = NDArray[np.float64]
 
@@ -128,7 +129,7 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
 def roll_of(problem: Problem, kept: Array) -> Array:
     """Roll, in (-pi, pi], and its standard uncertainty (k, 2) [rad] from kept states (k, 2 m)."""
     k = int(problem.places[ROLL])
-    return np.column_stack([np.pi - np.remainder(np.pi - kept[:, k], 2.0 * np.pi), kept[:, problem.size + k]])
+    return np.column_stack([principal(kept[:, k]), kept[:, problem.size + k]])
 
 
 def _with_roll(problem: Problem, t: Array, rows: Array, every: int) -> tuple[State, Trace, Array, Array]:

@@ -12,6 +12,7 @@ alpha. A row of the recording that was left out has no numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,8 @@ from inercal.aoa.flow import alpha_beta, stated, theta_u
 from inercal.aoa.points import Point
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import AoaSettings, Attitude
-from inercal.records.record import Column, Record, Source
+from inercal.records.made import record_of
+from inercal.records.record import Record, Source
 from inercal.units import parse_unit
 
 Array = NDArray[np.float64]
@@ -101,7 +103,6 @@ def _record(
     names: tuple[tuple[str, str], ...], values: Array, t: Array, recording: Recording, source: Source
 ) -> Record:
     """Columns (n, k) as a record."""
-    made = {}
-    for (name, symbol), column in zip(names, values.T, strict=True):
-        made[name] = Column(name, name, "", parse_unit(symbol), np.ascontiguousarray(column), t, source)
-    return Record(made, recording.findings, (*recording.sources, source))
+    named = zip(names, values.T, strict=True)
+    made = record_of(((name, parse_unit(symbol), column) for (name, symbol), column in named), t, source)
+    return replace(made, findings=recording.findings, sources=(*recording.sources, source))

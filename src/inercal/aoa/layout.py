@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.geometry.rotations import principal
+
 Array = NDArray[np.float64]
 
 #: text of an axis -> lambda [rad], counted from +x (forward) towards -z (down)
@@ -44,7 +46,7 @@ class Layout:
     def turned(self) -> Array:
         """(N, N) rad: lambda of the column less that of the row, within (-pi, pi]."""
         apart = self.angle[None, :] - self.angle[:, None]
-        return np.asarray(math.pi - np.remainder(math.pi - apart, 2.0 * math.pi))
+        return principal(apart)
 
     def square(self) -> list[tuple[int, int]]:
         """Pairs (i, j) whose axis j is a right angle ahead of axis i: lambda_j = lambda_i + 90 deg."""

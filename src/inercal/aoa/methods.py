@@ -20,6 +20,7 @@ from inercal.aoa.recording import Recording
 from inercal.aoa.settings import AoaSettings, Methods
 from inercal.aoa.static import spread
 from inercal.errors import RecordError, StudyError
+from inercal.geometry.rotations import principal
 
 Array = NDArray[np.float64]
 
@@ -124,7 +125,7 @@ def low_passed(angles: Angles, t: Array, cutoff: float = LOW_PASS) -> Angles:
     theta[known] = np.unwrap(theta[known])
     smooth = zero_phase(t[taken], theta, cutoff, _ORDER)
     found = np.full(len(t), np.nan)
-    found[taken] = math.pi - np.remainder(math.pi - smooth, 2.0 * math.pi)
+    found[taken] = principal(smooth)
     return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=found)
 
 
@@ -142,12 +143,12 @@ def _needs(recording: Recording, settings: AoaSettings, methods: Methods, level:
 
 
 def _alike(acc: Array) -> Iterator[tuple[NDArray[np.intp], list[int]]]:
-    """Rows in which the same accelerometers are there, and which these are."""
+    """Rows in which the same accelerometers are there, and which these are; none of rows without any."""
     known = np.isfinite(acc)
     kind = np.zeros(len(acc), dtype=np.int64)
     for k in range(acc.shape[1]):
         kind = 2 * kind + known[:, k]
-    for each in np.unique(kind):
+    for each in np.unique(kind[kind > 0]):
         rows = np.flatnonzero(kind == each)
         seen = [int(k) for k in np.flatnonzero(known[rows[0]])]
         yield rows, seen
@@ -176,7 +177,7 @@ def _at_stamps(
         slope = np.gradient(_unwrapped(theta), recording.t[taken]) if len(theta) > 1 else np.zeros(len(theta))
         moving = np.where(np.isfinite(rate), rate, slope)
         theta = theta + tau * moving + 0.5 * tau**2 * acceleration
-        theta = math.pi - np.remainder(math.pi - theta, 2.0 * math.pi)
+        theta = principal(theta)
         u = np.sqrt(u**2 + (moving * tau_u) ** 2 + (tau * np.nan_to_num(rate_u)) ** 2)
         rate_u = np.hypot(rate_u, acceleration * tau_u)
         rate = rate + tau * acceleration

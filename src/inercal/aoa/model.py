@@ -18,7 +18,7 @@ An accelerometer at angle lambda, counted from +x towards -z, reads f_x cos lamb
 lags by tau, (1 + k) (w - tau al + tau^2 j / 2) + b_g, times c at a fixed roll. Source: Tan et al. 2021, with the
 lever-arm terms of three axes written out.
 
-The state is, where each part is estimated (`Places`): theta, w, al, j | b_g | b_1.. | dr_1.. | s_z, s_z', s_x, s_x' |
+The state is, where each part is estimated (`places`): theta, w, al, j | b_g | b_1.. | dr_1.. | s_z, s_z', s_x, s_x' |
 zo_1.., k_g | tau | phi, b_roll, b_yaw; b_.. are biases, dr_.., zo_.. errors of the positions r, z.
 """
 

@@ -67,9 +67,11 @@ def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
 def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]:
     """Whether the model rests at each row (n,), and how much the angle scatters about its line there (n,) [rad].
 
-    Near the ends rows are judged by the first and last whole window.
+    Near the ends rows are judged by the first and last whole window. A record shorter than that, or of which most
+    rows have the time of the one before, rests.
     """
-    n, w = len(t), _rows(t)
+    n = len(t)
+    w = _rows(t) if n > 1 and _step(t) > 0.0 else n + 1
     if n < w:
         return np.ones(n, dtype=bool), np.zeros(n)
     # sums over windows of the angle less its overall line, so that they lose no digits

@@ -16,7 +16,7 @@ from inercal.aoa.outcome import COMMAND, geometry
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.stated import carried, gravity_u
 from inercal.errors import StudyError
-from inercal.estimate.exchange import load as load_estimate
+from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 
@@ -49,7 +49,7 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
     Raises
     ------
     InputError
-        The file cannot be read, or is no result (`inercal.estimate.exchange.load`).
+        The file cannot be read, or is no result (`inercal.estimate.files.load`).
     StudyError
         It is of another command, holds no coefficients, ended with a bad verdict, or is of other sensors.
     """

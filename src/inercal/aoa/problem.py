@@ -95,7 +95,7 @@ def problem(
         common, own = prior.lever_common**2, prior.lever**2
         add(model.LEVERS, common + own * np.eye(n), *(f"dr_{k}" for k in each))
     if states >= 15:
-        add(model.RESONATORS, np.diag([*_stationary(prior.vertical), *_stationary(prior.axial)]), *_FLEXURE)
+        add(model.RESONATORS, np.diag([*_stationary(prior.heave), *_stationary(prior.axial)]), *_FLEXURE)
     if states >= 19:
         add(model.HEIGHTS, prior.height**2 * np.eye(n), *(f"zo_{k}" for k in each))
         add(model.SCALE, np.array([[prior.gyro_scale**2]]), "k_g")
@@ -145,7 +145,7 @@ def _constants(settings: AoaSettings) -> Array:
     }
     made = np.zeros(16)
     made[list(known)] = list(known.values())
-    for first, of in ((model.Z_RATE, settings.prior.vertical), (model.X_RATE, settings.prior.axial)):
+    for first, of in ((model.Z_RATE, settings.prior.heave), (model.X_RATE, settings.prior.axial)):
         made[first : first + 3] = of.frequency, of.damping, of.level
     return made
 

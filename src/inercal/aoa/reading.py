@@ -13,6 +13,7 @@ from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.errors import RecordError
 from inercal.records.checks.samples import plateaus
 from inercal.records.checks.values import is_dead, saturated
+from inercal.records.clocks import usable_interval
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Column, Record
@@ -67,6 +68,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         raise RecordError(
             where, f"found {counted(len(taken), 'row')} that go on in time, expected {HELD} or more"
         )
+    usable_interval(float(np.median(np.diff(t[taken]))), where)
     rows = _Rows(record, settings, t, where)
     gyros = [name for name in GYROS if name in record and _told(record[name], settings)]
     values = {name: rows.calibrated(name) for name in (*there, *gyros)}

@@ -203,7 +203,8 @@ def root(variance: float) -> float:
 @kernel
 def told(value: float, variance: float) -> float:
     """How much of a rate or an acceleration is more than noise, 0 to 1: 1 - 9 P / x^2, none below three deviations."""
-    return max(0.0, 1.0 - 9.0 * variance / (value * value)) if value != 0.0 else 0.0
+    squared = value * value  # which may be zero where the value is not
+    return max(0.0, 1.0 - 9.0 * variance / squared) if squared > 0.0 else 0.0
 
 
 @kernel

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from inercal.aoa.recording import Recording
 from inercal.aoa.reference import OVERLAP, Reference, reference
 from inercal.aoa.settings import AoaSettings
+from inercal.errors import RecordError
 from inercal.estimate.identifiability import Learned, learned
 from inercal.estimate.result import Parameter
 
@@ -103,7 +104,7 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
     Raises
     ------
     RecordError
-        There is no reference angle, or too little of it.
+        There is no reference angle, too little of it, or none that a sensor follows.
     """
     known = reference(recording)
     names, units, usual, start = _terms(settings)
@@ -118,14 +119,23 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
         power = np.square(residuals).sum(axis=0) / np.maximum(count, 1)
         weights = np.where(power > 0.0, OVERLAP[0] / np.where(power > 0.0, power, 1.0), 0.0)
         information = np.einsum("kip,i,kiq->pq", jacobian, weights, jacobian, optimize=True)
-        # in units of the prior, in which the matrix is well scaled
-        bread = np.linalg.inv(information * np.outer(wide, wide) + np.eye(len(x))) * np.outer(wide, wide)
-        pull = np.einsum("kip,i,ki->p", jacobian, weights, residuals, optimize=True)
-        step = bread @ (pull - (x - start) / wide**2)
-        x = x + step
         scores = np.einsum("kip,i,ki->kp", jacobian, weights, residuals, optimize=True)
-        covariance = bread @ (_spread(scores) + np.diag(1.0 / wide**2)) @ bread
-        converged = bool((np.abs(step) <= _SMALL * np.sqrt(np.abs(np.diag(covariance)))).all())
+        # in units of the prior, in which the matrices are well scaled, and by factors, so that no variance is negative
+        scale = np.outer(wide, wide)
+        try:
+            inner = np.linalg.inv(np.linalg.cholesky(information * scale + np.eye(len(x))))
+            outer = np.linalg.cholesky(_spread(scores) * scale + np.eye(len(x)))
+        except np.linalg.LinAlgError as error:
+            raise RecordError(
+                "theta_ref", "found angles that no sensor follows, expected those of the model"
+            ) from error
+        pull = np.einsum("kip,i,ki->p", jacobian, weights, residuals, optimize=True)
+        bread = inner.T @ inner
+        step = wide * (bread @ (wide * pull - (x - start) / wide))
+        x = x + step
+        root = wide[:, None] * (bread @ outer)
+        covariance = root @ root.T
+        converged = bool((np.abs(step) <= _SMALL * np.sqrt(np.diag(covariance))).all())
         if converged:
             break
     more = learned(covariance, wide, names)

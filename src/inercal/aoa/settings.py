@@ -57,7 +57,7 @@ class Prior:
     """Standard deviations of what the filter estimates beside motion and biases, about 0.
 
     Positions r [m]: ``lever_common`` to all (the pivot) and ``lever`` of each; ``height`` z [m] of each;
-    ``gyro_scale``; ``gyro_delay`` [s], where it is estimated. ``vertical`` and ``axial`` are the sting's flexure.
+    ``gyro_scale``; ``gyro_delay`` [s], where it is estimated. ``heave`` and ``axial`` are the sting's flexure.
     """
 
     lever_common: float = 3e-3
@@ -65,7 +65,7 @@ class Prior:
     height: float = 5e-3
     gyro_scale: float = 1e-3
     gyro_delay: float = 5e-3
-    vertical: Resonance = Resonance(2.0 * math.pi * 9.0, 0.3, 0.01 * STANDARD_GRAVITY)
+    heave: Resonance = Resonance(2.0 * math.pi * 9.0, 0.3, 0.01 * STANDARD_GRAVITY)
     axial: Resonance = Resonance(2.0 * math.pi * 12.0, 0.5, 0.01 * STANDARD_GRAVITY)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,9 @@ from inercal.aoa.motion import course, duration, oscillation, point_numbers, sha
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Disturbances, Noise
 from inercal.errors import StudyError
-from inercal.units import STANDARD_GRAVITY
+from inercal.records.made import record_of
+from inercal.records.record import Record
+from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -175,3 +177,37 @@ def _spoiled(values: Array, settings: AoaSettings, rng: np.random.Generator) -> 
     if other.dropouts > 0.0:
         values[rng.random(len(values)) < other.dropouts] = np.nan
     return values
+
+
+def to_record(recording: Recording, settings: AoaSettings) -> Record:
+    """A record as a file holds it, which read with the same study means the same.
+
+    ``t``; ``a1``.. [g], ``gyro`` [deg/s], and ``gyro_roll``, ``gyro_yaw`` [deg/s] where the recording has them: or
+    volts or counts of sensors that the study calibrates from these. ``point`` and ``trigger`` where they are known,
+    ``theta_ref`` [deg] where there is a reference; ``temperature`` [degC], that of the study, where a sensor depends
+    on it.
+    """
+    columns = ((name, unit, values / unit.factor) for name, unit, values in _columns(recording, settings))
+    return record_of(columns, recording.t)
+
+
+def _columns(recording: Recording, settings: AoaSettings) -> Iterator[tuple[str, Unit, Array]]:
+    """Name, unit and values [SI] of each column."""
+    values = np.column_stack([recording.acc, recording.gyro, recording.turns])
+    temperature = None if settings.temperature is None else settings.temperature.value
+    thermal = False
+    for k, name in enumerate((*settings.layout.names, *GYROS)):
+        if name in GYROS and not np.isfinite(values[:, k]).any():
+            continue
+        of = settings.calibration(name)
+        thermal = thermal or of.scale_slope != 0.0 or of.bias_slope != 0.0
+        symbol = of.per if of.per != "1" else "deg/s" if name in GYROS else "g"
+        yield name, parse_unit(symbol), of.indicated(values[:, k], temperature)
+    if thermal and temperature is not None:
+        yield "temperature", parse_unit("degC"), np.full(len(values), temperature)
+    if recording.point is not None:
+        yield "point", parse_unit("1"), recording.point
+    if recording.trigger is not None:
+        yield "trigger", parse_unit("1"), recording.trigger
+    if recording.reference is not None:
+        yield "theta_ref", parse_unit("deg"), recording.reference

@@ -126,7 +126,7 @@ def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:
     before = _known_before(problem, settings)
     roll, zero = settings.attitude.roll, settings.zero
     lever = float(np.hypot(prior.lever_common, prior.lever))
-    flexure = max(prior.vertical.level, prior.axial.level)
+    flexure = max(prior.heave.level, prior.axial.level)
     accelerometers = tuple(f"b_{k + 1}" for k in range(problem.count))
 
     def of_prior(name: str, u: float, unit: str, *begin: str) -> Source:

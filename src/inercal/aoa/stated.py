@@ -26,7 +26,7 @@ from inercal.aoa.recording import Recording
 from inercal.aoa.roll import tracked
 from inercal.aoa.settings import AoaSettings, Methods
 from inercal.aoa.zero import tare
-from inercal.estimate.exchange import load as load_estimate
+from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
 
 Array = NDArray[np.float64]

@@ -21,6 +21,7 @@ from inercal.aoa.arms import axes
 from inercal.aoa.layout import Layout
 from inercal.aoa.settings import Static
 from inercal.errors import StudyError
+from inercal.geometry.rotations import principal
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -79,7 +80,7 @@ def segmented(acc: Array, layout: Layout, gravity: float, level: float = 1.0) ->
     forward = slope[at] >= 0.0
     size, turn = np.hypot(h[:, 0], h[:, 1])[i], np.arctan2(-h[:, 1], h[:, 0])[i]
     raised = np.arcsin(np.clip(acc[at] / (gravity * size), -1.0, 1.0))
-    theta = _wrapped(turn + np.where(forward, raised, math.pi - raised))
+    theta = principal(turn + np.where(forward, raised, math.pi - raised))
     steep = np.maximum(size * np.cos(raised), _FLAT)
     gain = np.zeros(acc.shape)
     gain[at] = np.where(forward, 1.0, -1.0) / (gravity * steep)
@@ -173,12 +174,14 @@ def gls(
         direction = np.stack([np.sin(theta), np.cos(theta)], axis=-1)
         slope = _slopes(direction, h)
         weighted = slope @ weight
-        gain = weighted / np.einsum("ni,ni->n", weighted, slope)[:, None]
+        power = np.einsum("ni,ni->n", weighted, slope)[:, None]
+        # where the readings that count do not change with theta it is not known
+        gain = np.divide(weighted, power, out=np.full_like(weighted, np.nan), where=power > 0.0)
         step = np.einsum("ni,ni->n", gain, read - direction @ h.T)
         theta = theta + step
         if not (np.abs(step) > _CONVERGED).any():
             break
-    return Still(_wrapped(theta), gain / gravity)
+    return Still(principal(theta), gain / gravity)
 
 
 _WAYS: Mapping[str, Callable[[Array, Layout, float, float], Still]] = {
@@ -233,7 +236,7 @@ def _by_two(acc: Array, ways: Array, taken: Indices, gravity: float) -> Still:
         direction = _direction(acc[rows] @ way.T)
         theta[rows] = np.arctan2(direction[:, 0], direction[:, 1])
         gain[rows] = _slopes(direction, way.T) / gravity
-    return Still(_wrapped(theta), gain)
+    return Still(principal(theta), gain)
 
 
 def _direction(force: Array) -> Array:
@@ -245,8 +248,3 @@ def _direction(force: Array) -> Array:
 def _slopes(direction: Array, h: Array) -> Array:
     """(n, N): how h . (sin theta, cos theta) grows with theta."""
     return np.asarray(direction[:, ::-1] @ (h * [1.0, -1.0]).T)
-
-
-def _wrapped(theta: Array) -> Array:
-    """Angles within (-pi, pi]."""
-    return np.asarray(math.pi - np.remainder(math.pi - theta, 2.0 * math.pi))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from inercal.aoa.display import in_words, short, shown_unit, sized, use_of_fit
+from inercal.aoa.display import in_words, off_stated, off_statement, short, shown_unit, sized, use_of_fit
 from inercal.aoa.flow import stated
 from inercal.aoa.points import Point
 from inercal.aoa.settings import AoaSettings
@@ -23,17 +23,26 @@ _SMALL = 0.001
 """Share of a variance below which a source is not listed."""
 
 
-def all_tables(estimate: Estimate, points: Iterable[Point], settings: AoaSettings) -> list[Table]:
-    """Those that have rows, in the order in which they are shown."""
-    made = (
-        angle(estimate),
-        points_table(points, settings),
-        sensors(estimate),
-        fitted(estimate),
-        uncertainty(estimate),
-        methods(estimate),
-    )
-    return [each for each in made if each.rows]
+def answer(estimate: Estimate, points: Iterable[Point], settings: AoaSettings) -> list[Table]:
+    """What was asked for: the angle, and the points where there are any."""
+    return _with_rows(angle(estimate), points_table(points, settings))
+
+
+def on_page(estimate: Estimate) -> list[Table]:
+    """What a page shows besides the answer, and the errors of the sensors as its coefficients."""
+    return _with_rows(fitted(estimate), uncertainty(estimate), methods(estimate))
+
+
+def on_terminal(estimate: Estimate) -> list[Table]:
+    """What a terminal shows besides the answer: of a fit to a reference what is off."""
+    fit = estimate.result.get("verified")
+    off = fitted(estimate, () if fit is None else off_statement(fit))
+    return _with_rows(sensors(estimate), off, uncertainty(estimate), methods(estimate))
+
+
+def _with_rows(*tables: Table) -> list[Table]:
+    """Those that have any."""
+    return [each for each in tables if each.rows]
 
 
 def angle(estimate: Estimate) -> Table:
@@ -112,17 +121,18 @@ def sensors(estimate: Estimate) -> Table:
     )
 
 
-def fitted(estimate: Estimate) -> Table:
-    """What the reference angle says of the sensors."""
+def fitted(estimate: Estimate, names: Container[str] | None = None) -> Table:
+    """What the reference angle says of the sensors: of those with these ``names``, or of all."""
     fit = estimate.result.get("verified")
     heads = (("", ""), ("what it is", ""), ("value", ""), ("u", ""), ("unit", ""), ("as angle", "deg"))
     title, rows = "Sensors as fitted to the reference angle", []
     if fit is None:
         return Table(title, "", heads, ())
     for each in fit["parameters"]:
-        name, value = each["name"], each["value"]
+        name, value = each["name"], off_stated(each)
+        if names is not None and name not in names:
+            continue
         unit, size = _OF_AXIS if name.startswith("dlambda_") else shown_unit(each["unit"])
-        value -= 1.0 if name.startswith("S_") else 0.0
         shown, u = rounded(value / size, each["u"] / size)
         angle = f"{math.degrees(value):.4f}" if name.startswith("dlambda_") else ""
         told = ("not seen", "–", "", "") if name in fit["unseen"] else (shown, u, unit, angle)

@@ -96,9 +96,9 @@ def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare:
     if methods is not None and not compare:
         return
     of = problem(settings)
-    live.load(of)
+    live.load_kernels(of)
     if settings.estimator.smooth or compare:
-        smoother.load(of)
+        smoother.load_kernels(of)
 
 
 def measure(

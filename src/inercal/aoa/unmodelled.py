@@ -111,7 +111,9 @@ def _step(
     away of their sum of squares; NaN, infinite and 0 where they do not depend on it."""
     then = judge(*error.taken_out(recording, settings, value + error.step)).innovations
     with np.errstate(all="ignore"):
-        size = np.nanmedian(np.abs(now), axis=0)
+        size = np.array(
+            [np.median(v[np.isfinite(v)]) if np.isfinite(v).any() else 0.0 for v in np.abs(now).T]
+        )
         used = np.isfinite(now) & np.isfinite(then) & (np.abs(now) < _WILD * size)
         slope = np.where(used, then - now, 0.0) / error.step
         power = float(np.square(slope).sum())

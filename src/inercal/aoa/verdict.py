@@ -62,7 +62,7 @@ def of_fusion(
     state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
     if 2 * known.sum() <= len(known):
         return Status.NOT_CONVERGED, _because(_missing(known), said)
-    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all()):
+    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
         return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
     if mean > NIS_LIMIT:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {NIS_LIMIT:g}"
@@ -73,7 +73,8 @@ def of_fusion(
     lost = _lost(recording, filtered)
     if lost is not None:
         return Status.NOT_CONVERGED, _because(lost, said)
-    return Status.OK, _doubted(f"{_words(angles)}, mean NIS {mean:.3g}", said)
+    judged = f"mean NIS {mean:.3g}" if math.isfinite(mean) else f"too short for a NIS, {SETTLED:g} s or less"
+    return Status.OK, _doubted(f"{_words(angles)}, {judged}", said)
 
 
 def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:

@@ -79,14 +79,15 @@ def combine(
     """
     p = len(names)
     total = np.zeros((p, p))
-    weight = np.zeros(p)
     for source in sources:
         total += source.covariance
-        if isinstance(source, TypeA) and np.isfinite(source.dof):
-            weight += np.diag(source.covariance) ** 2 / source.dof
     variance = np.diag(total)
+    weight = np.zeros(p)
     with np.errstate(divide="ignore", invalid="ignore"):
-        dof = np.where(weight > 0, np.maximum(variance**2 / weight, 1.0), np.inf)
+        for source in sources:
+            if isinstance(source, TypeA) and np.isfinite(source.dof):
+                weight += np.square(np.diag(source.covariance) / variance) / source.dof
+        dof = np.where(weight > 0, np.maximum(1.0 / weight, 1.0), np.inf)
     budget = tuple(_item(names, source, variance) for source in sources)
     return total, dof, budget
 

@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from inercal._files import write_bytes
+from inercal._files import read_bytes, write_bytes
 from inercal.errors import InputError
 
 S = TypeVar("S")
@@ -65,7 +65,7 @@ def load(path: str | Path, kind: str, fingerprint: str, like: S) -> S:
         No file, no checkpoint, a damaged one, or one of another kind, of other settings or of another form.
     """
     try:
-        data = Path(path).read_bytes()
+        data = read_bytes(path)
     except OSError as error:
         raise InputError(
             path, f"cannot be read ({error.strerror or error}), expected a checkpoint"

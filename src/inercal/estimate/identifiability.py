@@ -130,7 +130,9 @@ def learned(covariance: Array, prior: Array, names: Sequence[str]) -> Learned:
     """Set what is known after the data, ``covariance`` (p, p), against ``prior`` (p,) standard deviations."""
     scaled = covariance / np.outer(prior, prior)
     values, vectors = np.linalg.eigh(scaled)
-    left = np.sqrt(np.maximum(values[::-1], np.finfo(float).tiny))
+    # smaller ones are lost in rounding
+    least = max(float(np.finfo(float).eps * values[-1]), float(np.finfo(float).tiny))
+    left = np.sqrt(np.maximum(values[::-1], least))
     return Learned(tuple(names), left, vectors.T[::-1], np.sqrt(np.diag(scaled)))
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.exchange import plain_objects
+from inercal.estimate.files import plain_objects
 from inercal.estimate.result import Estimate, coverage_factor, rounded
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding

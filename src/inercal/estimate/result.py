@@ -126,7 +126,13 @@ class Estimate:
         """The coefficients as aligned text, each value rounded to its uncertainty."""
         head = ("", "value", "u", "U", "k", "unit")
         rows = [head] + [
-            (p.name, *rounded(p.value, p.u, p.U), f"{p.k:.2f}", p.unit) for p in self.parameters.values()
+            (
+                p.name,
+                *rounded(p.value, p.u, p.U),
+                "–" if math.isnan(p.u) else f"{p.k:.2f}",
+                p.unit,
+            )
+            for p in self.parameters.values()
         ]
         widths = [max(len(row[i]) for row in rows) for i in range(6)]
         return "\n".join(
@@ -162,9 +168,12 @@ def without_parameters(command: str, status: Status, message: str, **other: Any)
 
 
 def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
-    """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6)."""
+    """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6).
+
+    A dash stands for NaN: what is not known.
+    """
     if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
-        return tuple(f"{x:.6g}" for x in (value, u, *others))
+        return tuple("–" if math.isnan(x) else f"{x:.6g}" for x in (value, u, *others))
     first = Decimal(f"{u:.1e}").adjusted()  # power of ten of the first digit; 0.0996 rounds to 0.10
     if first >= -4 and max(abs(value), u) < 1e7:
         places = max(0, 1 - first)

@@ -97,9 +97,12 @@ def estimate_map(
     message = f"the iteration did not end in {ITERATIONS} steps, so far is the recording from the model"
     covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
     for _ in range(ITERATIONS):
-        terms = _terms(q, c, recording, problem, measured, first, loose)
         try:
-            step = _step(terms, history)
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # what is lost is not finite, and refused below
+                terms = _terms(q, c, recording, problem, measured, first, loose)
+                step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
             message = "the iteration diverged: the normal equations are not positive definite"
             break
@@ -243,6 +246,8 @@ def _step(terms: _Terms, attitude_u: bool) -> _Step:
     both = flat_process.T @ flat_process + flat_sensed.T @ flat_sensed - ties.T @ solved
     schur = both[1:, 1:] + np.eye(p)
     covariance = np.linalg.inv(schur)
+    if not (np.diag(covariance) > 0.0).all():
+        raise np.linalg.LinAlgError("the coefficients have no variance")
     coefficients = np.linalg.solve(schur, both[1:, 0] + terms.prior)
     by_coefficients = solved[:, 1:]
     attitudes = solved[:, 0] - by_coefficients @ coefficients

@@ -99,6 +99,12 @@ class Campaign:
         return f"{text}: {', '.join(found)}" if found else ""
 
     @property
+    def message(self) -> str:
+        """What was found, in words."""
+        text = f"{self.verdict}: {self.attempted} runs, {self.runs} of them converged"
+        return "; ".join(filter(None, [text, self.harmless]))
+
+    @property
     def result(self) -> dict[str, Any]:
         """The figures as plain objects."""
         coverage, nees = self.coverage, self.nees
@@ -156,7 +162,6 @@ class Campaign:
                 f"NIS {self.nis.mean():.4f}, expected {low:.4f} to {high:.4f}",
                 "rms error over the bound:",
                 ratio,
-                *filter(None, [self.harmless]),
             ]
         )
 

@@ -58,11 +58,11 @@ def diagnose(
     stated : Cause, optional
         What the study states with an uncertainty: no error within that is named.
     """
-    if any(finding.code in SAID for finding in recording.findings):
+    if any(finding.code in SAID for finding in recording.findings) or not found.dims.any():
         return []
-    repaired, findings = _without_faults(recording, problem, stated)
-    if not findings or not _sound(filtered((repaired, _fair(repaired, problem, stated)))):
-        findings += _small_errors((repaired, problem), stated)
+    repaired, fair, findings = _without_faults(recording, problem, stated)
+    if not findings or not _sound(filtered((repaired, fair))):
+        findings += _small_errors((repaired, problem), fair, stated)
     if findings or _sound(found):
         return findings
     # where what is stated is wrong within its uncertainty all estimators have large innovations
@@ -74,10 +74,9 @@ def diagnose(
     return findings
 
 
-def _fair(recording: Recording, problem: Problem, stated: Cause | None) -> Problem:
-    """The problem as it may be meant: what is stated moved within its uncertainty, and no prior that is in the way."""
-    moved = likely(recording, problem, stated)
-    found = filtered((recording, moved))
+def _fair(problem: Problem, moved: Problem, found: Filtered) -> Problem:
+    """The problem as it may be meant: what is stated ``moved`` to where the recording fits best, and no prior that is
+    in the way of what the filter then ``found``."""
     if not found.converged:
         return problem
     u, prior = np.sqrt(np.diag(found.covariance)), problem.prior
@@ -94,11 +93,12 @@ def _most(alternatives: int) -> float:
     return -float(ndtri(0.5 * RISK / alternatives))
 
 
-def _small_errors(case: Case, stated: Cause | None) -> list[Finding]:
-    """What the model leaves out, a prior that is too narrow, and noise that is not what is stated."""
+def _small_errors(case: Case, meant: Problem, stated: Cause | None) -> list[Finding]:
+    """What the model leaves out, a prior that is too narrow, and noise that is not what is stated; ``meant`` as of
+    `_fair`."""
     recording, problem = case
-    fair = (recording, _fair(*case, stated))
-    errors, corrected = search(recording, replace(problem, prior=fair[1].prior), stated)
+    fair = (recording, meant)
+    errors, corrected = search(recording, replace(problem, prior=meant.prior), stated)
     now = filtered(corrected)
     # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
     if errors and not _white(corrected, now) and (walk := _restless(fair)) is not None:
@@ -111,6 +111,8 @@ def _small_errors(case: Case, stated: Cause | None) -> list[Finding]:
 
 def _beyond_prior(found: Filtered, prior: Array) -> list[Finding]:
     """Coefficients, found without a prior in the way, that the prior [SI] did not expect."""
+    if not found.converged:
+        return []
     values, variance = found.coefficients, np.diag(found.covariance)
     findings = []
     far = ~(np.abs(values) <= _most(len(prior)) * np.sqrt(prior**2 + variance))
@@ -128,8 +130,8 @@ def _white(case: Case, found: Filtered) -> bool:
 
 
 def _sound(found: Filtered) -> bool:
-    """Whether a filter agrees with its recording, as a whole and in each row."""
-    if not found.converged:
+    """Whether a filter agrees with its recording, as a whole and in each row; not where nothing is measured."""
+    if not found.converged or not found.dims.any():
         return False
     mean = nis(found.nis, found.dims)
     return mean.excess <= 5.0 and not len(surprising(found.nis, found.dims, RISK))
@@ -137,15 +139,15 @@ def _sound(found: Filtered) -> bool:
 
 def _without_faults(
     recording: Recording, problem: Problem, stated: Cause | None
-) -> tuple[Recording, list[Finding]]:
-    """The recording without its gross faults, and these."""
+) -> tuple[Recording, Problem, list[Finding]]:
+    """The recording without its gross faults, the problem as it may then be meant (`_fair`), and these faults."""
     findings = list[Finding]()
     of = likely(recording, problem, stated)
     now = filtered((recording, of))
     while len(findings) < _FAULTS and not _sound(now):
         best, then = _best(proposals(recording, of), now, of)
         if not _sound(then) and not _misfit(then) < 0.1 * _misfit(now):
-            fair = _fair(recording, problem, stated)
+            fair = _fair(problem, of, now)
             if _sound(filtered((recording, fair))):
                 break
             single, after = _best(_outliers(recording, of, now), now, of)
@@ -160,7 +162,7 @@ def _without_faults(
         of = likely(recording, problem, stated)
         now = filtered((recording, of))
         findings.append(best.finding)
-    return recording, findings
+    return recording, _fair(problem, of, now), findings
 
 
 def _best(tried: Iterable[Proposal], now: Filtered, problem: Problem) -> tuple[Proposal | None, Filtered]:
@@ -174,9 +176,9 @@ def _best(tried: Iterable[Proposal], now: Filtered, problem: Problem) -> tuple[P
 
 
 def _misfit(found: Filtered) -> float:
-    """Sum of the normalised innovations squared; infinite where the filter diverged."""
+    """Sum of the normalised innovations squared; infinite where the filter diverged or nothing is measured."""
     total = float(found.nis[found.dims > 0].sum())
-    return total if found.converged and math.isfinite(total) else math.inf
+    return total if found.converged and found.dims.any() and math.isfinite(total) else math.inf
 
 
 def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Proposal]:

@@ -176,11 +176,8 @@ def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Propos
     moved = {shift: _by_rows(recording.acc, shift) for shift in SHIFTS}
 
     def off(shift: int) -> float:
-        return (
-            float(np.nanmean(np.square(moved[shift] - turn.up)))
-            if np.isfinite(moved[shift]).any()
-            else math.inf
-        )
+        apart = moved[shift] - turn.up
+        return float(np.nanmean(np.square(apart))) if np.isfinite(apart).any() else math.inf
 
     shift = min(SHIFTS, key=off)
     how = "late" if shift > 0 else "early"

@@ -21,6 +21,7 @@ from inercal.selfcal.rig import JOINTS
 from inercal.selfcal.tables import bounds_by_path, campaign_table, paths, turns, weak_combinations
 
 if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
     from inercal.selfcal.campaign import Campaign
     from inercal.selfcal.filtered import Filtered, History
     from inercal.selfcal.pathdesign import Designed
@@ -174,7 +175,7 @@ def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
     )
 
 
-def design_page(designed: Designed, settings: SelfcalSettings) -> str:
+def design_page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of a search for a path as one self-contained HTML page."""
     bounds, plan = designed.bounds, designed.plan
     units, size = of_field(len(bounds.names))
@@ -201,17 +202,16 @@ def design_page(designed: Designed, settings: SelfcalSettings) -> str:
     ]
     return page(
         "selfcal.html",
-        title="A path for self-calibration",
-        message=designed.message,
-        facts=_facts(settings),
-        findings=designed.findings,
+        estimate,
+        "A path for self-calibration",
+        _facts(settings),
         tables=[paths(designed), turns(plan), weak_combinations(bounds)],
         pictures=drawn,
         details=[bounds_by_path(designed)],
     )
 
 
-def campaign_page(campaign: Campaign, settings: SelfcalSettings) -> str:
+def campaign_page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of many simulated calibrations as one self-contained HTML page."""
     coverage, nees, p = campaign.coverage, campaign.nees, len(campaign.names)
     m = campaign.joint_error.shape[1]
@@ -246,20 +246,9 @@ def campaign_page(campaign: Campaign, settings: SelfcalSettings) -> str:
     ]
     return page(
         "selfcal.html",
-        title="Self-calibration simulated many times",
-        message="; ".join(
-            filter(
-                None,
-                [
-                    f"{campaign.attempted} runs of the {FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind}), "
-                    f"{campaign.runs} of them converged",
-                    campaign.verdict,
-                    campaign.harmless,
-                ],
-            )
-        ),
-        facts=_facts(settings),
-        findings=None,
+        estimate,
+        "Self-calibration simulated many times",
+        [*_facts(settings), ("filter", "", f"{FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind})")],
         tables=[campaign_table(campaign)],
         pictures=drawn,
         details=[],

@@ -111,12 +111,14 @@ class History:
 
 def known_in(state: State, problem: Problem) -> History:
     """What a state knows, as the one row of a history."""
-    u = np.sqrt(np.diag(state.covariance))
+    with np.errstate(invalid="ignore"):  # NaN of a filter that fails, which is said
+        u = np.sqrt(np.diag(state.covariance))
     q = attitude_of(state, problem)
     of_attitude = u[:3]
     if len(u) - len(problem.prior) == 4:  # of a quaternion: 2 |q (0, e_i)| along each axis
         across = multiply(q, np.eye(4)[1:])
-        of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
+        with np.errstate(invalid="ignore"):
+            of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
     return History(
         q[None],
         of_attitude[None],

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 LOCK = 0.01
 """Least |cos thy| at which the gimbal angles of a model can still be used."""
 
+_LOADED = set[FilterKind]()
+"""Recursive filters whose kernels this process has; their types do not depend on the problem."""
+
 
 def recursive(kind: FilterKind) -> ModuleType | None:
     """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
@@ -102,9 +105,10 @@ def estimate(
 def load_kernels(kind: FilterKind, problem: Problem) -> None:
     """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
     module = recursive(kind)
-    if module is not None:
+    if module is not None and kind not in _LOADED:
         none = np.empty((0, 3))
         module.advance(module.initial(problem, np.zeros(3)), problem, np.empty(0), none, none, none)
+        _LOADED.add(kind)
 
 
 def _history(first: History, trace: Trace) -> History:

@@ -12,10 +12,13 @@ is left out here.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.records.record import Column, Record, Source
+from inercal.records.made import record_of
+from inercal.records.record import Record, Source
 from inercal.selfcal.coefficients import names, scale, to_product, units
 from inercal.selfcal.filtered import Filtered
 from inercal.selfcal.kinematics import all_angles
@@ -79,9 +82,8 @@ def history_record(filtered: Filtered, recording: Recording, world: World) -> Re
         mean = np.where(count > 0, total / count, np.nan)
     last = np.vstack([np.full(2, np.nan), np.column_stack([filtered.nis, mean])])
     source = Source(f"history of {filtered.kind}", "")
-    made = {}
-    for (name, symbol), values in zip(columns(history.u.shape[1]), np.hstack([first, last]).T, strict=True):
-        sensor, _, axis = name.rpartition("_")
-        unit, column = parse_unit(symbol), np.ascontiguousarray(values)
-        made[name] = Column(name, sensor, axis, unit, column, recording.t, source)
-    return Record(made, recording.findings, (*recording.sources, source))
+    named = zip(columns(history.u.shape[1]), np.hstack([first, last]).T, strict=True)
+    made = record_of(
+        ((name, parse_unit(symbol), values) for (name, symbol), values in named), recording.t, source
+    )
+    return replace(made, findings=recording.findings, sources=(*recording.sources, source))

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TypeAlias, get_args, get_type_hints
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.identifiability import Learned, learned
 from inercal.estimate.result import rounded
+from inercal.estimate.status import Status
 from inercal.records.findings import Finding
-from inercal.selfcal.bounds import Bounds, bounds
+from inercal.selfcal.bounds import Bounds
 from inercal.selfcal.display import of_field
-from inercal.selfcal.filtered import Problem
-from inercal.selfcal.plan import Motion
-from inercal.selfcal.settings import Gating
+from inercal.selfcal.filtered import Filtered
 
-Array: TypeAlias = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 AT_PRIOR = 0.5
 """Part of its prior above which a coefficient counts as left at it."""
@@ -104,18 +102,32 @@ def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:
     return Seen(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
 
 
-def gating_costs(
-    motion: Motion, problem: Problem, truth: Array | None = None
-) -> dict[tuple[str, str], Array]:
-    """What near-level gating costs: (rule, what it stops) -> u over that without gating (p,), each at least 1."""
-    kinds = get_type_hints(Gating)
+def useless(filtered: Filtered, bounds: Bounds, by_filter: Array) -> tuple[Status, str] | None:
+    """Status and sentence where there are no numbers to be used, None where there are: ``by_filter`` (p, p), product
+    form, and the bounds must be covariances."""
+    if not filtered.converged:
+        return Status.NOT_CONVERGED, filtered.message
+    if not filtered.dims.any():
+        return Status.UNOBSERVABLE, (
+            "no row after the first has a measurement that is used: all are missing, or stopped by near-level gating"
+        )
+    return singular(bounds.prior, by_filter, bounds.covariance)
 
-    def u(gating: Gating | None) -> Array:
-        return bounds(motion, replace(problem, filter=replace(problem.filter, gating=gating)), truth).u
 
-    free = u(None)
-    return {
-        (rule, stops): u(Gating(rule, stops)) / free
-        for rule in get_args(kinds["rule"])
-        for stops in get_args(kinds["stops"])
-    }
+def singular(prior: Array, *covariances: Array) -> tuple[Status, str] | None:
+    """Status and sentence where a covariance (p, p) is none within rounding, in units of the ``prior`` (p,)."""
+    scale = np.outer(prior, prior)
+    if all(_positive(P / scale) for P in covariances):
+        return None
+    return Status.ILL_CONDITIONED, (
+        "the covariance is numerically singular: noise and prior lie too many powers of ten apart for this path; "
+        "check their units"
+    )
+
+
+def _positive(P: Array) -> bool:
+    """True for a positive definite matrix."""
+    try:
+        return bool(np.isfinite(np.linalg.cholesky(P)).all())
+    except np.linalg.LinAlgError:
+        return False

@@ -21,7 +21,7 @@ from inercal.selfcal.coefficients import NAMES, names, product_slope, to_product
 from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filtered import Filtered, problem
 from inercal.selfcal.filtering import LOCK
-from inercal.selfcal.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen
+from inercal.selfcal.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen, singular, useless
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.rig import JOINTS
 from inercal.selfcal.settings import SelfcalSettings
@@ -121,24 +121,31 @@ def assemble(
     interval = float(np.median(recording.dt))
     result: dict[str, Any] = {
         "filter": filtered.kind,
-        "bounds": dict(zip(bounds.names, bounds.u.tolist(), strict=True)),
+        "bounds": {},
         "at_prior": [],
         "goal": {},
         "step_us": filtered.step_us,
         "sample_share": 1e-6 * filtered.step_us / interval,
         "compare": {},
     }
-    if not filtered.converged:
-        status, message = Status.NOT_CONVERGED, filtered.message
-        return without_parameters(COMMAND, status, message, findings=tuple(said), result=result, **fields)
-
     slope, values = product_slope(filtered.coefficients), to_product(filtered.coefficients)
     by_filter = slope @ filtered.covariance @ slope.T
+    if (unusable := useless(filtered, bounds, by_filter)) is not None:
+        return without_parameters(COMMAND, *unusable, findings=tuple(said), result=result, **fields)
+
+    result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
     used = _scalars(filtered)
     dof = float(used - p - 3)
     of_site, exact = stated(recording, settings, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
     covariance, _, budget = combine(names(p), sources)
+    if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
+        text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
+        return without_parameters(
+            COMMAND, Status.ILL_CONDITIONED, text, findings=tuple(said), result=result, **fields
+        )
+    if (unusable := singular(bounds.prior, covariance)) is not None:
+        return without_parameters(COMMAND, *unusable, findings=tuple(said), result=result, **fields)
     # all noises are judged by one set of innovations; their parts add up to them but for rounding
     more = np.square(np.diag(covariance) / np.diag(by_filter))
     effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
@@ -198,10 +205,10 @@ def verdict(
     filtered: Filtered, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
 ) -> tuple[Status, str]:
     """Status of what an estimator found, and its sentence, without all that an estimate holds: for comparisons."""
-    if not filtered.converged:
-        return Status.NOT_CONVERGED, filtered.message
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
     known = Bounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
+    if (unusable := useless(filtered, known, known.covariance)) is not None:
+        return unusable
     agreement = nis(filtered.nis, filtered.dims)
     cause = _cause(findings, recording.findings)
     limit = _limit(agreement, recording, settings)

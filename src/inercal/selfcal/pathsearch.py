@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from inercal.errors import StudyError
 from inercal.selfcal.bounds import Bounds, bounds
 from inercal.selfcal.filtered import Problem, problem
-from inercal.selfcal.plan import Plan, Rest, Turn, motion
+from inercal.selfcal.plan import MOST_ROWS, Plan, Rest, Turn, motion
 from inercal.selfcal.rig import JOINTS
 from inercal.selfcal.settings import Search, SelfcalSettings
 
@@ -31,6 +31,9 @@ STARTS: Final = 24
 
 LOCK: Final = 0.2
 """Least |cos| of the inner gimbal angle where its limits are not stated: nearer, two joints are almost one."""
+
+MOST: Final = 5000
+"""Angles within the time that a search can go through: it tries one change for each, again and again."""
 
 _GRAIN: Final = math.radians(3.0)
 """Largest turn between two rows while searching."""
@@ -123,8 +126,14 @@ def _ground(settings: SelfcalSettings) -> _Ground:
     if asked.time is None and settings.plan is None:
         raise StudyError("design.time", "missing, expected a time or a plan that is as long")
     time = settings.plan.duration if asked.time is None and settings.plan else float(asked.time or 0.0)
+    if time / model.step > MOST_ROWS:
+        found = f"found {time / model.step:.6g} steps of {model.step:g} s"
+        raise StudyError("design.time", f"{found}, expected at most {MOST_ROWS:,}")
     unit = asked.angle / model.rate
     number = math.floor(time / unit + 1e-9)
+    if number > MOST:
+        found = f"found {number} turns of {math.degrees(asked.angle):g} deg within {time:g} s"
+        raise StudyError("design.angle", f"{found}, expected at most {MOST}: a larger angle, or less time")
     low, high = _limits(settings, model)
     made = _Ground(asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal)
     if not any(made.fits(((joint, sign),)) for joint in range(3) for sign in (1, -1)):

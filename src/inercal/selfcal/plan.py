@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -14,6 +15,9 @@ from inercal.selfcal.rig import JOINTS, World
 
 Array = NDArray[np.float64]
 JointName = Literal["x", "y", "z"]
+
+MOST_ROWS = 5_000_000
+"""Rows of a plan that fit into memory with all that is computed from them."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ class Plan:
     def steps(self, move: Move) -> int:
         """Number of rows that a move takes."""
         duration = move.duration if isinstance(move, Rest) else abs(move.angle) / (move.rate or self.rate)
-        return math.ceil(duration / self.step - 1e-9)
+        return math.ceil(min(duration / self.step - 1e-9, sys.maxsize))  # so many are refused, but counted
 
     @property
     def duration(self) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError
-from inercal.geometry.rotations import Axis, conjugate, log, multiply, rotate
+from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
 from inercal.records.findings import Finding
 from inercal.selfcal.plan import Plan
 from inercal.selfcal.recording import Recording
@@ -213,9 +213,10 @@ def _accelerometers(
 
 
 def _misfit(a: Array, b: Array, noise: float) -> float:
-    """Root mean square of a - b (s, 3), less that of the ``noise`` of an axis, over that of b."""
-    left = np.sum((a - b) ** 2) - 3.0 * len(a) * noise**2
-    return math.sqrt(max(left, 0.0) / np.sum(b**2))
+    """Root mean square of a - b (s, 3), less that of the ``noise`` of an axis, over that of b; inf where b is 0."""
+    left = max(float(np.sum((a - b) ** 2)) - 3.0 * len(a) * noise**2, 0.0)
+    whole = float(np.sum(b**2))
+    return math.sqrt(left / whole) if whole > 0.0 else math.inf if left > 0.0 else 0.0
 
 
 def _exchanged(sensor: str, found: Array, expected: Array, noise: float) -> list[Finding]:
@@ -257,7 +258,7 @@ def off_the_path(
     expected = np.stack([np.interp(t, then, nominal[:, k]) for k in range(3)], axis=-1)
     away = np.abs(np.remainder(recording.th - expected + math.pi, 2.0 * math.pi) - math.pi)
     there, planned = (gimbals(np.nan_to_num(th), world)[0] for th in (recording.th, expected))
-    turned = np.linalg.norm(log(multiply(conjugate(planned), there)), axis=1, keepdims=True)
+    turned = attitude_difference(planned, there)[:, None]
     away = np.where(np.isfinite(recording.th).all(axis=1, keepdims=True) & (turned > OFF_THE_PATH), away, 0.0)
     if away.max() > OFF_THE_PATH:
         first, joint = divmod(int(np.argmax(away > OFF_THE_PATH)), 3)

@@ -198,7 +198,6 @@ def _continuous(th: Array) -> tuple[Array, list[str]]:
         turns = np.round((th[known, k] - np.unwrap(th[known, k])) / TWO_PI)
         if turns.any():
             turned.append(f"th_{axis}")
-        th[known, k] -= (
-            TWO_PI * turns
-        )  # to the digits of `nearest_turn`, so that a stream gives what a file gives
+        # to the digits of `inercal.selfcal.kinematics.nearest_turn`, so that a stream gives what a file gives
+        th[known, k] -= TWO_PI * turns
     return th, turned

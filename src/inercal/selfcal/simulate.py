@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import StudyError
-from inercal.records.record import Column, Record, Source
+from inercal.records.made import record_of
+from inercal.records.record import Record
 from inercal.selfcal.coefficients import to_linear
 from inercal.selfcal.kinematics import all_angles, attitude
 from inercal.selfcal.model import simulate_truth
@@ -63,7 +64,7 @@ def experiment(settings: SelfcalSettings) -> Experiment:
     m, step = other.substeps, settings.plan.step
     # the platform acts late: at time t on what was commanded at t - delay, at the start on the first command
     middle = (np.arange(len(commanded.rate) * m) + 0.5) * (step / m) - other.command_delay
-    row = np.clip(np.floor(middle / step).astype(np.int64), 0, len(commanded.rate) - 1)
+    row = np.clip(np.floor(middle / step), 0.0, len(commanded.rate) - 1.0).astype(np.int64)
     fine = np.ascontiguousarray(commanded.rate[row].reshape(-1, m, 3))
     return Experiment(settings.world, settings.noise, commanded, fine, to_linear(settings.truth), other)
 
@@ -97,17 +98,15 @@ _UNITS = {"wc": "deg/h", "th": "deg", "acc": "m/s^2"}
 
 def to_record(recording: Recording) -> Record:
     """A record as a file holds it: ``t``, ``wc_x..`` (the last row's empty), ``th_x..``, ``acc_x..``."""
-    source = Source("simulated", "")
     values = {
         "wc": np.vstack([recording.rate, np.full(3, np.nan)]),
         "th": recording.th,
         "acc": recording.acc,
     }
-    made = {}
+    columns = []
     for sensor, symbol in _UNITS.items():
         unit = parse_unit(symbol)
-        for k, axis in enumerate("xyz"):
-            name = f"{sensor}_{axis}"
-            column = np.ascontiguousarray(values[sensor][:, k] / unit.factor)
-            made[name] = Column(name, sensor, axis, unit, column, recording.t, source)
-    return Record(made, (), (source,))
+        columns += [
+            (f"{sensor}_{axis}", unit, values[sensor][:, k] / unit.factor) for k, axis in enumerate("xyz")
+        ]
+    return record_of(columns, recording.t)

@@ -39,6 +39,7 @@ def within(covariance: Array, bounds: Bounds, noise: Noise, dof: float) -> list[
     found: list[TypeA | TypeB] = []
     for source, part in bounds.contributions.items():
         P = to_filter @ part @ to_filter.T
+        P = 0.5 * (P + P.T)  # where hardly anything is known, rounding is not the same on both sides
         if source in levels:
             found.append(
                 TypeA(f"{source} noise" if source != "angle random walk" else source, *levels[source], P, dof)
@@ -92,6 +93,8 @@ def stated(
             ]
         elif statement.u:
             sources.append(TypeB(statement.name, statement.u, "rad", slope))
+        elif not np.isfinite(slope).all():
+            exact[statement.name] = f"an unknown error of {statement.name}, as the filter does not follow it"
         elif slope[worst] != 0.0:
             error = u[worst] / abs(slope[worst]) / statement.size
             exact[statement.name] = f"{error:.2g} {statement.unit} of {statement.name} ({known[worst]})"

@@ -97,7 +97,12 @@ def estimate_lm(
     covariance = unknowns[3:, 3:] * np.outer(problem.prior, problem.prior)
     by_attitude, residual = at.sensed.by_attitude, at.sensed.residual
     spread = np.eye(6) + wander[:, None, None] * by_attitude @ np.swapaxes(by_attitude, 1, 2)
-    nis = np.einsum("ki,ki->k", residual, np.linalg.solve(spread, residual[:, :, None])[:, :, 0])
+    try:
+        weighted = np.linalg.solve(spread, residual[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:
+        weighted = np.full_like(residual, np.nan)
+        message = "the random walk of the gyros drowns all measurements: check its unit"
+    nis = np.einsum("ki,ki->k", residual, weighted)
     of_prior = fit.residuals[: 3 + len(problem.prior)]
     nis += of_prior @ of_prior / max(int(np.count_nonzero(measured.dims)), 1)
     past, innovations = None, np.empty((0, 6))
@@ -121,17 +126,6 @@ def estimate_lm(
         message=message,
         gimbal_cosine=least_cosine(recording),
     )
-
-
-def rough_start(recording: Recording, problem: Problem, start: Start) -> Start:
-    """A start for other estimators from one that is far off.
-
-    The attitude is that of `estimate_lm`, sigma ten times its largest standard deviation: the same measurements are
-    going to be used again.
-    """
-    fit, at = _fit(recording, problem, readings(recording, problem), start)
-    _, u = _uncertainty(fit, at, recording, problem.noise.angle_random_walk)
-    return Start(at.q[0], 10.0 * float(u[0].max()))
 
 
 def rough_path(recording: Recording, problem: Problem, start: Start) -> tuple[Array, Array]:

@@ -91,6 +91,8 @@ def stated_errors(settings: SelfcalSettings) -> Cause | None:
     def corrected(recording: Recording, problem: Problem, values: Array) -> tuple[Recording, Problem]:
         earth, up = problem.world.earth, problem.world.up
         for statement, value in zip(uncertain, values, strict=True):
+            if value == 0.0:
+                continue
             there = statement.changed(float(value) * statement.u).world
             earth, up = earth + there.earth - here.earth, up + there.up - here.up
         return recording, replace(problem, world=replace(problem.world, earth=earth, up=up))

@@ -188,7 +188,7 @@ def _tolerances(estimate: Estimate, factor: Array) -> list[Picture]:
     ]
 
 
-def sensitivity_page(analysed: Analysed, settings: TurntableSettings) -> str:
+def sensitivity_page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) -> str:
     """The report of a sensitivity analysis as one self-contained HTML page."""
     indices = analysed.indices
     drawn = [
@@ -202,8 +202,8 @@ def sensitivity_page(analysed: Analysed, settings: TurntableSettings) -> str:
     found = analysis_result(analysed)
     return page(
         "sensitivity.html",
-        title="Sensitivity of a turntable",
-        message=analysed.message,
+        estimate,
+        "Sensitivity of a turntable",
         note=analysed.note,
         facts=[
             *_rig_facts(settings),
@@ -249,7 +249,7 @@ def _flag_counts(analysed: Analysed) -> list[tuple[str, int]]:
     return [(name, outputs.count(name)) for name in analysed.indices.outputs if name in outputs]
 
 
-def design_page(designed: Designed, settings: TurntableSettings) -> str:
+def design_page(designed: Designed, settings: TurntableSettings, estimate: Estimate) -> str:
     """The report of a search for positions as one self-contained HTML page."""
     judged, unit = designed.judged, designed.unit
     names, shown = list(designed.units), [shown_unit(text, unit) for text in designed.units.values()]
@@ -261,9 +261,8 @@ def design_page(designed: Designed, settings: TurntableSettings) -> str:
     ]
     return page(
         "design.html",
-        title="Positions for a turntable test",
-        message=designed.message,
-        findings=designed.findings,
+        estimate,
+        "Positions for a turntable test",
         facts=[
             *_rig_facts(settings),
             ("instrument", "", f"{settings.instrument.kind}, {', '.join(names)}"),

@@ -23,7 +23,7 @@ class Fitting:
     """What a plan allows, and the fit if it allows one.
 
     ``known`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
-    identified.
+    identified, and where the weights of the readings do not settle.
     """
 
     model: TableModel
@@ -51,7 +51,13 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
     if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
         return Fitting(model, what, None, tuple(findings))
     noise = [settings.instrument.noise] * len(found.channels)
-    done = fit(model, found.angles, found.y, noise, samples=found.samples)
+    try:
+        with np.errstate(
+            over="ignore", divide="ignore", invalid="ignore"
+        ):  # what is lost is not finite, and no fit
+            done = fit(model, found.angles, found.y, noise, samples=found.samples)
+    except np.linalg.LinAlgError:
+        return Fitting(model, what, None, tuple(findings))
     return Fitting(model, what, done, tuple(findings))
 
 
@@ -73,8 +79,11 @@ def choose_terms(
         return rest, without, ""
     if not leaves_rates_unknown(what, without):
         return whole, what, ""
-    free = next(words for each in what for words in each.words if set(words.split()) & set(rates))
-    return rest, without, free
+    free = [words for each in what for words in each.words]
+    free.sort(
+        key=lambda words: not set(words.split()) & set(rates)
+    )  # one that names a term of a rate, if any does
+    return rest, without, free[0]
 
 
 def earth_rate_of(model: TableModel) -> str:

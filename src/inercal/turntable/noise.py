@@ -68,7 +68,7 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
     log, now = start, _likelihood(rows, y, table, np.exp(start))
     for _ in range(STEPS):
         s2 = np.exp(log)
-        slope, information = now.slope * s2, now.information * np.outer(s2, s2)
+        slope, information = now.slope * s2, now.information * s2 * s2[:, None]
         moving = free & ~((log <= low) & (slope < 0.0))
         if not moving.any():
             break
@@ -86,7 +86,7 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
         if np.abs(log - before).max() < 1e-4:
             break
     s2 = np.exp(log)[free]
-    of_log = now.information[np.ix_(free, free)] * np.outer(s2, s2)
+    of_log = now.information[np.ix_(free, free)] * s2 * s2[:, None]
     dof[free] = 2.0 / np.diag(np.linalg.pinv(of_log))
     return Scatter(np.exp(0.5 * log), dof)
 

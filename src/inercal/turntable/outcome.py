@@ -119,17 +119,26 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "instrument": settings.instrument.kind,
         "earth_rate": earth_rate_of(fitting.model),
     }
-    if fitting.fit is None:
+
+    def nothing(status: Status, message: str) -> Estimate:
         return without_parameters(
             COMMAND,
-            Status.UNOBSERVABLE,
-            _unobservable(found, fitting, settings),
+            status,
+            message,
             findings=tuple(findings),
             statistics={"positions": float(len(found.y))},
             result=result | {"tolerance_shares": {}},
             **common,
         )
-    fit, terms = fitting.fit, terms_of(fitting.fit)
+
+    if fitting.fit is None:
+        return nothing(*_without_fit(found, fitting, settings))
+    fit = fitting.fit
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        terms = terms_of(fit)
+        known = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
+    if not known.all():
+        return nothing(Status.UNOBSERVABLE, _dead(fit, known))
     names = fit.model.symbols
     covariance, dof, budget = combine(names, sources(fit, terms, unit))
     status, message = _verdict(found, fitting)
@@ -205,6 +214,23 @@ def _too_large(fit: Regression) -> list[Finding]:
         "uncertainties hold for small errors"
     )
     return [Finding("large_errors", said)]
+
+
+def _dead(fit: Regression, known: NDArray[np.bool_]) -> str:
+    """That terms which are not ``known`` (p,) are relative to a scale factor of zero, in words."""
+    lost = ", ".join(name for name, each in zip(fit.model.symbols, known, strict=True) if not each)
+    return f"{lost}: relative to a scale factor that is found as 0: does the output follow its input?"
+
+
+def _without_fit(found: Readings, fitting: Fitting, settings: TurntableSettings) -> tuple[Status, str]:
+    """Status and sentence where nothing was fitted."""
+    enough = len(found.y) >= fewest_positions(fitting.model, settings)
+    if enough and not any(each.words for each in fitting.known):
+        return Status.NOT_CONVERGED, (
+            "the weights of the readings do not settle: the terms come out so large that errors of the table, which "
+            "they multiply, drown the readings; fit fewer terms, or check units and noise"
+        )
+    return Status.UNOBSERVABLE, _unobservable(found, fitting, settings)
 
 
 def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings) -> str:

@@ -100,6 +100,11 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
     if stays == terms and instrument.noise is None:
         said = f"found {counted(stays, 'stay')} for {terms} terms and no stated noise, expected one stay more"
         return nothing(known.rank, said)
+    for channel in taken:
+        if not np.ptp(found.y[:, found.channels.index(channel)]):
+            return nothing(
+                0, f"{channel} reads the same at all rates, expected it to follow them: is it dead?"
+            )
     inputs = tuple(gyro_input(found, settings, "xyz".index(channel[-1])) for channel in taken)
     if found.assumed:
         findings += _whole_turns(found, inputs)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
+from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.turntable.model import channels_of, stated_values
@@ -14,7 +15,6 @@ from inercal.turntable.rate import arc, over_turn, sensed
 from inercal.turntable.rate_calibration import check_rate_test
 from inercal.turntable.rate_fit import approaches
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.simulate import record_of
 from inercal.units import parse_unit
 
 Array = NDArray[np.float64]

@@ -23,12 +23,15 @@ from inercal.estimate.identifiability import Identifiability, few_terms, identif
 from inercal.instruments.polynomial import ChannelModel
 from inercal.turntable.model import TableModel
 from inercal.turntable.noise import scatter
-from inercal.turntable.weights import Samples, Weights, beside_inputs, weights, whitened
+from inercal.turntable.weights import Samples, Weights, beside_inputs, least_noise, weights, whitened
 
 Array = NDArray[np.float64]
 
 ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
+
+RUNAWAY = 1e3
+"""Growth of u in the last of these that says that they do not end: with the terms the weights of all readings sink."""
 
 FLOOR = 1e-12
 """Least standard deviation of a reading, over the rms of the readings: that of a simulation without noise."""
@@ -77,13 +80,18 @@ class Regression:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """One weighted fit: ``c`` (p,), ``joint`` (p + q, p + q) covariance, ``gain`` (p, n, c), chi (q,), chi2."""
+    """One weighted fit: ``c`` (p,), ``root`` (p + q, p + q) of the covariance, ``gain`` (p, n, c), chi (q,), chi2."""
 
     c: Array
-    joint: Array
+    root: Array
     gain: Array
     chi: Array
     chi2: float
+
+    @property
+    def joint(self) -> Array:
+        """(p + q, p + q) covariance of c and chi."""
+        return np.asarray(self.root @ self.root.T)
 
 
 @dataclass(frozen=True)
@@ -137,14 +145,15 @@ def solve(rows: Array, y: Array, weight: Weights) -> Solution:
     n, channels, p = rows.shape
     white = whitened(rows, y, weight)
     u, s, vt = np.linalg.svd(white.rows, full_matrices=False)
-    inverse = (vt.T / s) @ u.T / white.length[:, None]
+    root = vt.T / s / white.length[:, None]
+    inverse = root @ u.T
     solution = inverse[:, : n * channels] @ white.right
     misfit = np.concatenate([white.right, np.zeros(len(solution) - p)]) - white.rows @ (
         solution * white.length
     )
     # c = inverse L^-1 y, with L block diagonal
     gain = np.einsum("pnd,ndc->pnc", inverse[:p, : n * channels].reshape(p, n, channels), white.inverse)
-    return Solution(solution[:p], inverse @ inverse.T, gain, solution[p:], float(misfit @ misfit))
+    return Solution(solution[:p], root, gain, solution[p:], float(misfit @ misfit))
 
 
 def fit(
@@ -166,6 +175,11 @@ def fit(
     noise : (c,) standard deviation of a reading; None where it is to be estimated from the scatter
     start : (p,) coefficients for the first derivatives; from an unweighted fit if absent
     samples : (n,) rows behind each reading, over which errors of scope ``sample`` average; one if absent
+
+    Raises
+    ------
+    LinAlgError
+        Terms so large that errors of the table, which they multiply, drown the readings: their weights do not settle.
     """
     rows = model.rows(angles)
     n, channels, p = rows.shape
@@ -175,17 +189,24 @@ def fit(
     y = y - model.outputs(angles, np.zeros(p))  # what is stated
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
     c = solve(rows, y, plain).c if start is None else start
+    u, settled = np.zeros(p), True
     for _ in range(ROUNDS):
+        if not np.isfinite(c).all():
+            break
         table = weights(model, angles, c, np.zeros(channels), samples=samples)
-        own = np.mean(np.diagonal(table.within, axis1=1, axis2=2), axis=0)
-        # errors of the table alone may leave the covariance of two channels without an inverse
-        floor = np.maximum(least, 1e-6 * np.sqrt(own))
-        found = scatter(rows, y, table, noise, floor)
+        found = scatter(rows, y, table, noise, np.maximum(least, least_noise(table.within)))
         sigma = found.std
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
         change, c = np.abs(solution.c - c), solution.c
-        if np.all(change <= 1e-3 * np.sqrt(np.diag(solution.joint)[:p])):
+        before, u = u, np.sqrt(np.diag(solution.joint)[:p])
+        if np.all(change <= 1e-3 * u):
             break
+    else:
+        settled = bool((u <= RUNAWAY * before).all())
+    if not (
+        settled and np.isfinite(c).all() and np.isfinite(solution.joint).all() and (found.dof > 0.0).all()
+    ):
+        raise np.linalg.LinAlgError("the weights of the readings do not settle")
     constant = np.flatnonzero([error.scope.constant for error in model.chain.errors])
     std = model.chain.std[constant]
     return Regression(

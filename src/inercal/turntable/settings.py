@@ -49,7 +49,7 @@ class Instrument:
         Standard deviation of a reading (the mean over a dwell), SI; None: estimated from the scatter.
     dwell : float
         Time in each position [s].
-    rate : float or None
+    sample_rate : float or None
         Samples per second; None: one row for each position.
     earth_rate : str or None
         ``fitted`` or ``stated``; None: fitted where the plan allows, else stated.
@@ -62,13 +62,13 @@ class Instrument:
     coefficients_u: Mapping[str, float] = field(default_factory=dict)
     noise: float | None = None
     dwell: float = 60.0
-    rate: float | None = None
+    sample_rate: float | None = None
     earth_rate: Literal["fitted", "stated"] | None = None
 
     @property
     def samples(self) -> int:
         """Rows of a record behind each reading."""
-        return 1 if self.rate is None else max(1, round(self.rate * self.dwell))
+        return 1 if self.sample_rate is None else max(1, round(self.sample_rate * self.dwell))
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
-from inercal.records.record import Column, Record, Source
+from inercal.records.made import record_of
+from inercal.records.record import Record
 from inercal.rigs.chain import Scope
 from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
 from inercal.turntable.settings import TurntableSettings
-from inercal.units import Unit, parse_unit
+from inercal.units import parse_unit
 
 Array = NDArray[np.float64]
+
+MOST_ROWS = 10_000_000
+"""Samples that fit into memory with all errors of the table."""
 
 
 def truth(settings: TurntableSettings) -> tuple[TableModel, Array]:
@@ -40,11 +45,21 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
         ``position``, commanded angles [deg] and outputs: one row for each position (the mean over the dwell,
         at its middle), or all samples where the study gives a rate. An error of scope ``sample`` is redrawn at
         every sample; without a rate, a position has only one.
+
+    Raises
+    ------
+    StudyError
+        Too many samples.
     """
     model, c = truth(settings)
     instrument, plan = settings.instrument, settings.plan
     n = len(plan)
     per_dwell = instrument.samples
+    if n * per_dwell > MOST_ROWS:
+        raise StudyError(
+            "instrument.sample_rate",
+            f"found {n * per_dwell:.4g} samples in all, expected at most {MOST_ROWS:.0e}",
+        )
     errors = np.repeat(model.chain.draw(rng, n)[:, None, :], per_dwell, axis=1)
     for k, error in enumerate(model.chain.errors):
         if error.scope is Scope.SAMPLE:
@@ -72,13 +87,3 @@ def _all_terms(settings: TurntableSettings) -> tuple[str, ...]:
     return tuple(
         symbol for channel in channels_of(settings) for symbol in channel_model(kind, channel).symbols
     )
-
-
-def record_of(columns: list[tuple[str, Unit, Array]], t: Array) -> Record:
-    """A record of these columns (name, unit, values)."""
-    source = Source("simulated", "")
-    made = {}
-    for name, unit, values in columns:
-        sensor, _, axis = name.rpartition("_") if "_" in name else (name, "", "")
-        made[name] = Column(name, sensor, axis, unit, values, t, source)
-    return Record(made, sources=(source,))

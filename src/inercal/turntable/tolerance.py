@@ -18,7 +18,7 @@ from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
 from inercal.turntable.regression import Regression, solve
-from inercal.turntable.weights import averaged, weights_of
+from inercal.turntable.weights import averaged, least_noise, weights_of
 
 Array = NDArray[np.float64]
 
@@ -120,9 +120,11 @@ def alternatives(fit: Regression, slope: Array) -> Alternatives:
     chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
 
     def u(changed: Chain) -> Array:
-        weight = weights_of(changed, fit.slopes, fit.beside, fit.noise, fit.samples)
-        joint = solve(rows, np.zeros_like(fit.residuals), weight).joint
-        return np.sqrt(np.diag(slope @ joint[:p, :p] @ slope.T))
+        table = weights_of(changed, fit.slopes, fit.beside, np.zeros_like(fit.noise), fit.samples)
+        noise = np.maximum(fit.noise, least_noise(table.within))
+        weight = replace(table, within=table.within + np.diag(np.square(noise)))
+        root = solve(rows, np.zeros_like(fit.residuals), weight).root
+        return np.asarray(np.linalg.norm(slope @ root[:p], axis=1))
 
     halved = {
         error.name: u(chain.with_errors(replace(error, distribution=error.distribution.scaled(0.5))))

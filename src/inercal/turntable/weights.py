@@ -70,11 +70,18 @@ def weights(
 ) -> Weights:
     """Covariance of the readings for coefficients ``c``, noise (c,) and errors of the table.
 
-    ``std`` (k,) stands in for the standard deviations of the chain's errors; ``samples`` (n,) as in `fit`.
+    ``std`` (k,) stands in for the standard deviations of the chain's errors; ``samples`` (n,) as in
+    `inercal.turntable.regression.fit`.
     """
     slopes = model.by_errors(angles, c)
     rows = np.ones(len(slopes), dtype=np.int64) if samples is None else samples
     return weights_of(model.chain, slopes, beside_inputs(model, angles, c), noise, rows, std)
+
+
+def least_noise(within: Array) -> Array:
+    """Standard deviation (c,) of noise without which covariances (n, c, c) by errors of the table alone may have no
+    inverse, as these move several channels at once."""
+    return np.asarray(1e-6 * np.sqrt(np.mean(np.diagonal(within, axis1=1, axis2=2), axis=0)))
 
 
 def beside_inputs(model: TableModel, angles: Array, c: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._files import write_text
+from inercal._files import read_bytes, write_text
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.result import Estimate
@@ -144,7 +144,7 @@ def load(path: str | Path) -> Estimate:
     """Read an estimate that `save` wrote; raises `InputError` in one sentence."""
     expected = "expected a calibration written by inercal (.json or .toml)"
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_bytes(path).decode()
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror}), {expected}") from error
     except UnicodeDecodeError as error:

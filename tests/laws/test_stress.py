@@ -1,0 +1,61 @@
+"""Laws of every run, however absurd its study and its recording: benchmarks/stress.py, 500 runs of each system.
+
+A result is finite, with a covariance that is one and a known status, or the run is refused in one sentence; nothing
+warns, and nothing takes longer than 10 s. The seed was fixed before the first run.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inercal.estimate.result import without_parameters
+from inercal.estimate.status import Status
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+import stress
+from absurd import laws
+
+RUNS, PARTS = 500, 4
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("room", stress.ROOMS)
+def test_absurd_runs_end_in_a_sound_result_or_in_words(room, part):
+    stress.load(room)
+    share = RUNS // PARTS
+    outcomes, wrong, _ = stress.campaign(room, range(part * share, (part + 1) * share))
+    assert wrong == []
+    # the draws reach sound results and bad verdicts as well as refusals
+    assert {"ok", "study refused", "recording refused"} <= outcomes.keys()
+    assert outcomes.keys() & {"unobservable", "not_converged", "inconsistent", "ill_conditioned"}
+
+
+def test_a_run_is_the_same_again():
+    first, second = (stress.one("drift", 7) for _ in range(2))
+    assert (first.study, first.words, first.outcome) == (second.study, second.words, second.outcome)
+
+
+def test_the_laws_see_what_is_wrong():
+    from dataclasses import replace
+
+    none = without_parameters("test", Status.OK, "sound")
+    estimate = replace(
+        none,
+        names=("a",),
+        units=("1",),
+        values=np.ones(1),
+        covariance=np.eye(1),
+        dof=np.ones(1),
+        k=np.ones(1),
+    )
+    assert laws.of_estimate(estimate) == []
+    assert laws.of_estimate(replace(estimate, values=np.array([np.nan]))) == ["values is not finite"]
+    assert laws.of_estimate(replace(estimate, covariance=-np.eye(1)))
+    assert laws.of_estimate(replace(estimate, message="mean NIS nan")) == ["a sentence says nan"]
+    assert laws.of_covariance(np.array([[1.0, 2.0], [2.0, 1.0]]), "P")
+    assert laws.of_covariance(np.array([[1.0, 0.5], [0.4, 1.0]]), "P") == ["P: not symmetric"]
+    assert laws.of_truth([1.0], np.array([1e-4]), 0.0, ["a"])
+    assert laws.of_refusal(ValueError("found no row"))
