@@ -5,14 +5,15 @@ count; imports inside functions do, but for circles.
 """
 
 import ast
+import functools
 import graphlib
+import re
 from pathlib import Path
-
-import pytest
 
 import inercal
 
 PACKAGE = Path(inercal.__file__).parent
+ROOT = Path(__file__).parents[1]
 
 #: lowest first; a module imports from its own floor and those below
 FLOORS = [
@@ -32,8 +33,8 @@ FLOORS = [
     {"study"},
     {"report"},
     {"stream"},
-    {"validate"},
     {"examples"},
+    {"validate"},
     {"cli", "__main__"},
 ]
 SYSTEMS = {"imu", "turntable", "selfcal", "aoa"}
@@ -61,8 +62,13 @@ def walk(node, functions):
             yield from walk(child, functions)
 
 
+@functools.cache
 def imports(module, functions=True):
     """Names of all modules a module imports; ``from package import name`` names the submodule if there is one."""
+    return frozenset(read_imports(module, functions))
+
+
+def read_imports(module, functions):
     for node in walk(TREES[module], functions):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -97,21 +103,27 @@ def test_every_room_has_a_floor():
     assert {room(module) for module in MODULES} - {""} <= FLOOR_OF.keys()
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_imports_come_from_below(module):
-    for other in set(imports(module)):
+def wrong_imports(module):
+    """What a module imports against the plan."""
+    for other in sorted(imports(module)):
         if other.split(".")[0] != "inercal":
             continue
-        assert other in SOURCES, f"{module} imports {other}, which does not exist"
-        assert floor(other) <= floor(module), f"{module} imports {other}, which is on a floor above"
-        both = {room(module), room(other)}
-        assert len(both & SYSTEMS) < 2, f"{module} imports {other}: one system knows another"
-        if other.endswith(".task") and room(other) in SYSTEMS:
-            assert room(module) in ("cli", room(other)), (
-                f"{module} imports {other}: only the command line runs tasks"
-            )
-        if is_figures(other):
-            assert room(module) == "cli", f"{module} imports {other}: only the command line asks for figures"
+        if other not in SOURCES:
+            yield f"{module} imports {other}, which does not exist"
+            continue
+        if floor(other) > floor(module):
+            yield f"{module} imports {other}, which is on a floor above"
+        if len({room(module), room(other)} & SYSTEMS) > 1:
+            yield f"{module} imports {other}: one system knows another"
+        of_task = other.endswith(".task") and room(other) in SYSTEMS
+        if of_task and room(module) not in ("cli", "validate", room(other)):
+            yield f"{module} imports {other}: only the command line and the validation run tasks"
+        if is_figures(other) and room(module) != "cli":
+            yield f"{module} imports {other}: only the command line asks for figures"
+
+
+def test_imports_come_from_below():
+    assert [wrong for module in MODULES for wrong in wrong_imports(module)] == []
 
 
 def test_records_stand_on_their_own():
@@ -133,17 +145,15 @@ def test_no_circles():
 
 def test_the_package_itself_computes_nothing():
     """Public names are resolved when asked for: importing inercal imports nothing else."""
-    assert set(imports("inercal", functions=False)) <= {"typing"}
+    assert imports("inercal", functions=False) <= {"typing"}
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_modules_can_be_read_in_one_go(module):
-    lines = SOURCES[module].read_text(encoding="utf-8").count("\n")
-    assert lines <= 400, f"{module} has {lines} lines"
+def test_modules_can_be_read_in_one_go():
+    lines = {module: path.read_text(encoding="utf-8").count("\n") for module, path in SOURCES.items()}
+    assert {module: count for module, count in lines.items() if count > 400} == {}
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_what_is_public_is_explained(module):
+def test_what_is_public_is_explained():
     def undocumented(node, name):
         if ast.get_docstring(node) is None:
             yield name
@@ -153,33 +163,114 @@ def test_what_is_public_is_explained(module):
                 if public and not child.name.startswith("_"):
                     yield from undocumented(child, f"{name}.{child.name}")
 
-    assert list(undocumented(TREES[module], module)) == []
+    assert [name for module in MODULES for name in undocumented(TREES[module], module)] == []
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_only_the_command_line_prints(module):
-    if room(module) == "cli":
-        return
-    calls = [node for node in ast.walk(TREES[module]) if isinstance(node, ast.Call)]
-    assert "print" not in {call.func.id for call in calls if isinstance(call.func, ast.Name)}
-    assert not any("sys.stdout" in ast.unparse(call.func) for call in calls)
+def names_in(tree):
+    """Names that code speaks of: variables, attributes, what is imported, words that may be looked up."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name) | ast.Attribute(attr=name) | ast.Constant(value=str(name)):
+                yield name
+            case ast.alias(name=name):
+                yield name.split(".")[-1]
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_numba_has_one_door(module):
-    numba = {other for other in imports(module) if other.split(".")[0] == "numba"}
-    assert not numba or module == "inercal._jit"
+def test_what_is_defined_is_used():
+    """By the program, its pages, the book or the benchmarks: what tests alone call belongs to the tests."""
+    used = {name for tree in TREES.values() for name in names_in(tree)}
+    for page in PACKAGE.rglob("*.html"):
+        used |= set(re.findall(r"\w+", page.read_text(encoding="utf-8")))
+    for folder in ("benchmarks", "docs"):
+        for path in (ROOT / folder).rglob("*.py"):
+            used |= set(names_in(ast.parse(path.read_text(encoding="utf-8"))))
+    for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
+        for block in re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S):
+            used |= set(names_in(ast.parse(block)))
+    unused = [
+        f"{module}.{node.name}"
+        for module, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and node.name not in used
+        and not is_called_from_outside(module, node)
+    ]
+    assert unused == []
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_randomness_is_always_handed_in(module):
+def test_the_map_names_every_room():
+    """The docstring of the package is where a newcomer begins."""
+    said = set(re.findall(r"\w+", inercal.__doc__.split("Map, lower floors first")[1]))
+    rooms = {room(module) for module in MODULES} - {""}
+    assert {each for each in rooms if not each.startswith("_")} <= said
+
+
+def test_what_is_referred_to_is_there():
+    """`inercal.room.module.name` in a docstring, a comment or the book: moved code must not leave a dead reference."""
+    defined = {module: set(names_defined(tree)) for module, tree in TREES.items()}
+
+    def is_there(reference):
+        parts = reference.split(".")
+        module = max((m for m in SOURCES if f"{reference}.".startswith(f"{m}.")), key=len)
+        return module == reference or set(parts[module.count(".") + 1 :]) <= defined[module]
+
+    pages = [*SOURCES.values(), ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    dead = [
+        f"{page.name}: {reference}"
+        for page in pages
+        for reference in re.findall(r"`(inercal(?:\.\w+)+)", page.read_text(encoding="utf-8"))
+        if not is_there(reference)
+    ]
+    assert dead == []
+
+
+def names_defined(tree):
+    """Names that a module defines or imports, those inside its classes among them."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.Name(id=name, ctx=ast.Store()):
+                yield name
+            case ast.alias(name=name, asname=other):
+                yield other or name
+
+
+def is_called_from_outside(module, node):
+    """Python's own names, checks that pydantic runs, and the commands."""
+    checked = any("_validator" in ast.unparse(each) for each in node.decorator_list)
+    of_pydantic = node.name == "nullable_schema"
+    return node.name.startswith("__") or checked or of_pydantic or room(module) == "cli"
+
+
+def prints(node):
+    """True for a call of ``print`` or of standard output."""
+    match node:
+        case ast.Call(func=ast.Name(id="print")):
+            return True
+        case ast.Call(func=ast.Attribute() as function):
+            return "sys.stdout" in ast.unparse(function)
+    return False
+
+
+def test_only_the_command_line_prints():
+    modules = {module for module in MODULES if any(prints(node) for node in ast.walk(TREES[module]))}
+    assert {module for module in modules if room(module) != "cli"} == set()
+
+
+def test_numba_has_one_door():
+    users = {module for module in MODULES for other in imports(module) if other.split(".")[0] == "numba"}
+    assert users == {"inercal._jit"}
+
+
+def test_randomness_is_always_handed_in():
     """No global generator, and none made without a seed."""
-    for node in ast.walk(TREES[module]):
-        if isinstance(node, ast.Attribute) and ast.unparse(node).startswith(("np.random.", "numpy.random.")):
-            name = node.attr
-            assert name in {"Generator", "default_rng", "SeedSequence", "PCG64", "BitGenerator"}, name
-        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("default_rng"):
-            assert node.args, f"{module} makes a generator without a seed"
+    allowed = {"Generator", "default_rng", "SeedSequence", "PCG64", "BitGenerator"}
+    for module in MODULES:
+        for node in ast.walk(TREES[module]):
+            match node:
+                case ast.Attribute(value=ast.Attribute(value=ast.Name(id="np" | "numpy"), attr="random")):
+                    assert node.attr in allowed, f"{module} uses np.random.{node.attr}"
+                case ast.Call(func=ast.Attribute(attr="default_rng") | ast.Name(id="default_rng")):
+                    assert node.args, f"{module} makes a generator without a seed"
 
 
 # The checks themselves.
@@ -204,8 +295,8 @@ except ImportError:
 """
     TREES["sample"] = ast.parse(code)
     try:
-        assert set(imports("sample")) == {"typing", "two", "three", "four", "five", "six"}
-        assert set(imports("sample", functions=False)) == {"typing", "two", "four", "five", "six"}
+        assert imports("sample") == {"typing", "two", "three", "four", "five", "six"}
+        assert imports("sample", functions=False) == {"typing", "two", "four", "five", "six"}
     finally:
         del TREES["sample"]
     assert len(MODULES) > 40

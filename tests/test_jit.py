@@ -4,7 +4,6 @@ Each test runs other processes, on a copy of the package where sources change, s
 processes and not in one.
 """
 
-import ast
 import os
 import shutil
 import subprocess
@@ -111,28 +110,3 @@ np.testing.assert_allclose(kernels.rotate(q0, omega[0]), rotations.rotate(q0, om
 print("same")
 """
     assert python(program, NUMBA_DISABLE_JIT=1) == "same"
-
-
-def imports_numba(tree):
-    """True if a module imports numba in any way, or names njit."""
-    for node in ast.walk(tree):
-        names = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            names = [node.module or "", *(alias.name for alias in node.names)]
-        elif isinstance(node, ast.Name):
-            names = [node.id]
-        elif isinstance(node, ast.Attribute):
-            names = [node.attr]
-        if any(name.split(".")[0] in ("numba", "njit") for name in names):
-            return True
-    return False
-
-
-def test_only_the_decorator_module_knows_numba():
-    sources = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob("*.py")}
-    users = {
-        name for name, path in sources.items() if imports_numba(ast.parse(path.read_text(encoding="utf-8")))
-    }
-    assert users == {"_jit.py"}

@@ -58,7 +58,9 @@ def test_uncertainty_in_the_last_digits_or_after_plus_minus(text, value, u):
     assert quantity.text == text
 
 
-@given(unit_of=st.sampled_from(UNITS), value=st.floats(-1e12, 1e12))
+@given(
+    unit_of=st.sampled_from(UNITS), value=st.floats(-1e12, 1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-30)
+)
 def test_format_and_parse_round_trip(unit_of, value):
     unit, dimension = unit_of
     quantity = parse_quantity(f"{value!r} {unit}", dimension, "key")

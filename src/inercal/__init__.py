@@ -48,11 +48,11 @@ Map, lower floors first; each imports only from those above its own line
     errors, units              what goes wrong; texts with units
     geometry                   rotations, earth, site
     instruments                terms, triad, polynomial, by_angle, noise
-    records                    record, findings, maps, read, write, checks, dwells
+    records                    record, made, channels, findings, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
-    estimate                   result, status, budget, linear, nonlinear, runs, coverage, exchange, repeat, compare,
+    estimate                   result, status, budget, linear, nonlinear, runs, coverage, files, repeat, compare,
                                checkpoint, consistency, identifiability; kernels: factor, sigma_point, kalman
-    noise                      deviation, coefficients, running, outcome
+    noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivity                exact, sampled, local, dense, averages
     design                     candidates, criteria, exchange, comparison
     imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, temperature, task
@@ -65,6 +65,7 @@ Map, lower floors first; each imports only from those above its own line
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     study, report, examples    files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
+    validate                   cases with published or closed-form numbers, run by `inercal validate`
     cli                        one module per verb
 """
 
@@ -72,7 +73,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from inercal.aoa.task import measure as measure_angle_of_attack
-    from inercal.estimate.exchange import load as load
+    from inercal.estimate.files import load as load
     from inercal.estimate.result import Estimate as Estimate
     from inercal.imu.task import calibrate as calibrate_imu
     from inercal.records.read import read as read
@@ -91,7 +92,7 @@ _WHERE = {
     "calibrate_platform": ("inercal.selfcal.task", "calibrate"),
     "calibrate_turntable": ("inercal.turntable.task", "calibrate"),
     "exact_sobol": ("inercal.sensitivity.exact", "analyse"),
-    "load": ("inercal.estimate.exchange", "load"),
+    "load": ("inercal.estimate.files", "load"),
     "measure_angle_of_attack": ("inercal.aoa.task", "measure"),
     "read": ("inercal.records.read", "read"),
 }

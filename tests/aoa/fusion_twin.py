@@ -81,7 +81,7 @@ class Twin:
         A, N = np.zeros((n, n)), np.zeros((n, n))
         A[0, 1] = A[1, 2] = A[2, 3] = 1.0
         N[3, 3] = self.settings.estimator.density * max(1.0, 1e-3 / dt) ** 2
-        for s, output, of in (("s_z", "flexure_z", prior.vertical), ("s_x", "flexure_x", prior.axial)):
+        for s, output, of in (("s_z", "flexure_z", prior.heave), ("s_x", "flexure_x", prior.axial)):
             if s in self.place:
                 a, b = self.place[s], self.place[output]
                 A[a, b], A[b, a], A[b, b] = 1.0, -(of.frequency**2), -2.0 * of.damping * of.frequency

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.aoa.record import to_record
-from inercal.aoa.simulate import simulate
+from inercal.aoa.simulate import simulate, to_record
 from inercal.examples import EXAMPLES, FOLDER
 from inercal.records.read import read
 from inercal.study.load import load_aoa_study

@@ -12,20 +12,12 @@ import pytest
 from sting_study import BASE, DEG, G, scenario
 
 from inercal.aoa.figures import angle_page, pictures
-from inercal.aoa.record import to_record
 from inercal.aoa.settings import Attitude, Disturbances, Methods, Oscillation
-from inercal.aoa.simulate import simulate
+from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
 from inercal.report import sting
 from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches, thinned
 from inercal.report.aoa_innovations import innovations
-from inercal.report.aoa_published import (
-    Curves,
-    centrifugal_residual,
-    lever_arm_untreated,
-    static_methods,
-    tangential_residual,
-)
 from inercal.report.spectra import of_angle, peak, spectral_density
 from inercal.units import Quantity, parse_unit
 
@@ -343,22 +335,3 @@ def test_spectral_density_of_known_signals():
     assert spectral_density(t[:100], noise[:100])[0].size == 0
     assert spectral_density(t, np.full(n, np.nan))[0].size == 0
     assert of_angle(t[:100], noise[:100], None, {}) == []
-
-
-def test_the_figures_of_the_paper():
-    t = np.linspace(0.0, 10.0, 5000)
-    swing = 1e-3 * np.sin(2.0 * np.pi * t)
-    lines = Curves(
-        "large: 10° at 1 Hz", t, {"low pass": swing, "mechanical compensation": 0.02 * swing}, scale="log"
-    )
-    sweep = Curves(
-        "static sweep", np.radians(np.arange(-90.0, 91.0)), {"improved": np.full(181, 1e-4)}, sweep=True
-    )
-    one = lever_arm_untreated(replace(lines, scale="linear"), "r = 0.2 m.")
-    drawn = [one, centrifugal_residual(lines, lines, ""), tangential_residual(lines, lines, "")]
-    drawn.append(static_methods(sweep, lines, ""))
-    for number, picture in zip((3, 10, 11, 12), drawn, strict=True):
-        assert picture.title.startswith(f"Figure {number}:")
-        assert {"low pass", "mechanical compensation", "large: 10° at 1 Hz"} <= set(texts(picture))
-    assert one.caption.endswith("r = 0.2 m.")
-    assert {"improved", "angle of attack [°]", "size of the angle error [°]"} <= set(texts(drawn[-1]))

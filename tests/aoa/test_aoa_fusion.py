@@ -19,7 +19,7 @@ from inercal.aoa.layout import Layout
 from inercal.aoa.problem import problem
 from inercal.aoa.recording import plain
 from inercal.aoa.recursion import OUTPUTS
-from inercal.aoa.settings import Attitude, Disturbances, Estimator, Oscillation, Timing
+from inercal.aoa.settings import Attitude, Disturbances, Estimator, MotionPlan, Oscillation, Timing
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit
 
@@ -60,6 +60,7 @@ def trace(of, recording):
     return advance(initial(of), of, recording.t, recording.rows, last=True)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("case", CASES)
 def test_filter_and_smoother_are_those_of_dense_matrices(case):
     """400 spoiled rows: a filter in dense matrices and Joseph's form, and the smoother of Rauch, Tung and Striebel."""
@@ -326,6 +327,30 @@ def test_the_filter_starts_with_what_three_axes_show_at_rest():
         x = found.starts[0].x
         assert x[0] == pytest.approx(math.atan2(read[1], (read[2] - read[0]) / 2.0), abs=1e-12)
         assert x[2] == pytest.approx((read[0] + read[2]) / 0.5, abs=1e-9)
+
+
+ALL_THE_WAY = {
+    "swing": MotionPlan("sine", duration=8.0, amplitude=90.0 * DEG, frequency=0.25),
+    "pauses": MotionPlan(
+        "pitch-pause", first=-90.0 * DEG, last=90.0 * DEG, step=45.0 * DEG, move=1.0, pause=1.0
+    ),
+    "buffet at 90": MotionPlan("buffet", duration=5.0, mean=90.0 * DEG, rms=0.2 * DEG, low=2.0, high=15.0),
+    "buffet at -90": MotionPlan("buffet", duration=5.0, mean=-90.0 * DEG, rms=0.2 * DEG, low=2.0, high=15.0),
+}
+
+
+@pytest.mark.parametrize("states", [8, 19])
+@pytest.mark.parametrize("name", ALL_THE_WAY)
+def test_through_90_deg_either_way(name, states):
+    """Turning, at rest and shaking, where sin(theta) is flat: the angle is within 5 u, and u is below 0.05 deg."""
+    told = study(states, motion=ALL_THE_WAY[name])
+    simulated = simulate(told, np.random.default_rng(90))
+    late = simulated.recording.t > 2.0
+    for smoothed in (False, True):
+        found = estimate(simulated.recording, problem(told), smoothed)
+        assert len(found.starts) == 1
+        assert (abs(found.theta - simulated.theta) < 5.0 * found.u)[late].all()
+        assert found.u[late].max() < 0.05 * DEG
 
 
 def test_a_stated_angle_calibrates_the_sensors():

@@ -3,7 +3,9 @@
 import math
 from dataclasses import replace
 
+import h5py
 import numpy as np
+import pyarrow.parquet
 import pytest
 from scipy.io import netcdf_file
 from sting_study import DEG, study
@@ -57,13 +59,13 @@ def columns_of(path):
         case ".npz":
             return dict(np.load(path))
         case ".parquet":
-            table = pytest.importorskip("pyarrow.parquet").read_table(path)
+            table = pyarrow.parquet.read_table(path)
             return {name: np.array(table[name].to_pylist(), dtype=float) for name in table.column_names}
         case ".nc":
             with netcdf_file(path, mmap=False) as file:
                 return {f"{name} [{each.units.decode()}]": each[:] for name, each in file.variables.items()}
         case _:
-            with pytest.importorskip("h5py").File(path) as file:
+            with h5py.File(path) as file:
                 return {f"{name} [{each.attrs['units']}]": each[:] for name, each in file.items()}
 
 

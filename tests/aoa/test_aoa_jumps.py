@@ -13,9 +13,8 @@ from inercal.aoa.clock import shortened, usual_step
 from inercal.aoa.delay import relative_delay
 from inercal.aoa.frequency import oscillation_frequency
 from inercal.aoa.lowpass import zero_phase
-from inercal.aoa.record import to_record
 from inercal.aoa.settings import Disturbances
-from inercal.aoa.simulate import simulate
+from inercal.aoa.simulate import simulate, to_record
 from inercal.cli import run
 from inercal.records.write import write_record
 

@@ -15,6 +15,8 @@ from inercal.aoa.problem import problem
 from inercal.aoa.settings import Attitude, Timing
 from inercal.units import Quantity, parse_unit
 
+pytestmark = pytest.mark.kernels
+
 STATES = (8, 11, 15, 19)
 
 

@@ -18,7 +18,7 @@ from inercal.aoa.sources import parts
 from inercal.aoa.stated import by_fusion, by_methods
 from inercal.aoa.verification import errors
 from inercal.aoa.zero import with_zero
-from inercal.estimate.exchange import from_json, to_json
+from inercal.estimate.files import from_json, to_json
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.records.findings import Finding

@@ -123,7 +123,7 @@ def test_nothing_is_found_anew_where_nothing_was_lost(name):
 def test_a_million_samples_without_a_missing_angle(moving):
     """19 states, at rest or moving with spikes and lost rows: angles, uncertainties, a covariance that is one.
 
-    `benchmarks/aoa_fusion.py --endless 10000000` goes further.
+    `benchmarks/aoa_endless.py` goes further.
     """
     plan = replace(BASE, duration=1000.0, amplitude=(10.0 if moving else 0.0) * DEG)
     spoiled = Disturbances(spikes=1e-3, dropouts=1e-3) if moving else Disturbances()
@@ -290,8 +290,8 @@ ABSURD = {
     "huge snap": {"estimator": Estimator(snap=1e20)},
     "no gate": {"estimator": Estimator(gate=math.inf)},
     "a gate for nothing": {"estimator": Estimator(gate=1e-6)},
-    "a stiff sting": {"prior": Prior(vertical=Resonance(1e6, 0.5, 0.1))},
-    "a slack sting": {"prior": Prior(vertical=Resonance(1e-3, 0.01, 0.1))},
+    "a stiff sting": {"prior": Prior(heave=Resonance(1e6, 0.5, 0.1))},
+    "a slack sting": {"prior": Prior(heave=Resonance(1e-3, 0.01, 0.1))},
 }
 READINGS = (math.inf, -math.inf, 1e300, 1e20, -1e5)
 

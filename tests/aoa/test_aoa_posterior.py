@@ -17,7 +17,7 @@ from inercal.aoa.sensor_fit import fit
 from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import InputError, StudyError
-from inercal.estimate.exchange import save
+from inercal.estimate.files import save
 from inercal.estimate.result import without_parameters
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site

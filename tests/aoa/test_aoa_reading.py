@@ -39,7 +39,7 @@ def record(t=T, clocks=None, **changes):
             continue
         unit, values = usual if isinstance(usual, tuple) else (CHANNELS[name][0], usual)
         at = clocks.get(name, t)
-        columns[name] = Column(name, name, "", parse_unit(unit), np.array(values, dtype=float), at, SOURCE)
+        columns[name] = Column(name, parse_unit(unit), np.array(values, dtype=float), at, SOURCE)
     return Record(columns, (), (SOURCE,))
 
 

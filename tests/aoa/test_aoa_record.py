@@ -9,9 +9,8 @@ from sting_study import DEG, SCENARIOS, G, scenario
 
 from inercal.aoa.motion import course, duration
 from inercal.aoa.reading import recording_of
-from inercal.aoa.record import to_record
 from inercal.aoa.settings import Calibration, Disturbances, MotionPlan, Oscillation
-from inercal.aoa.simulate import simulate
+from inercal.aoa.simulate import simulate, to_record
 from inercal.errors import StudyError
 from inercal.records.read import read
 from inercal.records.write import write_record

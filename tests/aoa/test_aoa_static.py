@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sting_study import DEG, G, layout
 
@@ -49,6 +49,7 @@ def apart(a, b):
     theta=st.floats(-math.pi, math.pi, exclude_min=True),
     level=st.one_of(st.just(1.0), st.floats(0.2, 1.0), st.floats(-1.0, -0.2)),
 )
+@example(theta=-3.1415926535897927, level=1.0)
 @settings(max_examples=25, deadline=None)
 def test_readings_without_error_give_the_angle_all_around_at_any_roll(way, of, theta, level):
     found = angle(way, readings([theta], of, level), of, G, level).theta

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from sting_study import DEG, G, study
 
 from inercal.aoa.angles import Angles, of_fusion
-from inercal.aoa.display import delays, displayed, in_words, shown_unit, sized
+from inercal.aoa.display import delays, displayed, in_words, rest_of_fit, shown_unit, sized
 from inercal.aoa.filtered import estimate
 from inercal.aoa.outcome import assemble, assemble_paper
 from inercal.aoa.points import points
@@ -17,9 +18,19 @@ from inercal.aoa.problem import problem
 from inercal.aoa.sensor_fit import fit
 from inercal.aoa.settings import Calibration, MotionPlan, Timing
 from inercal.aoa.simulate import simulate
-from inercal.aoa.tables import all_tables, angle, fitted, methods, points_table, sensors, uncertainty
+from inercal.aoa.tables import (
+    angle,
+    answer,
+    fitted,
+    methods,
+    on_page,
+    on_terminal,
+    points_table,
+    sensors,
+    uncertainty,
+)
 from inercal.aoa.verification import errors
-from inercal.estimate.exchange import to_json
+from inercal.estimate.files import to_json
 
 PAUSES = MotionPlan(
     "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0
@@ -195,6 +206,16 @@ def test_the_fit_to_a_reference_is_a_table():
     assert rows["zo_1"][1] == rows["tau_g"][1] == "not seen"
     assert set(rows) == {*found.names, ""}
     assert "prior" in fitted(result).caption
+    (short,) = (each for each in on_terminal(result) if each.title == fitted(result).title)
+    listed = {row[0] for row in short.rows} - {""}
+    assert {"dlambda_1", "dlambda_2"} <= listed < set(found.names)
+    for name, (_, value, u, *_) in rows.items():
+        if name and value != "not seen":
+            assert (abs(float(value)) > 2.0 * float(u)) == (name in listed) or abs(
+                abs(float(value)) / float(u) - 2.0
+            ) < 0.1  # rounded
+    others = set(re.findall(r"[a-zA-Z]+_\w+|tau", rest_of_fit(result))) - {"theta_ref"}
+    assert others == set(found.names) - listed
     json.dumps(to_json(result), allow_nan=False)
     poor, _ = assembled(settings, made, replace(found, converged=False))
     assert "not to be used" in fitted(poor).caption
@@ -202,17 +223,18 @@ def test_the_fit_to_a_reference_is_a_table():
 
 
 def test_all_tables_of_the_fusion_and_of_a_paper_method(shown):
+    """A page has the errors of the sensors as its coefficients; a terminal as a table."""
     settings, result, at_rest = shown
-    titles = [each.title for each in all_tables(result, at_rest, settings)]
-    assert titles == [
-        "Angle", "Points", "Errors of the sensors", "Where the uncertainty of the angle comes from",
-        "Methods side by side",
-    ]  # fmt: skip
+    besides = ["Where the uncertainty of the angle comes from", "Methods side by side"]
+    assert [each.title for each in answer(result, at_rest, settings)] == ["Angle", "Points"]
+    assert [each.title for each in on_page(result)] == besides
+    assert [each.title for each in on_terminal(result)] == ["Errors of the sensors", *besides]
     made = simulate(settings, np.random.default_rng(4)).recording
     u = np.full(len(made.t), 0.01 * DEG)
     angles = Angles("improved, mechanical, dual", made.reference, u, made.gyro, u)
     plain = assemble_paper(made, settings, angles, [], None)
-    assert [each.title for each in all_tables(plain, (), settings)] == ["Angle"]
+    assert [each.title for each in answer(plain, (), settings)] == ["Angle"]
+    assert on_page(plain) == on_terminal(plain) == []
     none = replace(
         angles, theta=np.full(len(made.t), np.nan), rate=np.full(len(made.t), np.nan), u=u * np.nan
     )

@@ -45,7 +45,7 @@ def record(**sensors):
         for k, axis in enumerate("xyz"):
             name = f"{sensor}_{axis}"
             column = np.ascontiguousarray(values[:, k])
-            columns[name] = Column(name, sensor, axis, parse_unit(unit), column, t, source)
+            columns[name] = Column(name, parse_unit(unit), column, t, source)
     return Record(columns, (), (source,))
 
 
@@ -155,7 +155,7 @@ def test_what_is_not_applied_is_said():
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A calibration and a record of the paper's path with missing values, here."""
-    from inercal.estimate.exchange import save
+    from inercal.estimate.files import save
     from inercal.selfcal.simulate import to_record
 
     monkeypatch.chdir(tmp_path)

@@ -109,7 +109,7 @@ def test_a_recording_in_another_unit_of_the_same_kind_is_corrected_alike():
         return Record(
             {
                 f"{sensor}_{axis}": Column(
-                    f"{sensor}_{axis}", sensor, axis, parse_unit(unit), values[:, i].copy(), t, source
+                    f"{sensor}_{axis}", parse_unit(unit), values[:, i].copy(), t, source
                 )
                 for sensor, (unit, values) in units.items()
                 for i, axis in enumerate("xyz")

@@ -11,7 +11,7 @@ from inercal.convert.convention import flat, in_si_outputs
 from inercal.convert.correct import imu_model
 from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
 from inercal.errors import InputError
-from inercal.estimate.exchange import load, save
+from inercal.estimate.files import load, save
 from inercal.records.findings import Finding
 
 

@@ -1,5 +1,7 @@
 """Positions of a two-axis table as design problems, for the tests of this folder."""
 
+import math
+
 import numpy as np
 
 from inercal.design import candidates as ca
@@ -23,6 +25,23 @@ def gravity(plan, **kwargs):
 def monomials(a):
     x, y, z = np.moveaxis(a, -1, 0)
     return np.stack([np.ones_like(x), x, y, z, x * x, y * y, x * y, x * z, y * z], axis=-1)
+
+
+def from_monomials():
+    """T (9, 9): coefficients beta of 1, ax, ay, az, ax², ay², axay, axaz, ayaz are T beta in the basis.
+
+    Exact where a.a = 1. The rms of the drift over all attitudes is ``|T beta|``.
+    """
+    r3, r5, r15 = math.sqrt(3.0), math.sqrt(5.0), math.sqrt(15.0)
+    T = np.zeros((9, 9))
+    T[0, 0] = 1.0
+    T[[1, 2, 3], [1, 2, 3]] = 1.0 / r3
+    T[[4, 5, 6], [6, 7, 8]] = 1.0 / r15
+    # ax², ay² = 1/3 ± (ax² - ay²)/2 - (3az² - 1)/6
+    T[0, 4:6] = 1.0 / 3.0
+    T[7, 4:6] = 1.0 / r15, -1.0 / r15
+    T[8, 4:6] = -1.0 / (3.0 * r5)
+    return T
 
 
 def drift(plan, **kwargs):

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from positions import RATES, TERMS, drift, gravity, with_rates
+from positions import RATES, TERMS, drift, from_monomials, gravity, with_rates
 
 from inercal.design.candidates import Candidates, plain
 from inercal.design.comparison import judge
 from inercal.design.criteria import D, a_criterion, i_criterion
-from inercal.design.spherical import NAMES, basis, from_monomials
+from inercal.design.spherical import NAMES, basis
 from inercal.geometry.rotations import elementary
 from inercal.rigs.plans import grid, named
 

@@ -3,9 +3,9 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from positions import monomials
+from positions import from_monomials, monomials
 
-from inercal.design.spherical import NAMES, basis, from_monomials
+from inercal.design.spherical import NAMES, basis
 
 
 def directions(seed, n):

@@ -11,7 +11,7 @@ from scipy import stats
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.compare import FAMILY, Saved, compare
-from inercal.estimate.exchange import load, save
+from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.estimate.status import Status
 from inercal.records.record import Source

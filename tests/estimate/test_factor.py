@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from inercal.estimate.factor import CHOLESKY, EIGEN, FACTORS, NEGATIVE, SVD, cholesky, forward, root
 
+pytestmark = pytest.mark.kernels
+
 
 def drawn(seed, n, rank, decades):
     """A covariance of a rank, with standard deviations over some decades."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.exchange import from_json, to_json
+from inercal.estimate.files import from_json, to_json
 from inercal.estimate.repeat import combine_runs, mandel_paule
 from inercal.estimate.result import Estimate, without_parameters
 from inercal.estimate.status import Status

@@ -129,8 +129,9 @@ def test_rounded_to_two_digits_of_u(u, multiple, k):
     ("value", "u"), [(1.0, 0.0), (1.0, np.nan), (1.0, np.inf), (np.nan, 1.0), (-np.inf, 1.0)]
 )
 def test_what_has_no_uncertainty_is_shown_all_the_same(value, u):
-    text, _ = rounded(value, u)
-    np.testing.assert_equal(float(text), value)
+    text, spread = rounded(value, u)
+    assert text == "–" if np.isnan(value) else float(text) == value
+    assert (spread == "–") == np.isnan(u)
 
 
 # The estimate.

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from inercal.estimate.factor import CHOLESKY, EIGEN, FACTORS, root
 from inercal.estimate.sigma_point import covariance, cross, draw, mean, moments, update, weights
 
+pytestmark = pytest.mark.kernels
+
 seeds = st.integers(0, 10_000)
 
 

@@ -7,6 +7,8 @@ from scipy.linalg import expm
 
 from inercal.geometry import kernels, rotations
 
+pytestmark = pytest.mark.kernels
+
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(20)
 

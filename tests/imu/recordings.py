@@ -33,9 +33,7 @@ def record_of(t, acc, gyro=None, acc_unit="count", gyro_unit="count", gyro_t=Non
         if values is not None:
             for i, axis in enumerate("xyz"):
                 name = f"{sensor}_{axis}"
-                columns[name] = Column(
-                    name, sensor, axis, parse_unit(unit), np.array(values[:, i]), time, source
-                )
+                columns[name] = Column(name, parse_unit(unit), np.array(values[:, i]), time, source)
     return Record(columns, (), (source,))
 
 

@@ -1,10 +1,9 @@
 """Calibration against a table's angles: round trips, true uncertainties, and what bad input is told.
 
-The limits of coverage of one coefficient, 91 and 98.4 %, and of all together, 94 and 96 %, as in
+The limits of coverage of one coefficient, 89.2 and 99.2 %, and of all together, 93.7 and 96.3 %, are those of
 test_stated_uncertainties.
 """
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 from inercal._toml import check
 from inercal.errors import RecordError, StudyError
 from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import Processes, run
+from inercal.estimate.runs import run
 from inercal.estimate.status import Status
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
@@ -32,7 +31,7 @@ from inercal.units import parse_unit
 
 CHAIN = turntable("two_axis_turntable", None)
 SEED = 20261121
-RUNS = 500
+RUNS = 250
 
 
 def quiet(rng):
@@ -132,6 +131,7 @@ def test_counts_give_the_same_instrument_as_physical_units(noisy):
         assert ours[name].u == pytest.approx(scale * theirs[name].u, rel=1e-3)
 
 
+@pytest.mark.kernels
 def test_whitening_is_generalised_least_squares_and_knows_the_mean_of_the_bias():
     """Against the dense covariance of the same model: white noise on a random walk of unknown start."""
     rng = np.random.default_rng(6)
@@ -174,11 +174,11 @@ def test_there_are_24_mountings_all_of_them_right_handed():
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say():
-    sample = run(one_calibration, runs=RUNS, seed=SEED, executor=Processes(min(2, os.cpu_count() or 1)))
+    sample = run(one_calibration, runs=RUNS, seed=SEED)
     assert np.all(sample["sound"] == 1.0)
     found = coverage(sample["error"], sample["u"], sample["dof"])
-    assert np.all((found.fraction >= 0.91) & (found.fraction <= 0.984)), found.table()
-    assert 0.94 <= found.pooled <= 0.96, found.table()
+    assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table()
+    assert 0.937 <= found.pooled <= 0.963, found.table()
 
 
 def test_errors_of_the_table_widen_the_uncertainties_and_are_in_the_budget(noisy):

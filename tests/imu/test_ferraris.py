@@ -1,7 +1,6 @@
 """Ferraris calibration of simulated sessions: the truth comes back, and the stated uncertainties hold."""
 
 import math
-import os
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from ferraris_sessions import SETTINGS, session, with_values
 
 from inercal.convert.correct import imu_model
 from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import Processes, run
+from inercal.estimate.runs import run
 from inercal.estimate.status import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
@@ -229,18 +228,19 @@ def test_outputs_coarser_than_their_noise_are_no_better_known_than_their_step():
     assert {"gyro resolution", "accelerometer resolution"} <= {item.source for item in estimate.budget}
 
 
-SEED, RUNS = 20261121, 500
+SEED, RUNS = 20261121, 250
 
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say():
-    """500 sessions with every source drawn, the seed fixed before the first look.
+    """250 sessions with every source drawn, the seed fixed before the first look.
 
-    91 and 98.4 % are exact binomial limits of one coefficient at a risk of about 0.05 % over some twenty; alignment of
-    second order and the Allan fit at the length of a hold err on the safe side, so that all together may lie at 97 %.
+    89.2 and 99.2 % are exact binomial limits of one coefficient, at a risk of 1e-4 each. All together: four standard
+    deviations below 95 %; alignment of second order and the Allan fit at the length of a hold err on the safe side,
+    so that they may lie at 97 % and a standard deviation more.
     """
-    sample = run(one_calibration, runs=RUNS, seed=SEED, executor=Processes(min(2, os.cpu_count() or 1)))
+    sample = run(one_calibration, runs=RUNS, seed=SEED)
     assert np.all(sample["sound"] == 1.0)
     found = coverage(sample["error"], sample["u"], sample["dof"])
-    assert np.all((found.fraction >= 0.91) & (found.fraction <= 0.984)), found.table(NAMES)
-    assert 0.94 <= found.pooled <= 0.97, found.table(NAMES)
+    assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table(NAMES)
+    assert 0.936 <= found.pooled <= 0.974, found.table(NAMES)

@@ -40,7 +40,7 @@ def xsens():
         for i, axis in enumerate("xyz", 1):
             channel = f"{sensor}_{axis}"
             columns[channel] = Column(
-                channel, sensor, axis, parse_unit("count"), data[:, i].astype(float), t, Source(name, "")
+                channel, parse_unit("count"), data[:, i].astype(float), t, Source(name, "")
             )
     return Record(columns)
 
@@ -111,9 +111,7 @@ def test_a_million_rows_stay_small():
     count = parse_unit("count")
     record = Record(
         {
-            name: Column(
-                name, *name.split("_"), count, rng.normal(0.0, 10.0, len(t)) + offset, t, Source("long", "")
-            )
+            name: Column(name, count, rng.normal(0.0, 10.0, len(t)) + offset, t, Source("long", ""))
             for name, offset in (("acc_x", 0.0), ("acc_y", 0.0), ("acc_z", 4000.0))
         }
     )

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from inercal.cli import run
 from inercal.errors import InputError, RecordError
-from inercal.estimate.exchange import load, save
+from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 from inercal.imu.temperature.calibrations import fit_calibrations
@@ -30,9 +30,9 @@ def sweep_of(samples=2000, turns=1.2) -> np.ndarray:
 
 def record_of(T, unit="degC", **channels) -> Record:
     t = np.arange(len(T), dtype=float)
-    columns = {"temperature": Column("temperature", "temperature", "", parse_unit(unit), T, t, SOURCE)}
+    columns = {"temperature": Column("temperature", parse_unit(unit), T, t, SOURCE)}
     for name, values in channels.items():
-        columns[name] = Column(name, name[:-2], name[-1], parse_unit("deg/s"), values, t, SOURCE)
+        columns[name] = Column(name, parse_unit("deg/s"), values, t, SOURCE)
     return Record(columns, (), (SOURCE,))
 
 

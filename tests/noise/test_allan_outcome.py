@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inercal.errors import InputError, RecordError
-from inercal.estimate.exchange import load, save
+from inercal.estimate.files import load, save
 from inercal.estimate.status import Status
 from inercal.instruments.noise import SYMBOLS, NoiseModel
 from inercal.noise.outcome import noise_of, within
@@ -17,18 +17,14 @@ SOURCE = Source("static.csv", "0" * 64)
 
 
 def column(name, unit, values, t=None, rate=RATE):
-    sensor, _, axis = name.partition("_")
     stamps = np.arange(len(values)) / rate if t is None else t
-    return Column(name, sensor, axis, parse_unit(unit), np.asarray(values, float), stamps, SOURCE)
+    return Column(name, parse_unit(unit), np.asarray(values, float), stamps, SOURCE)
 
 
 def record(*columns):
     """A record of columns; those of one length share a clock."""
     clocks = {}
-    shared = [
-        Column(c.name, c.sensor, c.axis, c.unit, c.values, clocks.setdefault(len(c.t), c.t), c.source)
-        for c in columns
-    ]
+    shared = [Column(c.name, c.unit, c.values, clocks.setdefault(len(c.t), c.t), c.source) for c in columns]
     return Record({c.name: c for c in shared}, sources=(SOURCE,))
 
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from inercal.errors import InputError, RecordError
 from inercal.instruments.noise import NoiseModel
-from inercal.noise.allan import overlapping_variance
 from inercal.noise.deviation import PRESENT, allan_deviation, regular
+from inercal.noise.dwell_means import overlapping_variance, running_sums
 
 
 def plain(x, m):
@@ -25,6 +25,7 @@ def plain(x, m):
 # The deviation.
 
 
+@pytest.mark.kernels
 @settings(deadline=None, max_examples=40)
 @given(st.integers(3, 90), st.data(), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.03, 0.3]))
 def test_kernels_against_plain_numpy(n, data, seed, missing):
@@ -44,7 +45,7 @@ def test_all_channels_and_averaging_times_against_the_definition():
     found = allan_deviation(x, 0.01)
     for tau, m, row in zip(found.tau, found.lengths, found.deviation, strict=True):
         assert tau == pytest.approx(0.01 * m)
-        np.testing.assert_allclose(row**2, overlapping_variance(x, int(m)), rtol=1e-10)
+        np.testing.assert_allclose(row**2, overlapping_variance(running_sums(x), int(m)), rtol=1e-10)
     one = allan_deviation(x[:, 1], 0.01)
     np.testing.assert_array_equal(one.deviation[:, 0], found.deviation[:, 1])
 

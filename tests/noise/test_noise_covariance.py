@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from inercal.instruments.noise import NoiseModel, allan_terms
 from inercal.noise import covariance
-from inercal.noise.allan import equivalent_dof, overlapping_variance
 from inercal.noise.covariance import ALPHA, degrees_of_freedom, lag_one, pair_sums, sums
 from inercal.noise.curve import Curve
 from inercal.noise.deviation import PRESENT, allan_deviation
+from inercal.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
 
 
 def generalised(kind, n):
@@ -101,7 +101,7 @@ def test_scatter_of_simulated_noise(kind, model):
     """Covariance matrix of 4000 Allan variances each at five averaging times."""
     n, lengths = 400, (1, 4, 16, 60, 130)
     x = model.simulate(n, 1.0, np.random.default_rng(7), 4000)
-    counted = np.cov([overlapping_variance(x, m) for m in lengths])
+    counted = np.cov([overlapping_variance(running_sums(x), m) for m in lengths])
     expected = sums(n, lengths).covariance(np.array([kind == k for k in "NBKQ"], dtype=float))
     # standard errors: sqrt(1/4000) of a correlation, sqrt(kurtosis/4000) of a variance, chi-square of 2 and more dof
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))

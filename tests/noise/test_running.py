@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.noise.allan import overlapping_variance
+from inercal.noise.dwell_means import overlapping_variance, running_sums
 from inercal.noise.running import cascade, empty_octaves, empty_window, slide
 from inercal.records.dwells import windowed_variance
 
@@ -36,6 +36,7 @@ def adjacent_means(x, m):
 # The window.
 
 
+@pytest.mark.kernels
 @settings(deadline=None, max_examples=40)
 @given(st.integers(1, 60), st.integers(2, 20), st.integers(1, 4), st.integers(0, 2**32 - 1))
 def test_the_window_equals_its_definition(n, window, channels, seed):
@@ -91,6 +92,7 @@ def test_a_cleared_window_begins_anew():
 # The octaves.
 
 
+@pytest.mark.kernels
 @settings(deadline=None, max_examples=40)
 @given(st.integers(2, 200), st.integers(1, 3), st.integers(0, 2**32 - 1))
 def test_each_octave_equals_its_definition(n, channels, seed):
@@ -109,10 +111,12 @@ def test_agrees_with_the_overlapping_variance():
     """Two estimates of one thing, at m = 1 the same; else apart by their scatter, of some 2/dof relative."""
     x = np.random.default_rng(5).standard_normal((4096, 4))
     state = allan(x)
-    assert state.variance(0)[0] == pytest.approx(overlapping_variance(x, 1), rel=1e-12)
+    assert state.variance(0)[0] == pytest.approx(overlapping_variance(running_sums(x), 1), rel=1e-12)
     for octave in range(1, 7):
         variance, dof = state.variance(octave)
-        assert variance / overlapping_variance(x, 2**octave) == pytest.approx(1.0, abs=4 * np.sqrt(2 / dof))
+        assert variance / overlapping_variance(running_sums(x), 2**octave) == pytest.approx(
+            1.0, abs=4 * np.sqrt(2 / dof)
+        )
 
 
 def test_a_ramp():

@@ -14,7 +14,6 @@ from inercal.selfcal.plan import Plan, Turn
 from inercal.selfcal.settings import Filter
 from inercal.selfcal.simulate import experiment, simulate
 
-pytest.importorskip("filterpy")
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import plain_filterpy
 

@@ -10,6 +10,7 @@ import math
 import sys
 from pathlib import Path
 
+import imucal
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,8 +20,6 @@ from ferraris_sessions import SETTINGS, UNSURE, options_of, record_of
 
 from inercal.examples import FOLDER
 from inercal.imu.ferraris.calibration import calibrate_ferraris
-
-imucal = pytest.importorskip("imucal")
 
 #: imucal 2.6.0, equal to tests/snapshots/example_cal.json of its repository (mad-lab-fau/imucal 8716e4c)
 REFERENCE = {

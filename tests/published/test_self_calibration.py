@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper_study import ARCSEC, DEG, NOISE, PPM, PRIOR, TRUTH, study
+from paper_study import ARCSEC, DEG, NOISE, PPM, PRIOR, TRUTH, gating_costs, study
 
 from inercal.estimate.factor import NEGATIVE
 from inercal.geometry.rotations import boxminus, boxplus
@@ -19,7 +19,6 @@ from inercal.selfcal.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.filtered import Start, problem
 from inercal.selfcal.filtering import estimate
 from inercal.selfcal.kinematics import attitude
-from inercal.selfcal.observability import gating_costs
 from inercal.selfcal.pathdesign import at_rest, with_stops
 from inercal.selfcal.plan import Plan, Rest, Turn, motion, path
 from inercal.selfcal.rig import Base

@@ -3,12 +3,12 @@ navigation system" (J. Beihang Univ. 2018) can and cannot have reached, in per c
 
 import numpy as np
 import pytest
-from paper_study import ARCSEC, DEG, NOISE, PER_HOUR, TRUTH, study
+from paper_study import ARCSEC, DEG, NOISE, PER_HOUR, TRUTH, gating_costs, study
 
 from inercal.selfcal.bounds import bounds
 from inercal.selfcal.coefficients import DO, DS, KG0, NAMES
 from inercal.selfcal.filtered import problem
-from inercal.selfcal.observability import gating_costs, seen
+from inercal.selfcal.observability import seen
 from inercal.selfcal.pathdesign import at_rest, with_stops
 from inercal.selfcal.plan import motion
 

@@ -16,9 +16,9 @@ def record(t, **channels):
     """Columns of a record; angles in deg, rates in deg/s."""
     made = {}
     for name, values in channels.items():
-        sensor, _, axis = name.partition("_")
+        sensor = name.partition("_")[0]
         unit = parse_unit("deg/s" if sensor in ("wc", "gyro") else "1" if sensor == "position" else "deg")
-        made[name] = Column(name, sensor, axis, unit, np.asarray(values, float), t, Source("a.csv", ""))
+        made[name] = Column(name, unit, np.asarray(values, float), t, Source("a.csv", ""))
     return made
 
 

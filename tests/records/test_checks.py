@@ -19,8 +19,7 @@ def noise(count, seed=7):
 
 def column(name, values, unit, t=None):
     t = np.arange(len(values)) / 100 if t is None else t
-    sensor, _, axis = name.partition("_")
-    return Column(name, sensor, axis, parse_unit(unit), np.asarray(values, float), t, Source("a.csv", ""))
+    return Column(name, parse_unit(unit), np.asarray(values, float), t, Source("a.csv", ""))
 
 
 def columns(unit, t=None, **values):

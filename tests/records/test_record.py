@@ -15,9 +15,8 @@ T = 0.01 * np.arange(5)
 
 
 def column(name, unit, values=None, t=T, source=SOURCE):
-    sensor, _, axis = name.partition("_")
     values = np.arange(len(t), dtype=float) if values is None else np.asarray(values, dtype=float)
-    return Column(name, sensor, axis, parse_unit(unit), values, t, source)
+    return Column(name, parse_unit(unit), values, t, source)
 
 
 def record(*columns, **more):
@@ -127,13 +126,14 @@ def test_to_xarray_and_back():
         a = data[name]
         source = Source(a.attrs["source"], a.attrs["sha256"])
         back[name] = Column(
-            name, a.attrs["sensor"], a.attrs["axis"], parse_unit(a.attrs["units"]), a.values,
+            name, parse_unit(a.attrs["units"]), a.values,
             data[a.dims[0]].values, source, a.attrs["frame"],
         )  # fmt: skip
     assert list(back) == list(r.columns)
     for name, each in r.columns.items():
         np.testing.assert_array_equal(back[name].values, each.values)
         np.testing.assert_array_equal(back[name].t, each.t)
+        assert (data[name].attrs["sensor"], data[name].attrs["axis"]) == (each.sensor, each.axis)
         for label in ("name", "sensor", "axis", "unit", "source", "frame"):
             assert getattr(back[name], label) == getattr(each, label)
 

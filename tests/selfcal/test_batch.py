@@ -66,6 +66,7 @@ def slope(function, size, step=1e-6):
     return np.stack(columns, axis=-1)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("length", [0.0, 1e-9, 9e-3, 1.1e-2, 0.5, 3.0])
 def test_jacobians_of_the_exponential(length):
     v = length * np.array([0.6, -0.64, 0.48])
@@ -73,6 +74,7 @@ def test_jacobians_of_the_exponential(length):
     assert_allclose(inverse_left_jacobian(v), slope(lambda d: log(multiply(exp(d), exp(v))), 3), atol=1e-8)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True])
 def test_derivatives_of_all_terms(extended):
     recording, given, _ = recorded(step=10.0, truth=EXTENDED_TRUTH, filter=Filter(extended=extended))
@@ -174,6 +176,7 @@ def test_least_squares_written_out_has_the_same_minimum():
     assert_allclose(scaled / np.outer(u[-p:], u[-p:]), every[-p:, -p:] / np.outer(u[-p:], u[-p:]), atol=1e-5)
 
 
+@pytest.mark.kernels
 def test_diagonal_of_an_inverse():
     rng = np.random.default_rng(2)
     A = np.zeros((40, 40))

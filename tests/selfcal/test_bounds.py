@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from paper_study import ARCSEC, MICRO_G, PPM, PRIOR, TRUTH, study
+from paper_study import ARCSEC, MICRO_G, PPM, PRIOR, TRUTH, gating_costs, study
 from scipy import stats
 
 from inercal.geometry.rotations import boxminus, exp, multiply, rotate
@@ -16,7 +16,7 @@ from inercal.selfcal.filtered import problem
 from inercal.selfcal.filtering import estimate
 from inercal.selfcal.kinematics import attitude
 from inercal.selfcal.model import accelerometers, platform_rate
-from inercal.selfcal.observability import gating_costs, seen
+from inercal.selfcal.observability import seen
 from inercal.selfcal.plan import Plan, Rest, motion
 from inercal.selfcal.rig import Gimbals
 from inercal.selfcal.settings import Filter, Gating, Noise
@@ -143,6 +143,7 @@ def of_earth(extended):
     return replace(asked, plan=plan, base=base, gimbals=Gimbals(("y", "z", "x"), (-1, 1, -1)))
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True])
 def test_riccati_is_that_of_its_plain_twin(extended):
     asked = of_earth(extended)

@@ -123,6 +123,7 @@ def twin(recording, problem, steps):
     return q, c, P, np.array(nis)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True])
 def test_the_kernel_is_its_matrix_twin(short, extended):
     """Apart by rounding alone: 1e-7 of a standard deviation after 400 steps, over a change of turns."""
@@ -147,6 +148,7 @@ def random_case(seed):
     return q / np.linalg.norm(q), c, rng.uniform(-1.0, 1.0, 3), rng.standard_normal(3), rng
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("turn", [1e-6, 1e-3])
 def test_the_transition_is_the_derivative_of_the_step(seed, turn):
@@ -179,6 +181,7 @@ def test_the_transition_is_the_derivative_of_the_step(seed, turn):
     assert np.array_equal(P, P.T)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(5))
 def test_accelerometer_rows_are_derivatives(seed):
     """Differences of the outputs over all errors, beta among them, at attitudes of any kind."""

@@ -74,6 +74,7 @@ def test_kinematics_are_those_of_the_inverted_joint_axes(rig):
     np.testing.assert_allclose(P, 2.0 * T @ T.T, rtol=1e-11, atol=1e-11)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize(("euler", "order"), [(False, 4), (True, 1)])
 def test_a_step_is_of_its_order_in_time(euler, order):
     """Against the exact attitude: over a fixed time the error falls by 2^order when steps are halved."""
@@ -104,6 +105,7 @@ def test_points_far_and_near_step_alike(size):
     np.testing.assert_allclose(found, moved(world, np.zeros(3), th + d, w, 0.01), rtol=1e-13)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize(("rig", "extended", "integration"), [
     (RIGS[0], False, "rk4"), (RIGS[0], True, "euler"), (RIGS[4], True, "rk4"), (RIGS[8], False, "euler"),
 ])  # fmt: skip

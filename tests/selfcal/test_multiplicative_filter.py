@@ -48,6 +48,7 @@ def paper():
     return settings, runs(settings, 8)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True])
 @pytest.mark.parametrize("rig", [RIGS[0], RIGS[4], RIGS[8]])
 def test_the_kernel_is_its_numpy_twin(rig, extended):

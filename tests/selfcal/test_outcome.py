@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
-from inercal.estimate.exchange import to_json
+from inercal.estimate.files import to_json
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.records.findings import Finding

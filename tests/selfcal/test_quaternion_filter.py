@@ -137,6 +137,7 @@ def twin(recording, told, steps):
         yield x, P, r @ np.linalg.solve(Pzz, r) if len(r) else math.nan
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True], ids=["18", "24"])
 @pytest.mark.parametrize("factor", FACTORS)
 def test_all_points_in_numpy(factor, extended):
@@ -294,6 +295,7 @@ def test_from_a_wrong_attitude(degrees):
         assert np.max(np.abs(state.coefficients - truth) / u) < 4.0
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("factor", FACTORS)
 def test_a_covariance_that_is_none_is_told(factor):
     """An indefinite covariance: every factor reports the eigenvalue, none goes on with |P|."""

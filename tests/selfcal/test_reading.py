@@ -137,7 +137,7 @@ def of_gyros(increment=False):
         rate = np.append(SIMULATED.rate[:, k], np.nan)
         gained = np.append(np.nan, SIMULATED.rate[:, k])
         columns[f"gyro_{axis}"] = Column(
-            f"gyro_{axis}", "gyro", axis, parse_unit("rad/s"), gained if increment else rate,
+            f"gyro_{axis}", parse_unit("rad/s"), gained if increment else rate,
             columns["th_x"].t, Source("g", ""), increment=increment,
         )  # fmt: skip
     return Record(columns, (), RECORD.sources)

@@ -11,12 +11,11 @@ from inercal.geometry.rotations import attitude_difference, boxminus, boxplus, n
 from inercal.selfcal.batch import estimate_map
 from inercal.selfcal.coefficients import to_linear
 from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import estimate
 from inercal.selfcal.plan import path
 from inercal.selfcal.residuals import readings
 from inercal.selfcal.settings import Filter, Noise
 from inercal.selfcal.simulate import experiment, simulate
-from inercal.selfcal.start import _along, estimate_lm, rough_start, wahba
+from inercal.selfcal.start import _along, estimate_lm, wahba
 
 
 def simulated(seed=1, name="paper", step=0.2, **changes):
@@ -127,19 +126,6 @@ def test_the_batch_takes_it_where_encoders_are_silent():
     found = estimate_map(made.recording, given, start)
     assert found.converged
     assert np.all(np.abs(found.coefficients - truth) < 4.5 * sigmas(found))
-
-
-def test_starts_a_filter_that_could_not_start_so_far_off():
-    made, given, _ = simulated(6, step=1.0)
-    start = Start(boxplus(made.attitude[0], np.array([0.5, 1.5, -0.6])), np.radians(100.0))
-    recording = blind(made.recording)
-    near = rough_start(recording, given, start)
-    assert np.all(np.abs(boxminus(near.attitude, made.attitude[0])) < near.sigma)
-    best = estimate_map(recording, given, start)
-    filtered = estimate(recording, given, "error-state", near)
-    assert np.all(np.abs(filtered.coefficients - best.coefficients) < 0.2 * sigmas(best))
-    lost = estimate(recording, given, "error-state", start)
-    assert np.max(np.abs(lost.coefficients - best.coefficients) / sigmas(best)) > 10.0
 
 
 def test_with_encoders_never_better_than_the_bound():

@@ -7,25 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, study
+from streams_that_break import lines_out
 
 from inercal.aoa.filtered import estimate
 from inercal.aoa.history import angles_record
 from inercal.aoa.problem import problem
 from inercal.aoa.reading import recording_of
-from inercal.aoa.record import to_record
 from inercal.aoa.settings import Attitude, Calibration, Disturbances, Oscillation, Zero
-from inercal.aoa.simulate import simulate
+from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.stated import by_fusion
 from inercal.aoa.task import measure
 from inercal.aoa.zero import with_zero
 from inercal.errors import InputError, RecordError, StudyError
 from inercal.estimate.checkpoint import fingerprint
-from inercal.estimate.exchange import save
+from inercal.estimate.files import save
 from inercal.records.read import read
 from inercal.records.write import write_record
 from inercal.stream.aoa import Aoa
 from inercal.stream.lines import Lines
-from inercal.stream.run import Saving, run
+from inercal.stream.run import Saving
 from inercal.units import parse_quantity, parse_unit
 
 SHORT = replace(BASE, duration=0.6)
@@ -47,7 +47,7 @@ def recorded(tmp_path, settings, seed=1, change=lambda rows: rows, **columns):
     record = to_record(simulate(settings, np.random.default_rng(seed)).recording, settings)
     first = next(iter(record.columns.values()))
     more = {
-        name: replace(first, name=name, sensor=name, unit=parse_unit("degC"), values=of(first.t))
+        name: replace(first, name=name, unit=parse_unit("degC"), values=of(first.t))
         for name, of in columns.items()
     }
     write_record(replace(record, columns={**record.columns, **more}), tmp_path / "log.csv")
@@ -60,21 +60,7 @@ def live(text, settings, every=0.0, saving=None, kill=None, said=None):
     """Lines out for such a file."""
     lines = Lines(io.BytesIO(text.encode()), "log", None, lambda finding: None)
     estimator = Aoa(lines, settings, every, lambda f: None if said is None else said.append(f))
-    if kill is not None:
-        whole = estimator.step
-
-        def step(state, sample):
-            if sample.row == kill:
-                raise RuntimeError
-            return whole(state, sample)
-
-        estimator.step = step
-    out = []
-    try:
-        run(estimator, lines, out.append, saving)
-    except RuntimeError:
-        assert kill is not None
-    return out
+    return lines_out(estimator, lines, saving, kill)
 
 
 def of_file(text, settings, tmp_path):

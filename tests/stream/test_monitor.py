@@ -8,7 +8,7 @@ import pytest
 
 from inercal.errors import InputError
 from inercal.imu.recording import MOVING
-from inercal.noise.allan import overlapping_variance
+from inercal.noise.dwell_means import overlapping_variance, running_sums
 from inercal.records.dwells import static_intervals, windowed_variance
 from inercal.stream.lines import Lines
 from inercal.stream.monitor import Monitor
@@ -124,7 +124,7 @@ def test_random_walk_lies_within_its_uncertainty():
     spread = np.std((estimates - walk) / (relative * walk))
     assert spread == pytest.approx(1.0, abs=4.5 / np.sqrt(2 * channels) + 0.05)
     # the overlapping variance of the same samples, at the octave nearest 1 s, is another estimate of it
-    other = np.sqrt(overlapping_variance(x[FIRST:], 64) * 64 / RATE)
+    other = np.sqrt(overlapping_variance(running_sums(x[FIRST:]), 64) * 64 / RATE)
     assert np.std(estimates / other) < 2 * relative
 
 

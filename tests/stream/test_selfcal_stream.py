@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from paper_study import TRUTH, study
+from streams_that_break import lines_out
 
 from inercal.errors import InputError, RecordError, StudyError
 from inercal.records.maps import read_map
@@ -44,21 +45,7 @@ def live(text, settings, every=0.0, saving=None, kill=None, said=None):
     """Lines out for such a file."""
     lines = Lines(io.BytesIO(text.encode()), "log", None, lambda finding: None)
     estimator = Selfcal(lines, problem(settings), every, lambda f: None if said is None else said.append(f))
-    if kill is not None:
-        whole = estimator.step
-
-        def step(state, sample):
-            if sample.row == kill:
-                raise RuntimeError
-            return whole(state, sample)
-
-        estimator.step = step
-    out = []
-    try:
-        run(estimator, lines, out.append, saving)
-    except RuntimeError:
-        assert kill is not None
-    return out
+    return lines_out(estimator, lines, saving, kill)
 
 
 def of_file(text, settings, tmp_path):

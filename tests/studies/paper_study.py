@@ -1,11 +1,15 @@
-"""The study of the paper, for tests: its defaults (spec of self-calibration, section 1) as settings."""
+"""The study of the paper, for tests: its defaults as settings, and what its gating costs."""
+
+from dataclasses import replace
+from typing import get_args, get_type_hints
 
 import numpy as np
 
 from inercal.geometry.earth import gravity
 from inercal.geometry.site import Site
+from inercal.selfcal.bounds import bounds
 from inercal.selfcal.plan import path as named_path
-from inercal.selfcal.settings import Noise, SelfcalSettings
+from inercal.selfcal.settings import Gating, Noise, SelfcalSettings
 
 DEG = np.pi / 180.0
 PER_HOUR = DEG / 3600.0
@@ -58,3 +62,18 @@ def study(path="paper", noise="nominal", **changes):
         "plan": named_path(path),
     }
     return SelfcalSettings(**(given | changes))
+
+
+def gating_costs(motion, problem, truth=None):
+    """What near-level gating costs: (rule, what it stops) -> u over that without gating (p,), each at least 1."""
+    kinds = get_type_hints(Gating)
+
+    def u(gating):
+        return bounds(motion, replace(problem, filter=replace(problem.filter, gating=gating)), truth).u
+
+    free = u(None)
+    return {
+        (rule, stops): u(Gating(rule, stops)) / free
+        for rule in get_args(kinds["rule"])
+        for stops in get_args(kinds["stops"])
+    }

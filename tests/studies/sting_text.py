@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 from numpy.testing import assert_allclose
 
-from inercal.estimate.exchange import save
+from inercal.estimate.files import save
 from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 from inercal.study.aoa import aoa_study

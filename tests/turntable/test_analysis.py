@@ -9,7 +9,7 @@ import xarray
 from numpy.testing import assert_allclose
 
 from inercal.errors import StudyError
-from inercal.estimate.exchange import plain_objects
+from inercal.estimate.files import plain_objects
 from inercal.study.turntable import turntable_study
 from inercal.turntable.analysis import analyse, result, table
 from inercal.turntable.maps import write_maps

@@ -19,7 +19,7 @@ from turntable_studies import (
 )
 
 from inercal.errors import CalibrationError, StudyError
-from inercal.estimate.exchange import from_json, to_json
+from inercal.estimate.files import from_json, to_json
 from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.records.record import Column
@@ -240,7 +240,7 @@ def test_positions_close_together_are_ill_conditioned():
 def test_samples_and_rows_give_the_same_estimate():
     settings = study(FULL_RANK, noise=0.0, dwell=4.0)
     rows, sampled = (
-        run(replace(settings, instrument=replace(settings.instrument, rate=rate))).estimate
+        run(replace(settings, instrument=replace(settings.instrument, sample_rate=rate))).estimate
         for rate in (None, 5.0)
     )
     scale = np.where([name[0] == "D" for name in rows.names], DEG_H, 1.0)
@@ -273,9 +273,7 @@ def rewritten(record, unit):
     columns = dict(record.columns)
     for name in ("y_x", "y_y"):
         old = columns[name]
-        columns[name] = Column(
-            name, old.sensor, old.axis, to, old.values * old.unit.factor / to.factor, old.t, old.source
-        )
+        columns[name] = Column(name, to, old.values * old.unit.factor / to.factor, old.t, old.source)
     return replace(record, columns=columns)
 
 

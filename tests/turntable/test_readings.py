@@ -21,21 +21,21 @@ def record_of(angles_deg, y, position=None, unit="deg/h", channels=("y_x",)):
     """A record of angles (n, 2) [deg] and outputs (n, c)."""
     t = np.arange(len(angles_deg)) * 0.1
     columns = {
-        name: Column(name, name, "", parse_unit("deg"), np.asarray(angles_deg)[:, k], t, SOURCE)
+        name: Column(name, parse_unit("deg"), np.asarray(angles_deg)[:, k], t, SOURCE)
         for k, name in enumerate(JOINTS)
     }
     for k, name in enumerate(channels):
         values = np.asarray(y, dtype=float).reshape(len(t), -1)[:, k]
-        columns[name] = Column(name, "y", name[-1], parse_unit(unit), values, t, SOURCE)
+        columns[name] = Column(name, parse_unit(unit), values, t, SOURCE)
     if position is not None:
-        columns["position"] = Column("position", "position", "", parse_unit("1"), position, t, SOURCE)
+        columns["position"] = Column("position", parse_unit("1"), position, t, SOURCE)
     return Record(columns, sources=(SOURCE,))
 
 
 def test_sampled_dwells_give_the_same_readings_as_one_row_each():
     """Without noise and errors the mean of a dwell is the reading."""
     rows = readings(simulate(study(TUMBLE), np.random.default_rng(1)), JOINTS, "gyrowheel")
-    sampled = simulate(study(TUMBLE, dwell=4.0, rate=10.0), np.random.default_rng(1))
+    sampled = simulate(study(TUMBLE, dwell=4.0, sample_rate=10.0), np.random.default_rng(1))
     found = readings(sampled, JOINTS, "gyrowheel")
     assert_allclose(found.y, rows.y, rtol=1e-12)
     assert_allclose(found.angles, rows.angles, atol=1e-12)
@@ -47,7 +47,7 @@ def test_sampled_dwells_give_the_same_readings_as_one_row_each():
 
 def test_the_scatter_within_the_dwells_tells_the_noise_of_a_mean():
     """White noise: standard deviation over the root of the number of samples (relative error 1/sqrt(2 dof))."""
-    settings = study(TUMBLE, dwell=20.0, rate=10.0, noise=0.05 * DEG_H)
+    settings = study(TUMBLE, dwell=20.0, sample_rate=10.0, noise=0.05 * DEG_H)
     found = readings(simulate(settings, np.random.default_rng(2)), JOINTS, "gyrowheel")
     assert_allclose(found.u_mean, 0.05 * DEG_H, rtol=4.5 / np.sqrt(2 * 24 * 199))
 
@@ -58,7 +58,7 @@ def without_numbers(record):
 
 def test_positions_are_found_by_angle_where_they_are_not_numbered():
     """Neighbours in the 24-position tumble differ by 45 deg or more, but for repeated attitudes."""
-    sampled = simulate(study(TUMBLE, dwell=4.0, rate=10.0), np.random.default_rng(1))
+    sampled = simulate(study(TUMBLE, dwell=4.0, sample_rate=10.0), np.random.default_rng(1))
     by_number = readings(sampled, JOINTS, "gyrowheel")
     by_angle = readings(without_numbers(sampled), JOINTS, "gyrowheel")
     assert_allclose(by_angle.y, by_number.y)

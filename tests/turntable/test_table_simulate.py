@@ -58,7 +58,7 @@ def test_only_channels_of_which_something_is_stated_are_recorded():
 def test_samples_carry_the_noise_of_a_reading_times_the_root_of_their_number():
     """The mean over a dwell has the stated noise, whether samples are recorded or not."""
     quiet = study(TUMBLE, noise=0.1 * DEG_H, dwell=10.0)
-    for settings in (quiet, replace(quiet, instrument=replace(quiet.instrument, rate=5.0))):
+    for settings in (quiet, replace(quiet, instrument=replace(quiet.instrument, sample_rate=5.0))):
         means = []
         for seed in range(40):
             record = simulate(settings, np.random.default_rng([9, seed]))
@@ -71,7 +71,7 @@ def test_samples_carry_the_noise_of_a_reading_times_the_root_of_their_number():
 
 
 def test_times_are_the_middles_of_the_samples_one_dwell_after_the_other():
-    record = simulate(study(TUMBLE, dwell=10.0, rate=2.0), np.random.default_rng(1))
+    record = simulate(study(TUMBLE, dwell=10.0, sample_rate=2.0), np.random.default_rng(1))
     assert_allclose(record["y_x"].t, 0.25 + 0.5 * np.arange(24 * 20))
     assert_allclose(simulate(study(TUMBLE, dwell=10.0), np.random.default_rng(1))["y_x"].t[:2], [5.0, 15.0])
 
@@ -85,7 +85,9 @@ def test_an_error_keeps_its_value_as_long_as_its_scope_says(scope):
     chain = table(2.0 * ARCMIN).with_scope(scope)
     only = replace(chain, elements=tuple(e for e in chain.elements if getattr(e, "name", "") in KEPT))
     plan = replace(TUMBLE, angles=np.tile(np.radians([90.0, 0.0]), (24, 1)))
-    settings = study(plan, only, coefficients={"DX_Y": 1.0, "k_x": 0.0}, unit="rad/s", dwell=5.0, rate=2.0)
+    settings = study(
+        plan, only, coefficients={"DX_Y": 1.0, "k_x": 0.0}, unit="rad/s", dwell=5.0, sample_rate=2.0
+    )
     error = -np.arcsin(column(simulate(settings, np.random.default_rng(2)), "y_x").reshape(24, 10))
     assert np.abs(error).max() <= 2.0 * ARCMIN * (1 + 1e-9)
     within, between = np.ptp(error, axis=1), np.ptp(error.mean(axis=1))

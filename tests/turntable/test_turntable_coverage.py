@@ -1,36 +1,35 @@
-"""The stated uncertainties are true: 500 simulated tests on a table, the seed fixed before the first look.
+"""The stated uncertainties are true: 250 simulated tests on a table, the seed fixed before the first look.
 
-The limits of one coefficient: 91 and 98.4 % are exact binomial limits for 500 runs at a risk of about 0.05 % over
-24 coefficients. Those of all together, 94 and 96 %: errors that stay constant over a test tie its coefficients
-together (design effect about 2), which makes them some three and a half standard deviations of the pooled share.
+The limits of one coefficient, 89.2 and 99.2 %, are exact binomial limits for 250 runs, at a risk of 1e-4 each. Those
+of all together, 93.6 and 96.4 %: errors that stay constant over a test tie its coefficients together (design effect
+about 2), which makes them three and a half standard deviations of the pooled share.
+`benchmarks/turntable_coverage.py` makes more runs.
 """
-
-import os
 
 import numpy as np
 import pytest
 from turntable_studies import usual_terms
 
 from inercal.estimate.coverage import coverage, nees
-from inercal.estimate.runs import Processes, run
+from inercal.estimate.runs import run
 from inercal.turntable.campaign import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )
 
 SEED = 20261121
-RUNS = 500
+RUNS = 250
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", [one_turntable_calibration, one_turntable_calibration_of_unknown_noise])
 def test_intervals_cover_the_truth_as_often_as_they_say_with_the_table_s_errors_on(task):
-    sample = run(task, runs=RUNS, seed=SEED, executor=Processes(min(2, os.cpu_count() or 1)))
+    sample = run(task, runs=RUNS, seed=SEED)
     assert np.all(sample["sound"] == 1.0)
     assert sample["error"].shape == (RUNS, len(usual_terms("gyrowheel")))
     found = coverage(sample["error"], sample["u"], sample["dof"])
-    assert np.all((found.fraction >= 0.91) & (found.fraction <= 0.984)), found.table()
-    assert 0.94 <= found.pooled <= 0.96, found.table()
+    assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table()
+    assert 0.936 <= found.pooled <= 0.964, found.table()
     assert found.passed, found.table()
     if task is one_turntable_calibration:
         # with the noise known, the whole covariance is put to the test: chi2 of 24 degrees of freedom in each run

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from inercal.estimate.result import rounded
+from inercal.estimate.result import rounded, without_parameters
 from inercal.estimate.status import Status
 from inercal.geometry.site import Site
 from inercal.report.html import render
@@ -171,7 +171,8 @@ def test_a_design_on_a_page():
         grid((12, 12)), gyrowheel(), positions=24, criterion="D", compare=("24-position", "6-position")
     )
     designed = design(settings)
-    page = check(design_page(designed, settings))
+    told = without_parameters("design positions", Status.OK, designed.message)
+    page = check(design_page(designed, settings, told))
     rows = [
         [re.sub("<.*?>", "", cell) for cell in re.findall("<td.*?>(.*?)</td>", row, re.DOTALL)]
         for row in re.findall("<tr>(.*?)</tr>", page, re.DOTALL)

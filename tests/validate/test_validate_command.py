@@ -60,7 +60,9 @@ def test_the_record(tmp_path, capsys):
         assert made["sources_sha256"] == source_hash()
         assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", whole["traceability"]["date"])
         assert all(len(source["sha256"]) == 64 for source in whole["inputs"])
-        assert all(source["path"].startswith("examples/") for source in whole["inputs"])  # not where inercal lies
+        assert all(
+            source["path"].startswith("examples/") for source in whole["inputs"]
+        )  # not where inercal lies
         assert set(whole["timing_s"]) == {"solve", "total"}
 
 

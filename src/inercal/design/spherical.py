@@ -34,20 +34,3 @@ def basis(a: ArrayLike) -> Array:
     linear = [np.ones_like(x), r3 * x, r3 * y, r3 * z]
     mixed = [r15 * x * y, r15 * x * z, r15 * y * z]
     return np.stack([*linear, *mixed, 0.5 * r15 * (x * x - y * y), 0.5 * r5 * (3.0 * z * z - 1.0)], axis=-1)
-
-
-def from_monomials() -> Array:
-    """T (9, 9): coefficients beta of 1, ax, ay, az, ax², ay², axay, axaz, ayaz are T beta in the basis.
-
-    Exact where a.a = 1. The rms of the drift over all attitudes is ``|T beta|``.
-    """
-    r3, r5, r15 = math.sqrt(3.0), math.sqrt(5.0), math.sqrt(15.0)
-    T = np.zeros((9, 9))
-    T[0, 0] = 1.0
-    T[[1, 2, 3], [1, 2, 3]] = 1.0 / r3
-    T[[4, 5, 6], [6, 7, 8]] = 1.0 / r15
-    # ax², ay² = 1/3 ± (ax² - ay²)/2 - (3az² - 1)/6
-    T[0, 4:6] = 1.0 / 3.0
-    T[7, 4:6] = 1.0 / r15, -1.0 / r15
-    T[8, 4:6] = -1.0 / (3.0 * r5)
-    return T

@@ -2,7 +2,7 @@
 
 Scalars only: a quaternion or a vector comes in as anything that is indexed (a tuple, a row of an array) and
 goes out as a tuple, which stays in registers when a kernel is inlined in a loop; nothing is allocated.
-Conventions are those of `rotations`, whose functions are the oracle of these in the tests.
+Conventions are those of `inercal.geometry.rotations`, whose functions are the oracle of these in the tests.
 """
 
 from __future__ import annotations

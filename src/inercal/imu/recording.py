@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError, StudyError
-from inercal.noise.allan import AllanFit
-from inercal.noise.allan import fit as fit_allan
+from inercal.noise.dwell_means import AllanFit
+from inercal.noise.dwell_means import fit as fit_allan
 from inercal.records.checks.values import saturated
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
 from inercal.records.record import Record, Triad

@@ -12,7 +12,8 @@ from inercal.geometry.earth import earth_rate
 from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel, triad_from_terms
-from inercal.records.record import Column, Record, Source
+from inercal.records.made import record_of
+from inercal.records.record import Record
 from inercal.units import parse_unit
 
 Array = NDArray[np.float64]
@@ -193,13 +194,12 @@ def _with_mean(model: TriadModel, wander: Array, holds: list[slice]) -> TriadMod
 
 def record_of_counts(t: Array, acc: Array, gyro: Array) -> Record:
     """A record of accelerometer and gyro outputs (n, 3) in counts at times ``t`` (n,) [s]."""
-    source = Source("simulated", "")
     count = parse_unit("count")
-    return Record(
-        {
-            f"{sensor}_{axis}": Column(f"{sensor}_{axis}", sensor, axis, count, values[:, i], t, source)
+    return record_of(
+        (
+            (f"{sensor}_{axis}", count, values[:, i])
             for sensor, values in (("acc", acc), ("gyro", gyro))
             for i, axis in enumerate("xyz")
-        },
-        sources=(source,),
+        ),
+        t,
     )

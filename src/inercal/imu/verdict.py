@@ -108,7 +108,7 @@ def verdict(
         term = known.leading_term()
         value = float(acc.fit.x[known.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
-        # poses that leave a null space never come so far: see `sweep`
+        # poses that leave a null space never come so far: see `inercal.imu.poses`
         return (
             Status.ILL_CONDITIONED,
             f"the {len(poses.dwells)} poses hardly fix {term} ({number}; weak "

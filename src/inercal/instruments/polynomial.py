@@ -110,7 +110,7 @@ class ChannelModel:
         """Values (p,) of the terms from linear coefficients (p,), and their derivatives (p, p)."""
         relative, lead = self._relative, self.gain(c)
         values = np.where(relative, c / lead, c)
-        slope = np.diag(np.where(relative, 1.0 / lead, 1.0))
+        slope = np.diag(np.where(relative, np.divide(1.0, lead), 1.0))
         if relative.any():
             slope[relative, self.symbols.index(self.leading)] = -values[relative] / lead
         return values, slope

@@ -143,7 +143,10 @@ class Curve:
         return max(float(apart @ y / (apart @ apart)), 0.0) * shared
 
     def dof(self, fit: Fit, which: int) -> float:
-        """Degrees of freedom of Student's t for the coefficient ``fit.seen[which]``: see `noise_coefficients`."""
+        """Degrees of freedom of Student's t for the coefficient ``fit.seen[which]``.
+
+        See `inercal.noise.coefficients.noise_coefficients`.
+        """
         i, w, variance = fit.seen[which], fit.weights[which], fit.covariance[which, which]
         if i != RAMP:
             alone = np.where(np.arange(len(SYMBOLS)) == i, fit.squares, 0.0)

@@ -19,6 +19,7 @@ from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
 from inercal.noise.rest import Unrest, unrest
+from inercal.records.clocks import usable_interval
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Column, Record
@@ -190,7 +191,8 @@ def _on_a_grid(columns: list[Column]) -> tuple[float, Array]:
     if counts.min() < FEWEST:
         name = columns[int(np.argmin(counts))].name
         raise RecordError(where, f"found {counts.min()} samples of {name}, expected at least {FEWEST}")
-    return regular(t, samples, where)
+    interval, samples = regular(t, samples, where)
+    return usable_interval(interval, where), samples
 
 
 def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, tuple[Finding, ...]]:
@@ -275,7 +277,7 @@ def _assemble(
 
 
 def _curve(channel: ChannelNoise) -> dict[str, Any]:
-    """One channel of the result, in SI."""
+    """One channel of the result, in SI; ``sample`` is the noise of a sample, N over the root of the interval."""
     curve, at, fit = channel.curve, channel.at, channel.fit
     out: dict[str, Any] = {
         "unit": channel.unit,
@@ -292,6 +294,9 @@ def _curve(channel: ChannelNoise) -> dict[str, Any]:
             "fitted": channel.fitted,
             "fit_range_s": list(fit.fit_range),
             "resolved": list(fit.names),
+            "sample": float(fit.values[fit.names.index("N")]) / curve.interval**0.5
+            if "N" in fit.names
+            else None,
             "upper_limits": dict(fit.bounds),
             "chi2": fit.chi2,
             "chi2_dof": fit.chi2_dof,

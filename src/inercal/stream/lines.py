@@ -305,9 +305,7 @@ def _form(
             time = field
         else:
             fields.append(field)
-            columns[channel.name] = Column(
-                channel.name, channel.sensor, channel.axis, unit, t, t, source, increment=channel.increment
-            )
+            columns[channel.name] = Column(channel.name, unit, t, t, source, increment=channel.increment)
     if not columns:
         raise RecordError(path, "found a time column alone, expected a channel")
     counted_at = math.nan if time is not None else row_rate(tuple(found), rate, path)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError
 from inercal.imu.recording import MOVING, SHORTEST_START
 from inercal.noise.running import Octaves, Window, cascade, empty_octaves, empty_window, slide
+from inercal.records.clocks import usable_interval
 from inercal.records.dwells import window_samples
 from inercal.records.record import Column
 from inercal.stream.lines import Lines, Sample
@@ -133,6 +134,7 @@ class Monitor:
             raise RecordError(
                 self._where, f"found {len(stamps)} time stamps that do not increase, expected a recording"
             )
+        usable_interval(interval, self._where)
         window = empty_window(window_samples(1.0 / interval), len(self._places))
         return state._replace(stamps=np.empty(0), interval=interval, window=window, t=t)
 
@@ -149,7 +151,7 @@ class Monitor:
         x = np.array(values)
         slide(x, *window)
         variance = window.variance.tolist()
-        sizes = [math.sqrt(sum(variance[i] ** 2 for i in group)) for group in self._groups]
+        sizes = [math.hypot(*(variance[i] for i in group)) for group in self._groups]
         if not state.started:
             state = self._started(state, x, t, sizes)
         elif _restlessness(state, sizes) <= MOVING:
@@ -185,7 +187,7 @@ class Monitor:
         """The output line."""
         window, octaves, interval = state.window, state.octaves, state.interval
         variance = window.variance.tolist()
-        sizes = [math.sqrt(sum(variance[i] ** 2 for i in group)) for group in self._groups]
+        sizes = [math.hypot(*(variance[i] for i in group)) for group in self._groups]
         restlessness = _restlessness(state, sizes)
         rest = math.nan if math.isnan(restlessness) else int(not math.isnan(state.still))
         still = t - state.still if rest == 1 else 0.0 if rest == 0 else math.nan

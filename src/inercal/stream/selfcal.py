@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError, StudyError
 from inercal.records.findings import Finding
 from inercal.selfcal.filtered import History, Problem, State, Trace, known_in
-from inercal.selfcal.filtering import LOCK, load_kernels, recursive
+from inercal.selfcal.filtering import LOCK, recursive
+from inercal.selfcal.filtering import load_kernels as load_filter
 from inercal.selfcal.gaps import LONG, RECENT, advance, held_rate, usual
 from inercal.selfcal.history import columns, rows
 from inercal.stream.lines import Lines, Sample
@@ -37,7 +38,7 @@ _SAID = 5
 _PATIENCE = 10
 
 
-class LiveState(NamedTuple):
+class SelfcalState(NamedTuple):
     """What is known after a row.
 
     ``begun``: a start was found; until then the others mean nothing. ``filter`` is the state of the filter; ``next``
@@ -129,16 +130,16 @@ class Selfcal:
             "every": self._every,
         }
 
-    def initial(self) -> LiveState:
+    def initial(self) -> SelfcalState:
         """Nothing known."""
         none = np.zeros(3)
-        return LiveState(
+        return SelfcalState(
             begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
             rated=math.nan, read=math.nan, t=math.nan, steps=np.full(RECENT, np.nan), doubt=False,
             angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, said=0, slots=Slots(),
         )  # fmt: skip
 
-    def step(self, state: LiveState, sample: Sample) -> tuple[LiveState, Sequence[Output]]:
+    def step(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[Output]]:
         """The state after a row, and a line where one is due."""
         if math.isnan(sample.t):
             return state, ()
@@ -170,13 +171,13 @@ class Selfcal:
             state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
         return self._line(self._alarmed(state, trace), trace, nis)
 
-    def finish(self, state: LiveState) -> Sequence[Output]:
+    def finish(self, state: SelfcalState) -> Sequence[Output]:
         """Nothing."""
         return ()
 
     def _begin(
-        self, state: LiveState, t: float, rate: Array, th: Array
-    ) -> tuple[LiveState, Sequence[Output]]:
+        self, state: SelfcalState, t: float, rate: Array, th: Array
+    ) -> tuple[SelfcalState, Sequence[Output]]:
         """The start, where all angles and the rate from here on are known; else it is waited for."""
         begun = bool(np.isfinite(th).all() and (np.isfinite(rate) | self._gained).all())
         if not begun:
@@ -185,7 +186,7 @@ class Selfcal:
         state = state._replace(begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th)
         return self._line(state, known_in(filter_, self._problem), math.nan)
 
-    def _late(self, state: LiveState, t: float) -> LiveState:
+    def _late(self, state: SelfcalState, t: float) -> SelfcalState:
         """A row left out, which is not later than the one before."""
         if state.late + 1 == _PATIENCE:
             raise RecordError(
@@ -195,21 +196,21 @@ class Selfcal:
             )
         return state._replace(late=state.late + 1)
 
-    def _after(self, state: LiveState, t: float, dt: float) -> LiveState:
+    def _after(self, state: SelfcalState, t: float, dt: float) -> SelfcalState:
         """The state with an interval seen; a gap is said."""
         state = state._replace(steps=np.append(state.steps[1:], dt))
         if dt <= LONG * usual(state.steps):
             return state
         return self._gap(state, t, f"{dt:.4g} s without rows, the platform is taken to turn on as before")
 
-    def _gap(self, state: LiveState, t: float, text: str) -> LiveState:
+    def _gap(self, state: SelfcalState, t: float, text: str) -> SelfcalState:
         """The state with something said of a gap."""
         if state.gaps < _SAID:
             more = "; further gaps are not said" if state.gaps + 1 == _SAID else ""
             self._say(Finding("gap", f"{text}{more}", f"t = {t:.10g} s"))
         return state._replace(gaps=state.gaps + 1)
 
-    def _rate(self, state: LiveState, t: float, rate: Array) -> tuple[LiveState, Array, bool]:
+    def _rate(self, state: SelfcalState, t: float, rate: Array) -> tuple[SelfcalState, Array, bool]:
         """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and whether it is held."""
         whole, gained = bool(np.isfinite(rate).all()), bool(self._gained.all())
         if whole:
@@ -224,7 +225,7 @@ class Selfcal:
         )
         return state, np.where(long | ~np.isfinite(rate), held, rate), True
 
-    def _alarmed(self, state: LiveState, trace: Trace) -> LiveState:
+    def _alarmed(self, state: SelfcalState, trace: Trace) -> SelfcalState:
         """The state with the alarms that were due now."""
         above = state.nis - state.dims > _BAND * math.sqrt(2.0 * state.dims)
         alarms = (
@@ -235,9 +236,9 @@ class Selfcal:
                 f"{state.dims / max(state.rows, 1):.4g}: the rows contradict the model or the stated noise",
             ),
             (
-                not np.isfinite(trace.coefficients).all(),
+                not all(np.isfinite(each).all() for each in (trace.coefficients, trace.u, trace.attitude_u)),
                 "filter_fails",
-                "the filter diverged: no coefficient is a number any more",
+                "the filter diverged: its coefficients or their uncertainties are no numbers any more",
             ),
             (
                 self._problem.filter.kind == "gimbal-ukf" and trace.gimbal_cosine < LOCK,
@@ -252,8 +253,8 @@ class Selfcal:
         return state
 
     def _line(
-        self, state: LiveState, known: History | Trace, nis: float
-    ) -> tuple[LiveState, Sequence[Output]]:
+        self, state: SelfcalState, known: History | Trace, nis: float
+    ) -> tuple[SelfcalState, Sequence[Output]]:
         """The state with its angles, and the line where one is due."""
         (row,) = rows(
             known.attitude, known.attitude_u, known.coefficients, known.u, state.angles, self._problem.world
@@ -278,9 +279,9 @@ def filter_of(problem: Problem) -> ModuleType:
     return module
 
 
-def load(problem: Problem) -> None:
+def load_kernels(problem: Problem) -> None:
     """Load, or compile, the kernels of a live calibration."""
-    load_kernels(problem.filter.kind, problem)
+    load_filter(problem.filter.kind, problem)
     p = len(problem.prior)
     none = np.empty((0, 3))
     rows(np.empty((0, 4)), none, np.empty((0, p)), np.empty((0, p)), np.zeros(3), problem.world)

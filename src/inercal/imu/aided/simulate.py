@@ -12,7 +12,8 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import skew
 from inercal.imu.aided.blocks import small_turn
 from inercal.instruments.triad import TriadModel
-from inercal.records.record import Column, Record, Source
+from inercal.records.made import record_of
+from inercal.records.record import Record
 from inercal.rigs.chain import Chain
 from inercal.units import parse_unit
 
@@ -117,16 +118,12 @@ def simulate(
         values[sensor] = felt + bias + noise
         biases[sensor] = bias.mean(axis=0)
     angles = angles_at(program, chain.joints, t - truth.late)
-    source = Source("simulated", "")
     columns = [
-        Column(f"{sensor}_{axis}", sensor, axis, parse_unit(unit), values[sensor][:, i], t, source)
+        (f"{sensor}_{axis}", parse_unit(unit), values[sensor][:, i])
         for sensor, unit in (("acc", "m/s^2"), ("gyro", "rad/s"))
         for i, axis in enumerate("xyz")
-    ] + [
-        Column(joint, joint, "", parse_unit("rad"), angles[:, k], t, source)
-        for k, joint in enumerate(chain.joints)
-    ]
-    return Record({column.name: column for column in columns}), _values(truth, biases)
+    ] + [(joint, parse_unit("rad"), angles[:, k]) for k, joint in enumerate(chain.joints)]
+    return record_of(columns, t), _values(truth, biases)
 
 
 def _values(truth: Truth, biases: Mapping[str, Array]) -> dict[str, float]:

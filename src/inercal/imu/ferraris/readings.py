@@ -15,7 +15,7 @@ from inercal.imu.ferraris.names import POSITIONS, TURNS
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.recording import LOST, clipped_rows, coarse_steps
-from inercal.noise.allan import AllanFit, fit_pooled
+from inercal.noise.dwell_means import AllanFit, fit_pooled
 from inercal.records.findings import Finding
 from inercal.records.record import Triad
 

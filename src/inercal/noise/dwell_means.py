@@ -17,34 +17,29 @@ from inercal.instruments.noise import allan_terms
 Array = NDArray[np.float64]
 
 
-def overlapping_variance(x: Array, m: int) -> Array:
+def running_sums(x: Array) -> Array:
+    """Running sums (n + 1, *channels) of equally spaced samples (n, *channels), less their mean."""
+    return np.concatenate([np.zeros_like(x[:1]), np.cumsum(x - x.mean(axis=0), axis=0)])
+
+
+def overlapping_variance(sums: Array, m: int) -> Array:
     """Overlapping Allan variance of rate-like samples for means over ``m`` samples.
 
     Parameters
     ----------
-    x : (n, *channels)
-        Equally spaced samples.
+    sums : (n + 1, *channels)
+        The `running_sums` of the samples.
     m : int
         Samples in a mean, 1 <= m <= n/2.
 
     Returns
     -------
-    (*channels) in the unit of x squared.
+    (*channels) in the unit of the samples squared.
 
     References
     ----------
     Riley and Howe, NIST SP 1065 (2008), section 5.2.4.
     """
-    return _of_sums(_sums(x), m)
-
-
-def _sums(x: Array) -> Array:
-    """Running sums (n + 1, *channels) of samples, less their mean."""
-    return np.concatenate([np.zeros_like(x[:1]), np.cumsum(x - x.mean(axis=0), axis=0)])
-
-
-def _of_sums(sums: Array, m: int) -> Array:
-    """`overlapping_variance` from running sums."""
     second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
     return np.asarray(np.mean(second**2, axis=0) / (2.0 * m**2))
 
@@ -106,7 +101,7 @@ def fit_pooled(stretches: Sequence[Array], interval: float) -> AllanFit:
     n = max(map(len, stretches))
     longest = 2 if len(stretches) == 1 else 1
     lengths = np.unique([max(1, n // 2**k) for k in range(longest, 10)])
-    sums = [_sums(x) for x in stretches]
+    sums = [running_sums(x) for x in stretches]
     variances = np.array([_pooled_variance(sums, int(m)) for m in lengths])
     dof = np.array(
         [sum(equivalent_dof(len(x), int(m)) for x in stretches if len(x) >= 2 * m) for m in lengths]
@@ -129,7 +124,7 @@ def _pooled_variance(sums: Sequence[Array], m: int) -> Array:
     """Overlapping Allan variance (channels) over the stretches that are long enough, by the number of differences."""
     long_enough = [each for each in sums if len(each) > 2 * m]
     counts = np.array([len(each) - 2 * m for each in long_enough])
-    return np.asarray(counts @ [_of_sums(each, m) for each in long_enough] / counts.sum())
+    return np.asarray(counts @ [overlapping_variance(each, m) for each in long_enough] / counts.sum())
 
 
 def _terms(tau: Array) -> Array:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.exchange import from_json, load, plain_objects, save, to_json
+from inercal.estimate.files import from_json, load, plain_objects, save, to_json
 from inercal.estimate.result import Estimate
 from inercal.estimate.status import Status
 from inercal.records.findings import CODES, Finding

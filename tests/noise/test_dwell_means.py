@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.instruments.noise import BIAS_FLOOR
-from inercal.noise.allan import AllanFit, equivalent_dof, fit, overlapping_variance
+from inercal.noise.dwell_means import AllanFit, equivalent_dof, fit, overlapping_variance, running_sums
 
 
 def flicker(rng, n, channels, B, interval):
@@ -25,8 +25,8 @@ def flicker(rng, n, channels, B, interval):
 def test_nbs14():
     """NBS Monograph 140, annex 8.E (and NIST SP 1065, table 30): nine frequency values."""
     x = np.array([892.0, 809, 823, 798, 671, 644, 883, 903, 677])
-    assert np.sqrt(overlapping_variance(x, 1)) == pytest.approx(91.22945, abs=5e-6)
-    assert np.sqrt(overlapping_variance(x, 2)) == pytest.approx(85.95287, abs=5e-6)
+    assert np.sqrt(overlapping_variance(running_sums(x), 1)) == pytest.approx(91.22945, abs=5e-6)
+    assert np.sqrt(overlapping_variance(running_sums(x), 2)) == pytest.approx(85.95287, abs=5e-6)
 
 
 def test_the_1000_point_set_of_nist():
@@ -39,7 +39,7 @@ def test_the_1000_point_set_of_nist():
     assert x.mean() == pytest.approx(4.897745e-01, abs=5e-8)
     assert x.std(ddof=1) == pytest.approx(2.884664e-01, abs=5e-8)
     for m, deviation in ((1, 2.922319e-01), (10, 9.159953e-02), (100, 3.241343e-02)):
-        assert np.sqrt(overlapping_variance(x, m)) == pytest.approx(deviation, rel=5e-7)
+        assert np.sqrt(overlapping_variance(running_sums(x), m)) == pytest.approx(deviation, rel=5e-7)
 
 
 # Closed forms.
@@ -51,7 +51,9 @@ def test_half_the_mean_square_of_the_differences_of_adjacent_means(n, data, seed
     m = data.draw(st.integers(1, n // 2))
     x = np.random.default_rng(seed).standard_normal(n)
     squares = [(x[i + m : i + 2 * m].mean() - x[i : i + m].mean()) ** 2 for i in range(n - 2 * m + 1)]
-    assert overlapping_variance(x, m) == pytest.approx(np.mean(squares) / 2, rel=1e-9, abs=1e-20)
+    assert overlapping_variance(running_sums(x), m) == pytest.approx(
+        np.mean(squares) / 2, rel=1e-9, abs=1e-20
+    )
 
 
 @settings(deadline=None)
@@ -59,22 +61,22 @@ def test_half_the_mean_square_of_the_differences_of_adjacent_means(n, data, seed
 def test_a_ramp(m, slope, start):
     """R^2 tau^2 / 2, exactly."""
     x = start + slope * np.arange(200)
-    assert overlapping_variance(x, m) == pytest.approx(slope**2 * m**2 / 2, rel=1e-6)
+    assert overlapping_variance(running_sums(x), m) == pytest.approx(slope**2 * m**2 / 2, rel=1e-6)
 
 
 @settings(deadline=None)
 @given(st.integers(1, 40), st.integers(0, 2**32 - 1), st.floats(-1e6, 1e6), st.floats(1e-6, 1e6))
 def test_offset_and_unit(m, seed, offset, unit):
     x = np.random.default_rng(seed).standard_normal(80)
-    assert overlapping_variance(unit * (x + offset), m) == pytest.approx(
-        unit**2 * overlapping_variance(x, m), rel=1e-6
+    assert overlapping_variance(running_sums(unit * (x + offset)), m) == pytest.approx(
+        unit**2 * overlapping_variance(running_sums(x), m), rel=1e-6
     )
 
 
 def test_channels_are_separate():
     x = np.random.default_rng(1).standard_normal((50, 2, 3))
-    one_by_one = [[overlapping_variance(x[:, i, j], 5) for j in range(3)] for i in range(2)]
-    np.testing.assert_allclose(overlapping_variance(x, 5), one_by_one, rtol=1e-12)
+    one_by_one = [[overlapping_variance(running_sums(x[:, i, j]), 5) for j in range(3)] for i in range(2)]
+    np.testing.assert_allclose(overlapping_variance(running_sums(x), 5), one_by_one, rtol=1e-12)
 
 
 def mean_within(samples, expected, sigmas=4.5):
@@ -87,14 +89,14 @@ def mean_within(samples, expected, sigmas=4.5):
 def test_white_noise_averages_out(m):
     """sigma^2 / m, the slope of -1/2 of the deviation."""
     x = 3.0 * np.random.default_rng(2).standard_normal((256, 2000))
-    mean_within(overlapping_variance(x, m), 9.0 / m)
+    mean_within(overlapping_variance(running_sums(x), m), 9.0 / m)
 
 
 @pytest.mark.parametrize("m", [1, 5, 20, 64])
 def test_a_random_walk_grows(m):
     """K^2 tau / 3, with the factor 1 + 1/(2 m^2) of a walk in steps: the slope of +1/2."""
     x = 0.5 * np.cumsum(np.random.default_rng(3).standard_normal((256, 2000)), axis=0)
-    mean_within(overlapping_variance(x, m), 0.25 * m / 3 * (1 + 1 / (2 * m**2)))
+    mean_within(overlapping_variance(running_sums(x), m), 0.25 * m / 3 * (1 + 1 / (2 * m**2)))
 
 
 def test_bias_instability_is_a_floor():
@@ -102,7 +104,7 @@ def test_bias_instability_is_a_floor():
     assert np.sqrt(BIAS_FLOOR) == pytest.approx(0.664, abs=5e-4)
     x = flicker(np.random.default_rng(4), 4096, 400, 0.1, 0.01)
     for m in (16, 64, 256):  # above the few samples in which the simulated band ends
-        mean = overlapping_variance(x, m).mean()
+        mean = overlapping_variance(running_sums(x), m).mean()
         assert mean == pytest.approx(0.01 * BIAS_FLOOR, rel=0.05)
 
 
@@ -113,7 +115,7 @@ def test_bias_instability_is_a_floor():
 def test_degrees_of_freedom_match_the_scatter(m):
     """2 mean^2 / variance of 6000 Allan variances of white noise, itself known to about 3 %."""
     x = np.random.default_rng(5).standard_normal((256, 6000))
-    variance = overlapping_variance(x, m)
+    variance = overlapping_variance(running_sums(x), m)
     assert equivalent_dof(256, m) == pytest.approx(2 * variance.mean() ** 2 / variance.var(), rel=0.15)
 
 
@@ -122,7 +124,7 @@ def test_chi_square_intervals_hold(m, most):
     """95 % intervals of the variance by its degrees of freedom: within 1 %, or wider at a quarter of the record."""
     x = np.random.default_rng(6).standard_normal((200, 6000))
     dof = equivalent_dof(200, m)
-    variance = overlapping_variance(x, m)
+    variance = overlapping_variance(running_sums(x), m)
     low, high = (dof * variance / stats.chi2.ppf(q, dof) for q in (0.975, 0.025))
     held = np.mean((low <= 1 / m) & (1 / m <= high))
     slack = 4 * np.sqrt(0.95 * 0.05 / 6000)
