@@ -265,3 +265,11 @@ def test_independent_errors_of_each_position_are_a_source_each():
         rtol=1e-9,
         atol=1e-9 * np.diag(covariance).min(),
     )
+
+
+@pytest.mark.parametrize("size", [1e-160, 1.0, 1e160])
+def test_effective_degrees_of_freedom_do_not_depend_on_the_unit(size):
+    """Welch-Satterthwaite is homogeneous of degree 0 in the variances, even where their squares leave the range."""
+    sources = [scalar("a", 3.0 * np.sqrt(size), 10.0), scalar("b", 1.0 * np.sqrt(size), 4.0)]
+    _, (dof,), _ = combine(["y"], sources)
+    assert dof == pytest.approx(10.0**2 / (9.0**2 / 10.0 + 1.0 / 4.0), rel=1e-12)

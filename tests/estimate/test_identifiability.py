@@ -55,3 +55,12 @@ def test_a_sum_alone_is_seen():
     assert known.weakest() in [("a - 1.00 b",), ("b - 1.00 a",)]
     assert known.left[0] == pytest.approx(1.0)
     assert known.left[1:].max() < 2e-3
+
+
+def test_what_is_known_beyond_rounding_has_a_finite_condition():
+    """Of eigenvalues below eps of the largest nothing is known but that they are: the square of the condition, their
+    ratio, ends at 1/eps."""
+    found = learned(np.diag([1e-300, 1.0]), np.ones(2), ("a", "b"))
+    assert found.condition**2 == pytest.approx(1.0 / np.finfo(float).eps, rel=1e-12)
+    tame = learned(np.diag([1e-12, 1.0]), np.ones(2), ("a", "b"))
+    assert tame.condition == pytest.approx(1e6, rel=1e-12)

@@ -8,6 +8,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from inercal.geometry import rotations
@@ -193,3 +195,19 @@ def test_loading_the_module_loads_neither_numba_nor_scipy():
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
+
+
+@given(st.floats(-1e6, 1e6))
+def test_the_principal_angle_is_the_same_angle_in_one_turn(angle):
+    """Within (-pi, pi], and off by a whole number of turns."""
+    found = float(rotations.principal(angle))
+    assert -np.pi < found <= np.pi
+    turns = (angle - found) / (2.0 * np.pi)
+    assert turns == pytest.approx(round(turns), abs=1e-9)
+
+
+def test_the_principal_angle_of_an_unknown_one_is_unknown():
+    found = rotations.principal([np.nan, 3.0 * np.pi, -np.pi, np.nextafter(-np.pi, -4.0)])
+    assert np.isnan(found[0])
+    np.testing.assert_allclose(found[1:3], np.pi, rtol=1e-15)
+    assert found[3] > 0.0

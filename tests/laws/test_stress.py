@@ -1,7 +1,7 @@
 """Laws of every run, however absurd its study and its recording: benchmarks/stress.py, 500 runs of each system.
 
 A result is finite, with a covariance that is one and a known status, or the run is refused in one sentence; nothing
-warns, and nothing takes longer than 10 s. The seed was fixed before the first run.
+warns, and nothing takes longer than 30 s. The seed was fixed before the first run.
 """
 
 import sys

@@ -255,7 +255,7 @@ def test_errors_of_each_sample_average_over_the_dwell_where_the_record_shows_it(
         table(scopes=dict.fromkeys(table().factors, Scope.SAMPLE)),
         noise=NOISE,
         dwell=10.0,
-        rate=rate,
+        sample_rate=rate,
     )
     ratios = []
     for seed in range(25):
@@ -465,6 +465,18 @@ def test_errors_whose_squares_matter_are_named():
             noise=1e-4,
         )
         assert [finding.code for finding in run(settings).estimate.findings] == codes
+
+
+@pytest.mark.parametrize(("noise", "codes"), [(None, ["large_errors"]), (NOISE, [])])
+def test_squares_of_errors_that_stay_are_named_where_there_is_no_noise_above_them(noise, codes):
+    """Errors that stay are found with the terms, as well as the noise allows: without any only their squares are left,
+    (1e-3)^2 of earth rate, which no u of first order holds. Noise of 0.01 deg/h is 700 times that."""
+    settings = study(FULL_RANK, table().with_scope(Scope.RIG), noise=noise, earth_rate="stated")
+    made = simulate(
+        replace(settings, instrument=replace(settings.instrument, noise=noise or 0.0)),
+        np.random.default_rng(2),
+    )
+    assert [finding.code for finding in calibrate(made, settings).estimate.findings] == codes
 
 
 def test_a_relative_term_without_its_gain_is_refused():

@@ -13,6 +13,7 @@ from inercal.aoa.filtered import SETTLED, Filtered
 from inercal.aoa.problem import Problem
 from inercal.aoa.recording import Recording
 from inercal.aoa.settings import AoaSettings
+from inercal.estimate.factor import NEGATIVE
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted, counted_names
@@ -62,7 +63,7 @@ def of_fusion(
     state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
     if 2 * known.sum() <= len(known):
         return Status.NOT_CONVERGED, _because(_missing(known), said)
-    if not (np.isfinite(state.x).all() and np.isfinite(state.P).all() and (np.diag(state.P) >= 0.0).all()):
+    if not (np.isfinite(state.x).all() and _is_covariance(state.P)):
         return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
     if mean > NIS_LIMIT:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {NIS_LIMIT:g}"
@@ -83,6 +84,17 @@ def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:
     if 2 * known.sum() <= len(known):
         return Status.NOT_CONVERGED, _because(_missing(known), said)
     return Status.OK, _doubted(f"{angles.method}: {_words(angles)}", said)
+
+
+def _is_covariance(P: Array) -> bool:
+    """Whether no combination of states has a negative variance, but for rounding."""
+    if not (np.isfinite(P).all() and (np.diag(P) >= 0.0).all()):
+        return False
+    u = np.sqrt(np.diag(P))
+    u[u == 0.0] = 1.0
+    with np.errstate(over="ignore"):
+        correlation = P / u / u[:, None]
+    return bool(np.isfinite(correlation).all() and np.linalg.eigvalsh(correlation)[0] >= NEGATIVE)
 
 
 def _lost(recording: Recording, filtered: Filtered) -> str | None:

@@ -256,4 +256,5 @@ def _uncertainty(fit: NonlinearFit, at: _Along, recording: Recording, arw: float
     shared = np.einsum("kip,kpl,kli->ki", S, crossed, C, optimize=True)
     wander = arw**2 * (recording.t - recording.t[0])
     variance = np.einsum("kip,pq,kiq->ki", S, unknowns, S, optimize=True) - 2.0 * shared + wander[:, None]
-    return unknowns, np.sqrt(variance)
+    with np.errstate(invalid="ignore"):  # unknown where a huge wander leaves but rounding
+        return unknowns, np.sqrt(variance)

@@ -44,7 +44,7 @@ def statements(settings: SelfcalSettings) -> list[Statement]:
         return replace(settings, base=replace(base, **change))
 
     by_gravity = (each for each in site.inputs if each.source != "latitude")
-    gravity_u = math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in by_gravity))
+    gravity_u = math.hypot(*(each.u * each.sensitivity for each in by_gravity))
     of_site = [
         Statement(
             "latitude", site.latitude_u, 1e-4, lambda by: replace(settings, site=_moved(site, by)), "deg", _DEG

@@ -198,9 +198,10 @@ def _farthest(found: Readings, fit: Regression) -> str:
 def _too_large(fit: Regression) -> list[Finding]:
     """What is to be said where errors of the table bend the readings by more than their noise."""
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
-    std = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).std
-    # where no noise is left, squares a thousand times below the rest do not matter either
-    limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.square(std).mean(axis=0)))
+    within = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).within
+    # where no noise is left, squares a thousand times below what changes from position to position do not matter
+    # either; errors that stay are found with the terms, and then only their squares are left
+    limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.diagonal(within, axis1=1, axis2=2).mean(axis=0)))
     bent = []
     for error, step in zip(chain.errors, np.diag(chain.std), strict=True):
         ends = [fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0)]

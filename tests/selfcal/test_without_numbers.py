@@ -1,0 +1,149 @@
+"""Where a self-calibration has no numbers to give it says why, instead of giving some."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from paper_study import ARCSEC, DEG, study
+
+from inercal.estimate.budget import combine
+from inercal.estimate.status import Status
+from inercal.geometry.site import GravityInput
+from inercal.selfcal import sources
+from inercal.selfcal.bounds import recorded_bounds
+from inercal.selfcal.coefficients import names, product_slope
+from inercal.selfcal.diagnosis import diagnose
+from inercal.selfcal.filtered import problem
+from inercal.selfcal.filtering import estimate
+from inercal.selfcal.observability import singular
+from inercal.selfcal.outcome import assemble
+from inercal.selfcal.plan import Plan, Turn
+from inercal.selfcal.settings import Filter, Noise
+from inercal.selfcal.simulate import experiment, simulate, to_record
+from inercal.selfcal.stated import stated_errors
+from inercal.selfcal.task import calibrate
+
+SHORT = study(plan=Plan((Turn("x", np.pi), Turn("y", np.pi), Turn("z", np.pi)), rate=6.0 * DEG, step=1.0))
+
+
+def recorded(settings, seed=3):
+    return simulate(experiment(settings), np.random.default_rng(seed)).recording
+
+
+def estimated(settings, made):
+    return calibrate(to_record(made), settings).estimate
+
+
+@pytest.mark.parametrize("kind", ["error-state", "svd-qukf", "mukf", "map", "lm"])
+def test_nothing_measured_tells_nothing(kind):
+    """Commands alone do not tell the coefficients: unobservable, and no fault is named of what was not measured."""
+    settings = replace(SHORT, filter=Filter(kind))
+    made = recorded(settings)
+    made = replace(
+        made, acc=np.full_like(made.acc, np.nan), th=np.vstack([made.th[:1], np.nan * made.th[1:]])
+    )
+    of = problem(settings)
+    by = estimate(made, of)
+    assert diagnose(made, of, by) == []
+    bounds = recorded_bounds(made, of, by.history.attitude, by.coefficients, contributions=True)
+    found = assemble(made, settings, by, bounds, [])
+    assert found.status is Status.UNOBSERVABLE
+    assert "no row after the first has a measurement" in found.message
+    assert not len(found.names)
+
+
+@given(st.lists(st.floats(-12.0, 12.0), min_size=3, max_size=3))
+def test_whether_a_covariance_is_one_does_not_depend_on_units(powers):
+    """C is positive definite if and only if D C D is, for any diagonal D."""
+    unit = 10.0 ** np.array(powers)
+    sound, none = np.array([[1.0, 0.9, 0.1], [0.9, 1.0, 0.2], [0.1, 0.2, 1.0]]), np.ones((3, 3)) - np.eye(3)
+    assert singular(unit, sound * np.outer(unit, unit)) is None
+    status, said = singular(unit, none * np.outer(unit, unit))
+    assert status is Status.ILL_CONDITIONED
+    assert "check their units" in said
+
+
+def test_noise_and_prior_beside_a_prior_in_the_wrong_unit_are_ill_conditioned():
+    """A bias of 1e18 prior u beside encoders of 1e-12: no double holds both."""
+    prior = SHORT.prior.copy()
+    prior[:3] *= 1e14
+    settings = replace(SHORT, prior=prior, noise=Noise(1e-16, 1e-12, 1e-14))
+    found = estimated(settings, recorded(settings))
+    assert found.status in (Status.ILL_CONDITIONED, Status.NOT_CONVERGED)
+    assert not len(found.names)
+
+
+def test_gravity_stated_so_uncertainly_that_no_filter_follows_is_said():
+    site = replace(SHORT.site, inputs=(GravityInput("gravity", 1e12, "m/s^2", 1.0),))
+    found = estimated(replace(SHORT, site=site), recorded(SHORT))
+    assert found.status is Status.ILL_CONDITIONED
+    assert found.message.startswith("gravity: stated so uncertainly")
+
+
+def test_what_is_taken_as_exact_has_an_unknown_effect_where_no_filter_follows(monkeypatch):
+    """An effect that is no number is said in words."""
+    true = sources.estimate
+
+    def lost(*given, **more):
+        return replace(true(*given, **more), coefficients=np.full(18, np.nan))
+
+    monkeypatch.setattr(sources, "estimate", lost)
+    found, exact = sources.stated(recorded(SHORT), SHORT, np.ones(18))
+    assert not found
+    assert set(exact) == {
+        "latitude",
+        "gravity",
+        "heading",
+        "tilt about north",
+        "tilt about east",
+    }
+    assert all(
+        words == f"an unknown error of {name}, as the filter does not follow it"
+        for name, words in exact.items()
+    )
+
+
+def test_the_parts_of_a_covariance_are_symmetric_and_add_up_to_it():
+    """P_noise + P_prior = P of the filter, each equal to its transpose to the last digit."""
+    done = calibrate(to_record(recorded(SHORT)), SHORT)
+    slope = product_slope(done.filtered.coefficients)
+    P = slope @ done.filtered.covariance @ slope.T
+    parts = sources.within(P, done.bounds, SHORT.noise, 100.0)
+    total, _, _ = combine(names(18), parts)
+    for part in parts:
+        u = np.sqrt(np.diag(part.covariance)) + 1e-300
+        np.testing.assert_allclose(
+            part.covariance / np.outer(u, u), part.covariance.T / np.outer(u, u), atol=1e-12
+        )
+    u = np.sqrt(np.diag(P))
+    np.testing.assert_allclose(total / np.outer(u, u), P / np.outer(u, u), atol=1e-6)
+
+
+def test_a_walk_of_the_gyros_beyond_all_bounds_is_no_fit():
+    """lm treats the wander as noise of the measurements: where it is 1e12 rad no angle counts any more."""
+    settings = replace(SHORT, filter=Filter("lm"), noise=replace(SHORT.noise, angle_random_walk=1e12))
+    found = estimated(settings, recorded(SHORT))
+    assert found.status is Status.NOT_CONVERGED
+    assert not len(found.names)
+
+
+def test_a_statement_that_is_not_changed_changes_nothing():
+    """The world at zero of what is stated is the world itself, and each part acts by itself to first order."""
+    site = replace(SHORT.site, inputs=(GravityInput("gravity", 1e-4, "m/s^2", 1.0),), latitude_u=0.1 * DEG)
+    settings = replace(SHORT, site=site, base=replace(SHORT.base, heading_u=10.0 * ARCSEC))
+    cause, of = stated_errors(settings), calibrate(to_record(recorded(settings)), settings).problem
+    n = len(cause.names)
+    made = recorded(settings)
+    at_zero = cause.corrected(made, of, np.zeros(n))[1].world
+    np.testing.assert_array_equal(at_zero.earth, of.world.earth)
+    np.testing.assert_array_equal(at_zero.up, of.world.up)
+    together = cause.corrected(made, of, np.full(n, 0.1))[1].world
+    alone = [cause.corrected(made, of, 0.1 * row)[1].world for row in np.eye(n)]
+    for name in ("earth", "up"):
+        here = getattr(of.world, name)
+        added = here + sum(getattr(each, name) - here for each in alone)
+        np.testing.assert_allclose(
+            getattr(together, name), added, rtol=0.0, atol=1e-14 * np.linalg.norm(here)
+        )
