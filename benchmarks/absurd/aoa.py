@@ -5,7 +5,7 @@ import numpy as np
 from absurd import laws
 from absurd.draws import Draws
 from absurd.faults import spoiled
-from absurd.outcome import Run
+from absurd.outcome import made
 from absurd.stream import streamed
 from inercal.aoa.display import delays, rest_of_fit, use_of_fit
 from inercal.aoa.history import angles_record, points_record
@@ -13,7 +13,7 @@ from inercal.aoa.settings import GYROS, Methods
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.tables import answer, on_page, on_terminal
 from inercal.aoa.task import load_kernels, measure
-from inercal.errors import InercalError, StudyError
+from inercal.errors import StudyError
 from inercal.stream.aoa import Aoa
 from inercal.study.aoa import aoa_study
 
@@ -41,14 +41,7 @@ def load():
 
 def run(rng):
     """One run, by one stream of random numbers."""
-    draws = Draws(rng)
-    done = Run(_study(draws))
-    try:
-        _run(done, draws)
-    except InercalError as error:
-        done.outcome = done.outcome or "recording refused"
-        done.wrong += laws.of_refusal(error)
-    return done
+    return made(_study, _run, rng)
 
 
 def _run(done, draws):

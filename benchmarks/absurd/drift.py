@@ -1,10 +1,8 @@
 """Absurd calibrations on a turntable: tables, positions, terms, noise and readings that nobody would take."""
 
 from absurd import laws
-from absurd.draws import Draws
 from absurd.faults import spoiled
-from absurd.outcome import Run
-from inercal.errors import InercalError
+from absurd.outcome import made
 from inercal.instruments.by_angle import CHANNELS, channel_model
 from inercal.instruments.terms import TERMS
 from inercal.rigs.plans import NAMED
@@ -39,31 +37,27 @@ def load():
 
 def run(rng):
     """One run, by one stream of random numbers."""
-    draws = Draws(rng)
-    done = Run(_study(draws))
-    try:
-        _run(done, draws)
-    except InercalError as error:
-        done.outcome = done.outcome or "recording refused"
-        done.wrong += laws.of_refusal(error)
-    return done
+    return made(_study, _run, rng)
 
 
 def _run(done, draws):
     done.outcome = "study refused"
     settings = turntable_study(done.study, "study.toml")
-    made = simulate(settings, draws.rng)
+    simulated = simulate(settings, draws.rng)
     done.outcome = ""
-    angles = [name for name in made.columns if name.startswith("phi")]
-    outputs = [name for name in made.columns if name in CHANNELS[settings.instrument.kind]]
-    others = [name for name in ("position", "rate") if name in made.columns]
-    record, faults = spoiled(made, draws, [angles, outputs, outputs, others] if others else [angles, outputs])
+    angles = [name for name in simulated.columns if name.startswith("phi")]
+    outputs = [name for name in simulated.columns if name in CHANNELS[settings.instrument.kind]]
+    others = [name for name in ("position", "rate") if name in simulated.columns]
+    record, faults = spoiled(
+        simulated, draws, [angles, outputs, outputs, others] if others else [angles, outputs]
+    )
     done.words += faults
     found = calibrate(record, settings)
     estimate = found.estimate
     done.outcome = estimate.status.value
     done.wrong += laws.of_estimate(estimate)
-    found.shown.table() if isinstance(found, Calibration) else None
+    if isinstance(found, Calibration):
+        found.shown.table()
     tolerances(estimate)
     if done.outcome == "ok" and not faults and isinstance(found, Calibration) and _obeyed(estimate):
         truth = [settings.instrument.coefficients.get(name, _unstated(name)) for name in estimate.names]

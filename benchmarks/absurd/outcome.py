@@ -1,6 +1,10 @@
-"""What became of one run."""
+"""One run, and what became of it."""
 
 from dataclasses import dataclass, field
+
+from absurd import laws
+from absurd.draws import Draws
+from inercal.errors import InercalError
 
 
 @dataclass
@@ -12,3 +16,15 @@ class Run:
     words: list = field(default_factory=list)
     outcome: str = ""
     wrong: list = field(default_factory=list)
+
+
+def made(study, run, rng):
+    """A run by one stream of random numbers: ``run(done, draws)`` on a ``study(draws)``; it may be refused."""
+    draws = Draws(rng)
+    done = Run(study(draws))
+    try:
+        run(done, draws)
+    except InercalError as error:
+        done.outcome = done.outcome or "recording refused"
+        done.wrong += laws.of_refusal(error)
+    return done

@@ -3,11 +3,9 @@
 import numpy as np
 
 from absurd import laws
-from absurd.draws import Draws
 from absurd.faults import spoiled
-from absurd.outcome import Run
+from absurd.outcome import made
 from absurd.stream import streamed
-from inercal.errors import InercalError
 from inercal.selfcal.base_search import stated_well
 from inercal.selfcal.coefficients import GROUPS
 from inercal.selfcal.display import compared, displayed
@@ -55,22 +53,15 @@ def load():
 
 def run(rng):
     """One run, by one stream of random numbers."""
-    draws = Draws(rng)
-    done = Run(_study(draws))
-    try:
-        _run(done, draws)
-    except InercalError as error:
-        done.outcome = done.outcome or "recording refused"
-        done.wrong += laws.of_refusal(error)
-    return done
+    return made(_study, _run, rng)
 
 
 def _run(done, draws):
     done.outcome = "study refused"
     settings = selfcal_study(done.study, "study.toml")
-    made = experiment(settings)
+    planned = experiment(settings)
     done.outcome = ""
-    record = to_record(simulate(made, draws.rng).recording)
+    record = to_record(simulate(planned, draws.rng).recording)
     record, faults = spoiled(record, draws, _COLUMNS)
     if draws.absurd():
         record, more = _measured(record), ["measured rates"]

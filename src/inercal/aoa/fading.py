@@ -42,8 +42,9 @@ def due(before: float, t: float, since: float) -> int:
 def next_due(t: Array, at: int, since: float) -> int:
     """The first row after ``at`` of ``t`` (m,) [s], increasing, before which constants fade; m where none is."""
     passed = max(math.floor((t[at] - since) / STEP), _FIRST) + 1
-    k = int(np.searchsorted(t, since + passed * STEP))
-    while k < len(t) and not due(float(t[k - 1]), float(t[k]), since):  # where rounding has it earlier
+    # rounding may have it a row earlier or later
+    k = max(at + 1, int(np.searchsorted(t, since + passed * STEP)) - 1)
+    while k < len(t) and not due(float(t[k - 1]), float(t[k]), since):
         k += 1
     return k
 
