@@ -4,6 +4,9 @@ RUN := .venv/run/bin
 DEV := .venv/dev/bin
 DEMO := build/demo
 
+# Where it is set, each of the many processes of the tests would parse every module again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test coverage docs bench lock clean
 
 demo: .venv/run/installed

@@ -17,6 +17,9 @@ from importlib.metadata import version
 
 from inercal import __version__
 
+#: processes that are started find modules compiled to bytecode, as those of an installed package are
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 #: seconds of this process on its processors, and seconds on the wall
 PROCESSOR, WALL = time.process_time, time.perf_counter
 

@@ -90,7 +90,7 @@ def of_angles(x, y, z):
 
 
 def joints(y, z):
-    """J (3, 3) of the spec's gimbals."""
+    """J (3, 3), the axes of the joints in the platform."""
     sy, cy, sz, cz = math.sin(y), math.cos(y), math.sin(z), math.cos(z)
     return np.array([[-sz * cy, cz, 0.0], [sy, 0.0, 1.0], [cz * cy, sz, 0.0]])
 

@@ -176,6 +176,15 @@ def test_permissions_follow_the_mask(tmp_path, mask):
     assert (tmp_path / "ours").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
 
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o666])
+def test_permissions_of_a_file_that_is_replaced_stay(old, mode):
+    """What its owner has closed to others is not opened by a new result."""
+    old.chmod(mode)
+    write_text(old, "new")
+    only(old, "new")
+    assert old.stat().st_mode & 0o777 == mode
+
+
 def test_a_link_stays_a_link(tmp_path):
     target, link = tmp_path / "deep" / "target.txt", tmp_path / "link.txt"
     target.parent.mkdir()

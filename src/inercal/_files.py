@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -51,7 +52,7 @@ def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(name, 0o666 & ~_umask())
+        os.chmod(name, _permissions(target))
         os.replace(name, target)
     except OSError as error:
         raise _refused(path, error) from error
@@ -64,6 +65,14 @@ def _refused(path: str | Path, error: Exception) -> InputError:
     """One sentence for what the operating system said."""
     shown = repr(str(path)) if "\0" in str(path) else path
     return InputError(shown, f"cannot be written ({getattr(error, 'strerror', None) or error})")
+
+
+def _permissions(target: Path) -> int:
+    """Those of the file that is replaced: what was private stays so; of a new one those that the mask leaves."""
+    try:
+        return stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        return 0o666 & ~_umask()
 
 
 def _umask() -> int:

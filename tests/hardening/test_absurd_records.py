@@ -15,7 +15,7 @@ PLATFORM = (
     "t [s],wc_x [deg/h],wc_y [deg/h],wc_z [deg/h],th_x [deg],th_y [deg],th_z [deg],"
     "acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]"
 )
-ROWS = 120
+ROWS = 70
 
 
 def columns(name: str) -> np.ndarray:

@@ -107,6 +107,8 @@ def fork(spoil) -> tuple[list[IO[bytes]], int]:
     said = [tempfile.TemporaryFile() for _ in range(2)]  # noqa: SIM115
     if (child := os.fork()) == 0:
         tempfile.mkstemp = MKSTEMP
+        # at the limit Python would keep a compiled module cut off, and fail on it ever after
+        sys.dont_write_bytecode = True
         for target, file in enumerate(said, start=1):
             os.dup2(file.fileno(), target)
         sys.stdout, sys.stderr = (open(n, "w", encoding="utf-8", closefd=False) for n in (1, 2))  # noqa: SIM115

@@ -23,14 +23,22 @@ RUNS, PARTS = 500, 4
 
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("room", stress.ROOMS)
-def test_absurd_runs_end_in_a_sound_result_or_in_words(room, part):
+def test_absurd_runs_end_in_a_sound_result_or_in_words(room, part, monkeypatch):
+    held, of_truth = [], laws.of_truth
+
+    def counted(values, u, truth, names):
+        held.extend(names)
+        return of_truth(values, u, truth, names)
+
+    monkeypatch.setattr(laws, "of_truth", counted)
     stress.load(room)
     share = RUNS // PARTS
     outcomes, wrong, _ = stress.campaign(room, range(part * share, (part + 1) * share))
     assert wrong == []
-    # the draws reach sound results and bad verdicts as well as refusals
+    # the draws reach sound results and bad verdicts as well as refusals, and results that can be held against the truth
     assert {"ok", "study refused", "recording refused"} <= outcomes.keys()
     assert outcomes.keys() & {"unobservable", "not_converged", "inconsistent", "ill_conditioned"}
+    assert held
 
 
 def test_a_run_is_the_same_again():
@@ -57,5 +65,6 @@ def test_the_laws_see_what_is_wrong():
     assert laws.of_estimate(replace(estimate, message="mean NIS nan")) == ["a sentence says nan"]
     assert laws.of_covariance(np.array([[1.0, 2.0], [2.0, 1.0]]), "P")
     assert laws.of_covariance(np.array([[1.0, 0.5], [0.4, 1.0]]), "P") == ["P: not symmetric"]
-    assert laws.of_truth([1.0], np.array([1e-4]), 0.0, ["a"])
+    assert laws.of_truth([1.0], np.array([9e-4]), 0.0, ["a"])
+    assert laws.of_truth([1.0], np.array([1.1e-3]), 0.0, ["a"]) == []
     assert laws.of_refusal(ValueError("found no row"))

@@ -9,7 +9,7 @@ import pytest
 
 from inercal.aoa import lever
 from inercal.convert import other_tools
-from inercal.estimate.runs import Processes
+from inercal.estimate.runs import Serial
 from inercal.estimate.status import Status
 from inercal.geometry import earth, rotations
 from inercal.noise import deviation
@@ -23,13 +23,13 @@ CASES = [case for system in SYSTEMS for case in cases_of(system)]
 
 
 class Kept:
-    """Two processes, and what they found by the number of the system."""
+    """All systems in this process (pages run them in several), and what they found by the number of the system."""
 
     def __init__(self):
         self.found = {}
 
     def map(self, work, chunks):
-        for chunk, results in Processes(2).map(work, chunks):
+        for chunk, results in Serial().map(work, chunks):
             self.found[chunk[0]] = results
             yield chunk, results
 
