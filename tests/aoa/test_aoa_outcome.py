@@ -10,6 +10,7 @@ from sting_study import DEG, G, scenario, study
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.filtered import estimate
+from inercal.aoa.judged import of_rows
 from inercal.aoa.outcome import assemble, assemble_paper
 from inercal.aoa.problem import problem
 from inercal.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
@@ -24,6 +25,7 @@ from inercal.geometry.site import GravityInput, Site
 from inercal.records.findings import Finding
 from inercal.units import Quantity, parse_unit
 
+UNCERTAIN = Site(G, (GravityInput("gravity", 1e-3, "m/s^2", 1.0),))
 SINE = MotionPlan("sine", duration=6.0, mean=30.0 * DEG, amplitude=10.0 * DEG, frequency=1.0)
 
 
@@ -96,11 +98,27 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
     assert by_name["stated zero"] > 0.0
 
 
+@pytest.mark.parametrize("smooth", [False, True])
+def test_the_budget_of_sensors_that_come_late_is_that_of_the_record_from_there_on(smooth, monkeypatch):
+    """Rows without accelerometers, more than are looked at, tell of no angle: they split nothing."""
+    monkeypatch.setattr("inercal.aoa.sources.MOST", 600)
+    settings = study(
+        motion=replace(SINE, sample_rate=250.0), estimator=Estimator(19, smooth=smooth), site=UNCERTAIN
+    )
+    made = simulate(settings, np.random.default_rng(4)).recording
+    made.acc[:660] = np.nan
+    made.gyro[:660] = np.nan
+    late, *_ = assembled(settings, made)
+    from_there, *_ = assembled(settings, of_rows(made, np.arange(660, len(made.t))))
+    for item, other in zip(late.budget, from_there.budget, strict=True):
+        assert item.share == pytest.approx(other.share, rel=1e-5)
+    assert sum(item.share.get("theta", 0.0) for item in late.budget) == pytest.approx(1.0, abs=1e-3)
+
+
 def test_gravity_and_a_stated_roll_widen_the_angle_as_wrong_ones_move_it():
     """A roll of 20 deg that is off by 0.1 deg, and gravity by 1e-3 m/s^2: the filter settles on other angles."""
     roll = Quantity(20.0 * DEG, 0.1 * DEG, parse_unit("rad"), "")
-    uncertain = Site(G, (GravityInput("gravity", 1e-3, "m/s^2", 1.0),))
-    settings = study(motion=SINE, attitude=Attitude(roll=roll), site=uncertain)
+    settings = study(motion=SINE, attitude=Attitude(roll=roll), site=UNCERTAIN)
     result, found, made = assembled(settings)
     told = by_fusion(made, settings, problem(settings), found)
     other = replace(roll, value=roll.value + roll.u)

@@ -1,5 +1,6 @@
 """What one run learned of the sensors, as the prior of the next."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -192,6 +193,50 @@ def test_other_results_are_refused(saved, tmp_path):
             load(tmp_path / "other.json", settings)
     with pytest.raises(InputError):
         load(tmp_path / "missing.json", settings)
+
+
+FIT = {"converged": True, "parameters": [{"name": "S_1", "u": 1e-9}], "unseen": [], "covariance": [[1.0]]}
+
+
+def used(path, settings):
+    """What a run does with an earlier result."""
+    return load(path, settings), corrected(path, settings)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("result", "gravity"), {}),
+        (("result", "gravity"), {"value": "9.8", "u": 0.0, "slopes": {}}),
+        (("result", "verified"), []),
+        (("result", "verified"), {"converged": True}),
+        (("result", "verified"), FIT),
+        (("result", "corrections"), {"a1": {}}),
+        (("result", "corrections"), {"a1": {"scale": 0.0, "angle_rad": 0.0}}),
+        (("conditions", "sensors", "a1", "r_m"), "far"),
+    ],
+)
+def test_a_result_without_its_form_is_refused_in_one_sentence(saved, tmp_path, keys, value):
+    """As where a file was changed by hand: what is missing or of another type is the user's to put right."""
+    path, settings, _ = saved
+    whole = json.loads(path.read_text())
+    table = whole
+    for key in keys[:-1]:
+        table = table[key]
+    table[keys[-1]] = value
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps(whole))
+    with pytest.raises(StudyError, match=r"other\.json does not have the form of a result of aoa"):
+        used(other, settings)
+
+
+def test_what_is_no_covariance_is_refused(saved, tmp_path):
+    path, settings, _ = saved
+    whole = json.loads(path.read_text())
+    whole["covariance"]["matrix"][0][1] = whole["covariance"]["matrix"][1][0] = 1e9
+    (tmp_path / "other.json").write_text(json.dumps(whole))
+    with pytest.raises(StudyError, match="holds a covariance with negative variances"):
+        load(tmp_path / "other.json", settings)
 
 
 TABLE = MotionPlan(

@@ -13,6 +13,7 @@ from inercal.aoa.reading import recording_of
 from inercal.aoa.settings import Calibration
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError
+from inercal.geometry.rotations import principal
 from inercal.records.read import read
 from inercal.records.record import Column, Record, Source
 from inercal.units import parse_unit
@@ -198,6 +199,22 @@ def test_a_gyro_on_a_clock_of_its_own():
     np.testing.assert_array_equal(np.flatnonzero(np.isfinite(slow.gyro)), np.arange(0, 2000, 20))
     with pytest.raises(RecordError, match="a3 has another clock than a1"):
         recording_of(record(clocks={"a3": late}), SHORT)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_reference_that_jumps_by_a_turn_goes_on_over_it(every):
+    """180 deg + 5 deg sin 2 pi t, recorded within +-180 deg: between two samples about the jump there is no 0 deg."""
+    at = T[::every]
+    true = np.pi + 5.0 * DEG * np.sin(2.0 * np.pi * T)
+    ref = principal(true[::every]) / DEG
+    assert np.ptp(ref) > 350.0
+    clocks = {"theta_ref": at} if every > 1 else {}
+    found = recording_of(record(theta_ref=ref, clocks=clocks), SHORT)
+    told = np.isfinite(found.reference)
+    assert told.sum() > 600
+    off = (found.reference - true)[told]
+    np.testing.assert_allclose(off, off[0], atol=1e-6)
+    assert abs(principal(off[0])) < 1e-6
 
 
 def test_fast_on_a_long_record():

@@ -10,10 +10,12 @@ import pytest
 from sting_study import DEG, G, study
 
 from inercal.aoa.angles import Angles, of_fusion
-from inercal.aoa.display import delays, displayed, in_words, rest_of_fit, shown_unit, sized
+from inercal.aoa.corrections import told
+from inercal.aoa.display import delays, displayed, in_words, rest_of_fit, shown_unit, sized, use_of_fit
 from inercal.aoa.filtered import estimate
 from inercal.aoa.outcome import assemble, assemble_paper
 from inercal.aoa.points import points
+from inercal.aoa.posterior import corrected
 from inercal.aoa.problem import problem
 from inercal.aoa.sensor_fit import fit
 from inercal.aoa.settings import Calibration, MotionPlan, Timing
@@ -30,7 +32,7 @@ from inercal.aoa.tables import (
     uncertainty,
 )
 from inercal.aoa.verification import errors
-from inercal.estimate.files import to_json
+from inercal.estimate.files import save, to_json
 
 PAUSES = MotionPlan(
     "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0
@@ -188,14 +190,19 @@ def test_sensors_of_the_conditions_are_told_in_words_with_units(shown):
     assert told["gyro"] == "scale 1, bias 0.1 deg/s"
 
 
-def test_the_fit_to_a_reference_is_a_table():
+@pytest.fixture(scope="module")
+def on_a_table():
     """Two sensors whose axes are off by 0.5 mrad, 0.0286 deg, on a table that turns slowly: no position is seen."""
     sweep = MotionPlan("static", duration=40.0, sample_rate=100.0, first=-10.0 * DEG, last=90.0 * DEG)
     settings = study(motion=sweep)
     off = replace(settings.layout, angle=settings.layout.angle + np.array([5e-4, -5e-4, 0.0]))
     made = simulate(replace(settings, layout=off), np.random.default_rng(5)).recording
     found = fit(made, settings)
-    result, _ = assembled(settings, made, found)
+    return settings, made, found, assembled(settings, made, found)[0]
+
+
+def test_the_fit_to_a_reference_is_a_table(on_a_table):
+    settings, made, found, result = on_a_table
     rows = {row[0]: row[1:] for row in fitted(result).rows}
     assert rows["dlambda_1"][0] == "axis of accelerometer 1, towards down"
     assert float(rows["dlambda_1"][1]) == pytest.approx(0.5, abs=5.0 * float(rows["dlambda_1"][2]))
@@ -205,7 +212,6 @@ def test_the_fit_to_a_reference_is_a_table():
     assert rows["S_1"][3] == "ppm"
     assert rows["zo_1"][1] == rows["tau_g"][1] == "not seen"
     assert set(rows) == {*found.names, ""}
-    assert "prior" in fitted(result).caption
     (short,) = (each for each in on_terminal(result) if each.title == fitted(result).title)
     listed = {row[0] for row in short.rows} - {""}
     assert {"dlambda_1", "dlambda_2"} <= listed < set(found.names)
@@ -220,6 +226,20 @@ def test_the_fit_to_a_reference_is_a_table():
     poor, _ = assembled(settings, made, replace(found, converged=False))
     assert "not to be used" in fitted(poor).caption
     assert "did not converge" in fitted(poor).title
+
+
+@pytest.mark.parametrize(("wider", "used"), [(0.01, True), (1.0, False)])
+def test_a_fit_is_said_to_be_used_where_the_next_run_uses_it(on_a_table, tmp_path, wider, used):
+    """A sweep at one rate does not tell the axes from a delay of the table, so that it leaves them worse known than the
+    fusion its biases; a hundred times as well known they are of use."""
+    settings, _, found, result = on_a_table
+    fit_ = replace(found, covariance=wider**2 * found.covariance)
+    result = replace(result, result={**result.result, "verified": told(fit_)})
+    save(result, tmp_path / "table.json")
+    changed = corrected(tmp_path / "table.json", settings).corrections
+    assert bool(changed) == used
+    assert ("scales and axes are then put right" in use_of_fit(result)) == used
+    assert ("sweep to and fro" in use_of_fit(result)) != used
 
 
 def test_all_tables_of_the_fusion_and_of_a_paper_method(shown):

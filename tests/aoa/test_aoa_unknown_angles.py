@@ -16,7 +16,7 @@ from inercal.aoa.settings import Methods
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.static import gls
 from inercal.aoa.task import measure
-from inercal.aoa.verdict import _is_covariance
+from inercal.aoa.verdict import is_covariance
 from inercal.estimate.status import Status
 
 
@@ -94,6 +94,6 @@ def test_what_is_no_covariance_is_not_taken_for_one(seed):
     P = A @ A.T + 0.1 * np.eye(5)
     values, vectors = np.linalg.eigh(P)
     none = P - 1.1 * values[0] * np.outer(vectors[:, 0], vectors[:, 0])
-    assert _is_covariance(P * np.outer(unit, unit))
-    assert not _is_covariance(none * np.outer(unit, unit))
-    assert not _is_covariance(np.full((2, 2), np.nan))
+    assert is_covariance(P * np.outer(unit, unit))
+    assert not is_covariance(none * np.outer(unit, unit))
+    assert not is_covariance(np.full((2, 2), np.nan))

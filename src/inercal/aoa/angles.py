@@ -39,6 +39,13 @@ class Angles:
         return self.u if self.own_u is None else self.own_u
 
 
+def continuous(theta: Array) -> Array:
+    """Angles (n,) [rad] without jumps of a turn, NaN where there is none."""
+    found, known = theta.copy(), np.isfinite(theta)
+    found[known] = np.unwrap(theta[known])
+    return found
+
+
 def of_fusion(filtered: Filtered, states: int) -> Angles:
     """The angles of the fusion with so many ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
     way = "smoothed" if filtered.smoothed else "fusion"

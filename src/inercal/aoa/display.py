@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.corrections import is_verified
 from inercal.aoa.settings import GYROS
 from inercal.estimate.result import Estimate, in_degrees, rounded
 from inercal.instruments.terms import term
@@ -64,16 +65,10 @@ def displayed(estimate: Estimate) -> Estimate:
 
     All of ``result`` stays as it is.
     """
-    shown = [shown_unit(unit) for unit in estimate.units]
-    size = np.array([size for _, size in shown])
     conditions = in_degrees(estimate.conditions)
     stated = estimate.conditions.get("sensors", {})
     return replace(
-        estimate,
-        units=tuple(unit for unit, _ in shown),
-        values=estimate.values / size,
-        covariance=estimate.covariance / np.outer(size, size),
-        common=None if estimate.common is None else estimate.common / np.outer(size, size),
+        estimate.in_units([shown_unit(unit) for unit in estimate.units]),
         conditions=conditions | {"sensors": {name: _sensor(name, of) for name, of in stated.items()}},
         statistics={_STATISTICS.get(key, key): value for key, value in estimate.statistics.items()},
         budget=tuple(
@@ -104,6 +99,11 @@ def use_of_fit(estimate: Estimate) -> str:
         return ""
     if not fit["converged"]:
         return "The fit of the sensors to theta_ref did not converge: it is not to be used."
+    if not is_verified(estimate):
+        return (
+            "The fit of the sensors to theta_ref knows the scale or the axis of an accelerometer too badly to be of "
+            "use to a next run: sweep to and fro, over more angles, or longer."
+        )
     return (
         'To use the fit to theta_ref: write this result by --out result.json, and put prior = "result.json" under '
         "[estimator] of the study; scales and axes are then put right, and the rest is what is known before."

@@ -278,12 +278,12 @@ def _lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[
     """What lever arms add to the reading of each accelerometer."""
     t, found, layout, roll = seen.recording.t, seen.filtered, settings.layout, settings.attitude.roll
     rate = seen.angles.rate if np.isfinite(seen.angles.rate).any() else seen.recording.gyro
+    level = 1.0 if roll is None else math.cos(roll.value)
     weights = all_weights(layout)
     if found is not None:
         acceleration = found.acceleration
     else:
-        acceleration = np.full(len(t), np.nan) if weights is None else seen.recording.acc @ weights
-    level = 1.0 if roll is None else math.cos(roll.value)
+        acceleration = np.full(len(t), np.nan) if weights is None else seen.recording.acc @ weights / level
     degrees, late = math.degrees(_MG / settings.site.gravity), settled(t)
     panels = []
     for name, q, p in zip(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa import lever, static
-from inercal.aoa.angles import Angles
+from inercal.aoa.angles import Angles, continuous
 from inercal.aoa.arms import all_weights, level_of, tangential_arms
 from inercal.aoa.clock import later
 from inercal.aoa.delay import aligned, relative_delay
@@ -120,10 +120,7 @@ def low_passed(angles: Angles, t: Array, cutoff: float = LOW_PASS) -> Angles:
     bound.
     """
     taken = later(t)
-    theta = angles.theta[taken]
-    known = np.isfinite(theta)
-    theta[known] = np.unwrap(theta[known])
-    smooth = zero_phase(t[taken], theta, cutoff, _ORDER)
+    smooth = zero_phase(t[taken], continuous(angles.theta[taken]), cutoff, _ORDER)
     found = np.full(len(t), np.nan)
     found[taken] = principal(smooth)
     return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=found)
@@ -174,7 +171,7 @@ def _at_stamps(
     )
     tau, tau_u = timing.common_delay, timing.common_delay_u
     if tau or tau_u:
-        slope = np.gradient(_unwrapped(theta), recording.t[taken]) if len(theta) > 1 else np.zeros(len(theta))
+        slope = np.gradient(continuous(theta), recording.t[taken]) if len(theta) > 1 else np.zeros(len(theta))
         moving = np.where(np.isfinite(rate), rate, slope)
         theta = theta + tau * moving + 0.5 * tau**2 * acceleration
         theta = principal(theta)
@@ -184,10 +181,3 @@ def _at_stamps(
     found = np.full((4, len(recording.t)), np.nan)
     found[:, taken] = theta, u, rate, rate_u
     return Angles(label(methods), *found)
-
-
-def _unwrapped(theta: Array) -> Array:
-    """Angles without jumps, NaN where there is none."""
-    found, known = theta.copy(), np.isfinite(theta)
-    found[known] = np.unwrap(theta[known])
-    return found

@@ -136,7 +136,8 @@ def assemble(
     status, message = verdict.of_fusion(recording, filtered, angles, said)
     if status is Status.NOT_CONVERGED:
         return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
-    split = parts(recording, problem, settings, filtered.smoothed)
+    first = int(np.argmax(np.isfinite(filtered.theta)))
+    split = parts(recording, problem, settings, filtered.smoothed, first)
     covariance = P + split.common
     u = np.sqrt(np.diag(covariance))
     rows = zip(names, values.tolist(), u.tolist(), before.tolist(), strict=True)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from inercal.aoa.corrections import is_verified, prior_of
 from inercal.aoa.outcome import COMMAND, geometry
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.stated import carried, gravity_u
+from inercal.aoa.verdict import is_covariance
 from inercal.errors import StudyError
 from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
@@ -53,14 +55,17 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
     StudyError
         It is of another command, holds no coefficients, ended with a bad verdict, or is of other sensors.
     """
-    earlier = _usable(path, settings)
-    names, x, P = (
-        prior_of(earlier, settings)
-        if is_verified(earlier)
-        else (earlier.names, earlier.values, _own(earlier, settings))
-    )
+    with _in_form(path):
+        earlier = _usable(path, settings)
+        names, x, P = (
+            prior_of(earlier, settings)
+            if is_verified(earlier)
+            else (earlier.names, earlier.values, _own(earlier, settings))
+        )
     if not (np.isfinite(x).all() and np.isfinite(P).all()):
         raise StudyError(WHERE, f"{path} holds coefficients without numbers, expected all of them")
+    if not is_covariance(P):
+        raise StudyError(WHERE, f"{path} holds a covariance with negative variances, expected none")
     values = dict(zip(names, x.tolist(), strict=True))
     covariances = {(a, b): float(P[i, j]) for i, a in enumerate(names) for j, b in enumerate(names)}
     return values, covariances
@@ -82,7 +87,18 @@ def corrected(path: str | Path, settings: AoaSettings) -> AoaSettings:
     InputError
         As of `load`.
     """
-    return put_right(_usable(path, settings), settings)
+    with _in_form(path):
+        return put_right(_usable(path, settings), settings)
+
+
+@contextmanager
+def _in_form(path: str | Path) -> Iterator[None]:
+    """Refuse a file whose parts are not what this command writes: it was changed by hand, or by another program."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        text = f"{path} does not have the form of a result of {COMMAND}, expected one as inercal wrote it"
+        raise StudyError(WHERE, text) from error
 
 
 def _usable(path: str | Path, settings: AoaSettings) -> Estimate:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.angles import continuous
 from inercal.aoa.calibrated import at_range, check_axes, check_unit, indication
 from inercal.aoa.clock import later
 from inercal.aoa.fusion import HELD
@@ -94,7 +95,10 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         stated=np.full((len(t), 2), np.nan),
         point=rows.held("point"),
         trigger=rows.held("trigger"),
-        reference=rows.on_rows("theta_ref", record["theta_ref"].si()) if "theta_ref" in record else None,
+        # told without jumps of a turn, which would be interpolated over, and spoil means
+        reference=rows.on_rows("theta_ref", continuous(record["theta_ref"].si()))
+        if "theta_ref" in record
+        else None,
         masked=masked,
         findings=tuple(findings + rows.findings),
         sources=record.sources,

@@ -30,7 +30,8 @@ class Recording:
     stated : (n, 2) rad
         An angle that is known, as at wind-off, and its standard uncertainty; NaN elsewhere.
     point, trigger, reference : (n,) or None
-        Numbers of test points and triggers, to be handed on; the reference angle ``theta_ref`` [rad].
+        Numbers of test points and triggers, to be handed on; the reference angle ``theta_ref`` [rad], without jumps
+        of a turn.
     masked : (n, N + 1) bool or None
         Samples of accelerometers and gyro that were saturated.
     """

@@ -39,7 +39,7 @@ _STEP = 1e-3
 """Relative change of a variance, for its slope."""
 
 MOST = 20_000
-"""Rows that are looked at, from the first on; half of them where they are smoothed."""
+"""Rows that are looked at, from the first with an angle on; half of them where they are smoothed."""
 
 _NOTHING = 1e-5
 """Share of a variance below which a source does nothing."""
@@ -79,12 +79,16 @@ class Parts:
     by_gravity: Array | None = None
 
 
-def parts(recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool) -> Parts:
+def parts(
+    recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool, first: int = 0
+) -> Parts:
     """Split what the fusion says of its uncertainty by where it comes from.
 
-    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same.
+    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``first`` row with an
+    angle: before it, as where sensors are switched on late, there is nothing to split.
     """
-    taken = later(recording.t)[: MOST // 2 if smoothed else MOST]
+    taken = later(recording.t)
+    taken = taken[taken >= first][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.rows[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)

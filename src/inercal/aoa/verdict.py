@@ -63,7 +63,7 @@ def of_fusion(
     state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
     if 2 * known.sum() <= len(known):
         return Status.NOT_CONVERGED, _because(_missing(known), said)
-    if not (np.isfinite(state.x).all() and _is_covariance(state.P)):
+    if not (np.isfinite(state.x).all() and is_covariance(state.P)):
         return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
     if mean > NIS_LIMIT:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {NIS_LIMIT:g}"
@@ -86,7 +86,7 @@ def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:
     return Status.OK, _doubted(f"{angles.method}: {_words(angles)}", said)
 
 
-def _is_covariance(P: Array) -> bool:
+def is_covariance(P: Array) -> bool:
     """Whether no combination of states has a negative variance, but for rounding."""
     if not (np.isfinite(P).all() and (np.diag(P) >= 0.0).all()):
         return False
