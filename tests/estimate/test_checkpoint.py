@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from inercal.errors import InputError
-from inercal.estimate.checkpoint import fingerprint, load, save
+from inercal.estimate.checkpoint import alone, fingerprint, load, save
 
 
 class Inner(NamedTuple):
@@ -149,3 +149,21 @@ def test_fingerprints_tell_settings_apart():
     marks = [fingerprint(each) for each in (base, *others)]
     assert len(set(marks)) == len(marks)
     assert fingerprint({**base, "a": base["a"].copy()}) == marks[0]
+
+
+@pytest.mark.parametrize("another", [True, False])
+def test_the_lock_of_a_run_that_ends_just_then_is_not_taken(another, tmp_path, monkeypatch):
+    """Between opening the file and locking it the other run removes it; a third may have begun with one of its own."""
+    fcntl = pytest.importorskip("fcntl", reason="locks as on POSIX")
+    lock, flock = tmp_path / "c.lock", fcntl.flock
+
+    def late(file, how):
+        lock.unlink()
+        if another:
+            lock.touch()
+        flock(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(InputError, match="c: is in use by another run"), alone(tmp_path / "c"):
+        pass
+    assert lock.exists() == another

@@ -67,6 +67,19 @@ def test_white_innovations_of_even_variance_pass_the_sums_over_blocks():
     assert np.mean(chances < 0.05) < 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 150)
 
 
+@pytest.mark.parametrize("part", [slice(0, 200), slice(700, 1400)])
+def test_white_innovations_that_are_missing_for_long_are_white(part):
+    """A channel that was measured in a part of the recording alone: blocks without it say nothing."""
+    rng = np.random.default_rng(7)
+    chances = []
+    for _ in range(60):
+        x, known = innovations(rng), np.zeros(2000, dtype=bool)
+        known[part] = True
+        x[~known, :3] = np.nan
+        chances.append(whiteness(x))
+    assert np.mean(np.array(chances) < 0.05) < 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 60)
+
+
 def test_correlation_over_one_row_and_over_many_are_both_seen():
     rng = np.random.default_rng(5)
     white = innovations(rng)
@@ -78,6 +91,7 @@ def test_correlation_over_one_row_and_over_many_are_both_seen():
     steady[1:, 0] -= 0.9 * white[:-1, 0]
     for coloured in (near, slow, steady):
         assert whiteness(coloured) < 1e-3
+        assert whiteness(np.vstack([coloured, np.full((8 * len(coloured), DIMS), np.nan)])) < 1e-3
 
 
 def test_columns_that_were_never_measured_are_left_out():

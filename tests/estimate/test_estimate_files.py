@@ -286,6 +286,11 @@ def test_foreign_files(tmp_path, content, suffix):
     refused(path)
 
 
+def test_a_recording_in_the_place_of_a_result_is_told_from_a_damaged_one(tmp_path):
+    (tmp_path / "log.csv").write_text("t [s],acc_x [g]\n0,1\n")
+    assert "log.csv: not valid JSON: " in refused(tmp_path / "log.csv")
+
+
 def test_files_that_are_not_there(tmp_path):
     assert "No such file" in refused(tmp_path / "none.json")
     assert "directory" in refused(tmp_path)

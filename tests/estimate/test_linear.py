@@ -268,7 +268,7 @@ def test_observations_turned_in_their_space(seed):
     assert turned.chi2 == pytest.approx(fit.chi2, rel=1e-9)
 
 
-# Rank: a gyrowheel on a turntable (spec 1, section 5).
+# Rank: a gyrowheel on a turntable.
 
 QUADRATIC = ("DX_F", "DX_X", "DX_Y", "DX_Z", "DX_XX", "DX_YY", "DX_ZZ", "DX_XY", "DX_XZ", "DX_YZ")
 

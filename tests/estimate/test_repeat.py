@@ -143,7 +143,7 @@ def test_a_bad_run_is_left_out_and_gives_the_verdict():
     found = combine_runs([run_of([1.0], [0.01]), bad, run_of([1.2], [0.01])])
     assert found["K0_x"].value == pytest.approx(1.1)
     assert found.status is Status.TOO_FEW_INTERVALS
-    assert found.message == "1 coefficients from 2 runs; run 2 (b.csv) is left out: found 3"
+    assert found.message == "1 coefficient from 2 runs; run 2 (b.csv) is left out: found 3"
     alone = combine_runs([run_of([1.0], [0.01]), bad])
     assert alone.status is Status.TOO_FEW_INTERVALS
     assert alone.message.startswith("run 2 (b.csv): found 3")
@@ -162,7 +162,7 @@ def test_a_change_between_runs_is_claimed_by_chance_no_more_often_than_said():
 
 
 def test_runs_of_another_kind_are_refused():
-    with pytest.raises(InputError, match=r"run 2: found 2 coefficients, .* expected 1 coefficients"):
+    with pytest.raises(InputError, match=r"run 2: found 2 coefficients, .* expected 1 coefficient,"):
         combine_runs([run_of([1.0], [1.0]), run_of([1.0, 2.0], [1.0, 1.0])])
 
 

@@ -202,3 +202,17 @@ def test_parameters_keep_their_order_and_cannot_be_set():
 
 def test_citations_one_a_line():
     assert estimate(references=("first", "second")).citations() == "first\nsecond"
+
+
+def test_other_units_are_other_words_for_the_same():
+    """Intervals and what repeat runs share go with the values; correlations, k and dof stay."""
+    found = estimate(common=np.array([[0.01, 0.02], [0.02, 0.04]]))
+    shown = found.in_units([("mg", 0.00980665), ("km/s^2", 1000.0)])
+    size = np.array([0.00980665, 1000.0])
+    assert shown.units == ("mg", "km/s^2")
+    for before, after, of in zip(found.parameters.values(), shown.parameters.values(), size, strict=True):
+        assert np.multiply(after.interval(), of) == pytest.approx(before.interval(), rel=1e-12)
+        assert (after.k, after.dof) == (before.k, before.dof)
+    np.testing.assert_allclose(shown.correlation, found.correlation, rtol=1e-12)
+    np.testing.assert_allclose(shown.common * np.outer(size, size), found.common, rtol=1e-12)
+    assert estimate().in_units([("g", 9.80665), ("g", 9.80665)]).common is None

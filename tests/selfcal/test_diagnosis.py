@@ -54,6 +54,14 @@ def test_missing_readings_are_no_fault():
     assert named(recording(disturbances=Disturbances(dropouts=0.1))) == []
 
 
+@pytest.mark.parametrize("lost", [slice(300, None), slice(0, 2400)])
+def test_accelerometers_that_are_silent_for_long_are_no_fault(lost):
+    """Their innovations in a ninth of the recording are white; what was not measured is neither too even nor uneven."""
+    made = recording()
+    made.acc[lost] = np.nan
+    assert named(made) == []
+
+
 @pytest.mark.parametrize(
     ("rows", "how"), [(-3, "3 rows earlier"), (-1, "1 row earlier"), (2, "2 rows later")]
 )

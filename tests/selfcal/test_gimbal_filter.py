@@ -135,7 +135,7 @@ def test_the_kernel_is_its_numpy_twin(rig, extended, integration):
 
 @pytest.mark.parametrize("rig", [RIGS[0], RIGS[4], RIGS[8]])
 def test_away_from_lock_it_agrees_with_the_multiplicative_filter(rig):
-    """Representation does not matter: within 0.01 sigma at nominal noise, gimbals in any order (spec: 0.004)."""
+    """Representation does not matter: within 0.004 sigma at nominal noise, gimbals in any order."""
     settings = study(gimbals=Gimbals(*rig))
     given, prepared = problem(settings), experiment(settings)
     for seed in range(3):

@@ -97,7 +97,7 @@ def test_it_converges_from_any_attitude_with_encoders(paper, degrees):
 
 
 def test_it_agrees_with_the_error_state_filter(paper):
-    """Within 0.02 sigma, spec; both are first order in errors of arc seconds."""
+    """Within 0.002 sigma; both are first order in errors of arc seconds."""
     settings, all_runs = paper
     given = problem(settings)
     for run in all_runs:
@@ -189,7 +189,7 @@ def test_extended_truth_is_found():
 
 
 def test_gated_accelerometers_take_no_part(paper):
-    """Rule ``any`` never runs on this path (spec); where the whole step stops nothing is learnt at all."""
+    """Rule ``any`` never runs on this path; where the whole step stops nothing is learnt at all."""
     settings, all_runs = paper
     for stops, dims in (("accelerometers", 3), ("step", 0)):
         given = replace(problem(settings), filter=Filter(gating=Gating("any", stops)))

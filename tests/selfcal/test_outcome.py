@@ -96,7 +96,7 @@ def test_a_wrong_latitude_shifts_the_coefficients_as_the_budget_says(sound):
     share = next(item.share for item in result.budget if item.source == "latitude")
     said = result.u * np.sqrt([share.get(name, 0.0) for name in NAMES])
     np.testing.assert_allclose(np.abs(shift), said, atol=0.02 * result.u.max(), rtol=0.02)
-    # spec: 0.1 deg of latitude is 12 sigma
+    # 0.1 deg of latitude, five times what is stated, is 12 sigma
     by_noise = np.sqrt(np.diag(result.covariance - result.common))
     assert np.max(said / by_noise) * 5.0 == pytest.approx(12.0, rel=0.2)
 

@@ -82,6 +82,15 @@ def test_it_keeps_time_number_and_limits():
     assert multiples == pytest.approx(np.round(multiples))
 
 
+@pytest.mark.parametrize("step", [0.7, 7.0])
+def test_it_keeps_time_where_turns_take_no_whole_number_of_rows(step, monkeypatch):
+    """Sixteen turns of 20 s fill 320 s, but each takes 20.3 or 21 s of rows: a rest fills what is left of one less."""
+    monkeypatch.setattr("inercal.selfcal.pathsearch.STARTS", 1)
+    asked = study("best", search=replace(FEW, time=320.0, angle=np.radians(20.0)))
+    found = search(replace(asked, plan=replace(asked.plan, step=step)))
+    assert 320.0 - step < found.duration <= 320.0
+
+
 def test_stated_limits_let_it_through_gimbal_lock():
     """With nothing but the inner gimbal to turn, it does so as far as it is let, and says that it comes to lock."""
     held = {"th_x": (0.0, 0.0), "th_z": (0.0, 0.0)}

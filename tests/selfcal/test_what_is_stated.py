@@ -7,6 +7,7 @@ import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
 from inercal.estimate.status import Status
+from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput
 from inercal.selfcal.bounds import recorded_bounds
 from inercal.selfcal.diagnosis import diagnose
@@ -15,7 +16,7 @@ from inercal.selfcal.filtering import estimate
 from inercal.selfcal.outcome import assemble, verdict
 from inercal.selfcal.rig import Base
 from inercal.selfcal.simulate import experiment, simulate
-from inercal.selfcal.stated import stated_errors
+from inercal.selfcal.stated import stated_errors, statements
 from inercal.selfcal.unmodelled import filtered, likely, search
 
 PLAIN = study(path="best")
@@ -42,6 +43,23 @@ def with_latitude(settings, degrees, u=0.0):
 def with_tilt(settings, north, east, u=0.0):
     base = Base(tilt=(north * ARCSEC, east * ARCSEC), tilt_u=(u * ARCSEC, u * ARCSEC))
     return replace(settings, base=base)
+
+
+@pytest.mark.parametrize("degrees", [40.0, 89.95, 90.0, -90.0])
+@pytest.mark.parametrize("by", [0.1 * DEG, -0.1 * DEG, 7.0])
+def test_earth_rate_turns_evenly_with_the_latitude_over_the_poles_too(degrees, by):
+    """we (cos L, sin L) to north and up for any L, so that half of the difference of both ways is the derivative."""
+    heading, latitude = 0.3, degrees * DEG + by
+    (stated,) = (
+        each
+        for each in statements(replace(with_latitude(PLAIN, degrees), base=Base(heading=heading)))
+        if each.name == "latitude"
+    )
+    north = np.array(
+        [np.cos(heading), 0.0, -np.sin(heading)]
+    )  # in b: north, up, east of a base turned clockwise
+    expected = EARTH_RATE * (np.cos(latitude) * north + np.sin(latitude) * np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(stated.changed(by).world.earth, expected, atol=1e-14 * EARTH_RATE)
 
 
 def test_worlds_drawn_from_what_is_stated_contradict_nothing():

@@ -121,7 +121,10 @@ def alone(path: str | Path) -> Iterator[None]:
     with file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+            # locked, but no longer the file of that name: its owner has just ended, and removed it
+            if not os.path.samestat(os.fstat(file.fileno()), os.stat(lock)):
+                raise BlockingIOError
+        except (BlockingIOError, FileNotFoundError) as error:
             raise InputError(path, "is in use by another run, expected a checkpoint for each") from error
         except OSError:
             pass  # no locks on this file system

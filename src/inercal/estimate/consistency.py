@@ -77,8 +77,9 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
 
     Two tests of each column, and Bonferroni's inequality over all. Of each lag the sum of products x_k x_(k+lag) over
     the root of the sum of their squares is about standard normal, whatever the variances of the rows; their squares are
-    summed over the ``lags``. Sums over blocks of some rows show what is correlated over longer times: their squares
-    over the mean square, summed, are about chi-square, and can be too large or too small.
+    summed over the ``lags``. Sums over blocks of some rows show what is correlated over longer times: their squares,
+    each over the number of its measurements and the mean square, add up to about chi-square with as many degrees of
+    freedom as there are blocks with measurements, and can be too large or too small.
     """
     from scipy.special import chdtr, chdtrc
 
@@ -89,12 +90,13 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
         total += _ratio(np.square(products.sum(axis=0)), np.square(products).sum(axis=0))
     chances = [chdtrc(lags, total)]
     for size in blocks:
-        count = len(x) // size
-        if count >= 5:
-            parts = np.nan_to_num(x[: count * size]).reshape(count, size, -1)
-            squares = np.square(parts).sum(axis=(0, 1))
-            sums = count * _ratio(np.square(parts.sum(axis=1)).sum(axis=0), squares)
-            chances.append(2.0 * np.minimum(chdtr(count, sums), chdtrc(count, sums)))
+        parts = x[: len(x) // size * size].reshape(-1, size, x.shape[1])
+        rows, parts = np.isfinite(parts).sum(axis=1), np.nan_to_num(parts)
+        count = np.count_nonzero(rows, axis=0)
+        mean_square = _ratio(np.square(parts).sum(axis=(0, 1)), rows.sum(axis=0))
+        sums = _ratio(np.sum(np.square(parts.sum(axis=1)) / np.maximum(rows, 1), axis=0), mean_square)
+        chance = 2.0 * np.minimum(chdtr(count, sums), chdtrc(count, sums))
+        chances.append(np.where(count >= 5, chance, 1.0))
     known = np.isfinite(x).any(axis=0)
     if not known.any():
         return 1.0
@@ -103,4 +105,4 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
 
 def _ratio(a: Array, b: Array) -> Array:
     """a / b, 0 where b is."""
-    return np.divide(a, b, out=np.zeros_like(b), where=b > 0.0)
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

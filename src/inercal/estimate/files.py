@@ -164,6 +164,8 @@ def load(path: str | Path) -> Estimate:
     except KeyError as error:
         hint = "; `inercal convert --from` reads those of other tools"
         raise InputError(path, f"the key {error} is missing, {expected}{hint}") from error
+    except json.JSONDecodeError as error:
+        raise InputError(path, f"not valid JSON: {error}, {expected}") from error
     except (TypeError, AttributeError) as error:
         raise InputError(path, f"does not have the form of one, {expected}") from error
     except (ValueError, OverflowError, RecursionError) as error:

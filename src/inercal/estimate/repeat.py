@@ -141,7 +141,7 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     dof = _dof(alone, weights, spread, np.diag(within) + between, np.diag(covariance))
     names = first.names
     findings = [*_findings(runs), *_changes(first, parts)]
-    status, message = Status.OK, f"{len(names)} coefficients from {counted(len(sound), 'run')}"
+    status, message = Status.OK, f"{counted(len(names), 'coefficient')} from {counted(len(sound), 'run')}"
     if bad is not None:
         status = bad.status
         message += f"; {_where(runs, bad)} is left out: {bad.message}"
@@ -290,7 +290,10 @@ def _where(runs: Sequence[Estimate], run: Estimate) -> str:
 
 def _described(run: Estimate) -> str:
     """The coefficients of a run in a few words."""
-    return f"{len(run.names)} coefficients, {run.names[0]} in {run.units[0]} to {run.names[-1]} in {run.units[-1]}"
+    return (
+        f"{counted(len(run.names), 'coefficient')}, {run.names[0]} in {run.units[0]} to {run.names[-1]} in "
+        f"{run.units[-1]}"
+    )
 
 
 def _inputs(runs: Sequence[Estimate]) -> tuple[Source, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
@@ -111,6 +111,18 @@ class Estimate:
         with np.errstate(divide="ignore", invalid="ignore"):
             matrix = self.covariance / np.outer(u, u)
         return np.where(np.isfinite(matrix), matrix, 0.0)
+
+    def in_units(self, units: Sequence[tuple[str, float]]) -> Estimate:
+        """The estimate with its coefficients in other ``units``: of each the name, and how many of the old it is."""
+        size = np.array([many for _, many in units])
+        square = np.outer(size, size)
+        return replace(
+            self,
+            units=tuple(name for name, _ in units),
+            values=self.values / size,
+            covariance=self.covariance / square,
+            common=None if self.common is None else self.common / square,
+        )
 
     def raise_for_status(self) -> Estimate:
         """Return the estimate itself if its status is ok, else raise `CalibrationError` with the message."""

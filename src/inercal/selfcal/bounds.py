@@ -31,6 +31,12 @@ from inercal.selfcal.recording import Recording
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
 
+BAYESIAN_BOUNDS: Final = (
+    "H. L. Van Trees, K. L. Bell (editors), Bayesian Bounds for Parameter Estimation and Nonlinear Filtering/Tracking, "
+    "Wiley (2007)"
+)
+"""The publication behind these bounds."""
+
 SOURCES: Final = ("angle random walk", "accelerometer", "encoder", "prior")
 """Where the errors of an estimate come from, in the order of `Bounds.contributions`."""
 

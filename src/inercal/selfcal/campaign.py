@@ -16,7 +16,7 @@ from inercal.errors import InputError
 from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.base_search import stated_well
-from inercal.selfcal.bounds import bounds
+from inercal.selfcal.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.selfcal.coefficients import names, product_slope, to_product
 from inercal.selfcal.filtered import Filtered, Problem, problem
 from inercal.selfcal.filtering import estimate, load_kernels
@@ -28,6 +28,13 @@ if TYPE_CHECKING:
     from inercal.estimate.coverage import Coverage, Nees
 
 Array = NDArray[np.float64]
+
+REFERENCES = (
+    BAYESIAN_BOUNDS,
+    "Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, Wiley (2001), "
+    "section 5.4.2",
+)
+"""Publications behind the judgement of many runs."""
 
 AWAY = 0.2
 """|cos thy| above which rows count for the mean NIS: nearer to gimbal lock the encoder noise is overstated."""

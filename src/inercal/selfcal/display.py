@@ -67,14 +67,8 @@ def displayed(estimate: Estimate) -> Estimate:
 
     What has unit 1 in the budget, and all of ``result``, stays as it is.
     """
-    shown = [shown_unit(unit) for unit in estimate.units]
-    size = np.array([size for _, size in shown])
     return replace(
-        estimate,
-        units=tuple(unit for unit, _ in shown),
-        values=estimate.values / size,
-        covariance=estimate.covariance / np.outer(size, size),
-        common=None if estimate.common is None else estimate.common / np.outer(size, size),
+        estimate.in_units([shown_unit(unit) for unit in estimate.units]),
         conditions=in_degrees(estimate.conditions),
         statistics=_in_words(estimate),
         budget=tuple(

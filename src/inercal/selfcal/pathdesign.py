@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.records.findings import Finding
-from inercal.selfcal.bounds import Bounds, bounds
+from inercal.selfcal.bounds import BAYESIAN_BOUNDS, Bounds, bounds
 from inercal.selfcal.filtered import problem
 from inercal.selfcal.observability import Seen, seen
 from inercal.selfcal.pathsearch import LOCK, criterion, search
@@ -20,6 +20,9 @@ from inercal.selfcal.settings import SelfcalSettings
 
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
+
+REFERENCES = (BAYESIAN_BOUNDS,)
+"""Publications behind the judgement of a path."""
 
 
 @dataclass(frozen=True, eq=False)

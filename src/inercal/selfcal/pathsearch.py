@@ -38,6 +38,9 @@ MOST: Final = 5000
 _GRAIN: Final = math.radians(3.0)
 """Largest turn between two rows while searching."""
 
+_EVEN: Final = 1e-6
+"""Part of a row that is rounding."""
+
 
 def criterion(bounds: Bounds, goal: Mapping[str, float], kind: str) -> float:
     """How good a path is; small is good.
@@ -99,13 +102,20 @@ class _Ground:
 
     def plan(self, turns: Sequence) -> Plan:
         """The plan of a sequence."""
+        turning, step = self._turning(turns), self.model.step
+        rest = step * math.floor((self.time - turning.duration) / step + _EVEN)
+        return replace(turning, moves=(*turning.moves, Rest(rest))) if rest > 0.0 else turning
+
+    def _turning(self, turns: Sequence) -> Plan:
+        """The turns alone."""
         moves = tuple(Turn("xyz"[joint], count * self.asked.angle) for joint, count in turns)  # type: ignore[arg-type]
-        rest = self.time - replace(self.model, moves=moves).duration
-        return replace(self.model, moves=(*moves, Rest(rest)) if rest > self.model.step / 2.0 else moves)
+        return replace(self.model, moves=moves)
 
     def fits(self, turns: Sequence) -> bool:
-        """Whether a sequence keeps to number, time and limits."""
-        if not 0 < len(turns) <= self.asked.turns or sum(abs(n) for _, n in turns) > self.number:
+        """Whether a sequence keeps to number, limits and time, of which each turn takes whole rows."""
+        if not 0 < len(turns) <= self.asked.turns:
+            return False
+        if self._turning(turns).duration > self.time + _EVEN * self.model.step:
             return False
         at = [0, 0, 0]
         for joint, count in turns:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.geometry.site import Site
 from inercal.selfcal.filtered import Problem
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.settings import SelfcalSettings
@@ -47,7 +46,7 @@ def statements(settings: SelfcalSettings) -> list[Statement]:
     gravity_u = math.hypot(*(each.u * each.sensitivity for each in by_gravity))
     of_site = [
         Statement(
-            "latitude", site.latitude_u, 1e-4, lambda by: replace(settings, site=_moved(site, by)), "deg", _DEG
+            "latitude", site.latitude_u, 1e-4, lambda by: _moved(settings, by), "deg", _DEG
         ),
         Statement(
             "gravity", gravity_u, 1e-5 * site.gravity,
@@ -71,11 +70,20 @@ def statements(settings: SelfcalSettings) -> list[Statement]:
     ]
 
 
-def _moved(site: Site, by: float) -> Site:
-    """The site at another latitude, with gravity as it was computed from it, if it was."""
+def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
+    """The study at another latitude, with gravity as it was computed from it, if it was.
+
+    Beyond a pole the latitude falls again and north is the other way, so that earth rate goes on turning evenly.
+    """
+    site, base = settings.site, settings.base
     slope = sum(each.sensitivity for each in site.inputs if each.source == "latitude")
-    latitude = min(max((site.latitude or 0.0) + by, -0.5 * math.pi), 0.5 * math.pi)
-    return replace(site, latitude=latitude, gravity=site.gravity + slope * by)
+    latitude = math.remainder((site.latitude or 0.0) + by, 2.0 * math.pi)
+    if abs(latitude) > 0.5 * math.pi:
+        latitude = math.copysign(math.pi, latitude) - latitude
+        base = replace(base, heading=base.heading + math.pi)
+    return replace(
+        settings, site=replace(site, latitude=latitude, gravity=site.gravity + slope * by), base=base
+    )
 
 
 def stated_errors(settings: SelfcalSettings) -> Cause | None:
