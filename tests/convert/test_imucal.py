@@ -97,5 +97,6 @@ def test_what_is_no_file_of_imucal_is_said(tmp_path, change, words):
 @pytest.mark.parametrize("text", ["", "[]", "{}", "[1, 2", "null", '"text"', "{" * 9])
 def test_what_is_not_even_json_of_it_is_said(tmp_path, text):
     (tmp_path / "bad.json").write_text(text)
-    with pytest.raises(InputError, match=r"bad\.json: .*expected a calibration written by imucal"):
+    with pytest.raises(InputError, match=r"bad\.json: .*expected a calibration written by imucal") as caught:
         from_tool([tmp_path / "bad.json"], "imucal")
+    assert ("not valid JSON" in str(caught.value)) == (text in ("", "[1, 2", "{" * 9))

@@ -22,12 +22,12 @@ from inercal.imu.aided.settings import AidedSettings, mounting_of, mountings
 from inercal.imu.aided.simulate import simulate
 from inercal.imu.aided.walk import whiten
 from inercal.imu.settings import ImuSettings
-from inercal.records.record import Record
+from inercal.records.record import Column, Record
 from inercal.report.html import render
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
 from inercal.study.imu_aided import AidedTable, aided_settings
-from inercal.units import parse_unit
+from inercal.units import parse_quantity, parse_unit
 
 CHAIN = turntable("two_axis_turntable", None)
 SEED = 20261121
@@ -315,6 +315,38 @@ def test_encoders_that_wrap_and_are_read_less_often_and_lost_samples_do_no_harm(
     estimate = calibrated(Record(columns))
     assert estimate.status is Status.OK
     assert np.all(np.abs(errors(estimate, true)) < 4.0 * estimate.u)
+
+
+@pytest.mark.parametrize("channels", ["acc gyro phi", "phi", "acc gyro"])
+def test_stray_stamps_are_left_out_and_a_clock_set_back_is_refused(noisy, channels):
+    record, true = noisy
+
+    def on(t):
+        named = tuple(channels.split())
+        return Record({n: replace(c, t=t) if n.startswith(named) else c for n, c in record.columns.items()})
+
+    t = record["acc_x"].t
+    stray = t.copy()
+    stray[[300, 700, 701, -1]] = t[300] + 100.0, t[600], t[601], np.nan
+    estimate = calibrated(on(stray))
+    assert estimate.status is Status.OK
+    assert np.all(np.abs(errors(estimate, true)) < 4.0 * estimate.u)
+    back = np.where(t > 40.0, t - 20.0, t)
+    with pytest.raises(RecordError, match=r"the clock of (acc|phi1) falls back from 40 s to 20\.\d+ s"):
+        calibrated(on(back))
+
+
+def test_the_temperature_is_that_stated_or_else_that_recorded(noisy):
+    columns = dict(noisy[0].columns)
+    t = columns["acc_x"].t
+    columns["temperature"] = Column(
+        "temperature", parse_unit("K"), 295.15 + np.sin(t), t, columns["acc_x"].source
+    )
+    recorded = calibrated(Record(columns)).conditions["temperature"]
+    assert recorded == f"{22.0 + np.sin(t).mean():.1f} degC"
+    stated = parse_quantity("20 degC", "temperature", "temperature")
+    assert calibrated(Record(columns), temperature=stated).conditions["temperature"] == "20 degC"
+    assert calibrated(noisy[0]).conditions["temperature"] is None
 
 
 # faces

@@ -23,7 +23,7 @@ from ferraris_sessions import (
     with_values,
 )
 
-from inercal.errors import InputError, StudyError
+from inercal.errors import InputError, RecordError, StudyError
 from inercal.estimate.status import Status
 from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.carried import carry
@@ -117,6 +117,31 @@ def test_a_gyro_with_its_own_clock(whole):
             assert b[name].value == pytest.approx(a[name].value, rel=2e-3)
     detected = calibrate_ferraris(unlabelled(slow), SETTINGS, OPTIONS)
     assert detected.sections.missing == ()
+
+
+def test_a_gyro_that_was_not_on_in_a_section_is_an_error(whole):
+    """Labels are those of the accelerometers: they say nothing of when a gyro on another clock was read."""
+    last = np.flatnonzero(np.array(whole.labels) == "y_rot")[0]
+    t = whole["gyro_x"].t[:last].copy()
+    columns = {
+        name: replace(column, values=column.values[:last], t=t) if name.startswith("gyro") else column
+        for name, column in whole.columns.items()
+    }
+    short = Record(columns, (), whole.sources, whole.labels)
+    with pytest.raises(RecordError, match="section y_rot has 0 rows of gyro with numbers"):
+        calibrate_ferraris(short, SETTINGS, OPTIONS)
+
+
+def test_a_turn_in_which_the_gyro_rests_is_named(whole):
+    """A coarse gyro reads exactly its bias at rest: there is no largest rate to compare the ends of the turn with."""
+    record = with_values(
+        whole, **{f"gyro_{i}": lambda y: np.round((y - np.median(y)) / 2000.0) for i in "xyz"}
+    )
+    labels = np.array(["" if label == "x_rot" else label for label in record.labels])
+    labels[np.flatnonzero(np.array(record.labels) == "x_rot")[0] - 60 :][:50] = "x_rot"
+    found = calibrate_ferraris(replace(record, labels=tuple(labels.tolist())), SETTINGS, OPTIONS)
+    assert found.estimate.status is Status.INCONSISTENT
+    assert found.estimate.message == "the turn x_rot shows hardly on any axis of gyro: check the sections"
 
 
 # What is missing.

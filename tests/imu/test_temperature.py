@@ -138,6 +138,14 @@ def test_missing_values_are_left_out():
     np.testing.assert_allclose(found.values[:4], TRUTH, rtol=1e-6)
 
 
+def test_a_dead_channel_has_no_curve():
+    T = sweep_of()
+    found = fit_recording(record_of(T, gyro_x=np.full(len(T), 0.25), gyro_y=cubic(T))).estimate
+    assert {name.partition("_T")[0].removesuffix("_hyst") for name in found.names} == {"gyro_y"}
+    with pytest.raises(RecordError, match="gyro_x: never changing, expected a live sensor"):
+        fit_recording(record_of(T, gyro_x=np.full(len(T), 0.25)))
+
+
 def test_a_steady_temperature_is_unobservable_and_a_missing_one_an_error():
     T = 25.0 + 0.01 * np.arange(200)
     found = fit_recording(record_of(T, gyro_x=np.zeros(200)))
@@ -186,6 +194,12 @@ def test_the_covariance_is_that_of_weighted_least_squares_and_gravity_stays_comm
     np.testing.assert_allclose(fit.covariance, own, rtol=1e-6)
     found = fit_calibrations([calibration(x, [cubic(x)], 0.2, 0.5) for x in T], files(6)).estimate
     np.testing.assert_allclose(found.covariance, own, rtol=1e-6)
+
+
+def test_a_coefficient_that_stays_is_explained_as_a_whole():
+    found = fit_calibrations([calibration(x, [1.0]) for x in (0.0, 20.0, 40.0, 60.0)], files(4)).estimate
+    assert found.result["curves"][0]["r2"] == 1.0
+    assert found["K1_x_T1"].value == pytest.approx(0.0, abs=1e-15)
 
 
 def test_scatter_beyond_the_stated_uncertainty_widens_it():
@@ -259,6 +273,9 @@ def test_what_cannot_be_a_series_of_calibrations_is_refused():
     twice = [Source("a.json", "1"), Source("b.json", "2"), Source("copy.json", "1")]
     with pytest.raises(InputError, match=r"copy\.json: holds the same as a file before it"):
         fit_calibrations(three, twice)
+    for u in (0.0, np.nan):
+        with pytest.raises(InputError, match=r"c1\.json: K1_x: states no standard uncertainty above zero"):
+            fit_calibrations([three[0], calibration(20.0, [1.0], u), three[2]], files(3))
     still = fit_calibrations([calibration(20.0 + x, [1.0]) for x in (0, 1, 2)], files(3)).estimate
     assert still.status is Status.UNOBSERVABLE
 

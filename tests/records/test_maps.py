@@ -110,6 +110,7 @@ def test_a_map_gives_channels_options_and_rate(tmp_path):
         (ACC + "[file]\ndelimiter = ','\ndecimal = ','", "file.decimal: found ',', expected another"),
         (ACC + "[file]\nskip = -1", "file.skip: found -1, "),
         ("file = 3", "file: found 3, expected a table"),
+        ("[site]\ngravity = '9.81 m/s^2'", "found a study, which goes behind --study, expected a column map"),
         ("[file.acc]\npath = 'a.csv'", "file.acc: columns: missing, expected a value"),
         ("[file.acc]\n[file.acc.columns.acc_x]\nfrom = 1\nunit = 'g'", "file.acc: path: missing"),
         (

@@ -8,9 +8,13 @@ from turntable_studies import ARCMIN, DEG_H, study, table
 
 from inercal.estimate.status import Status
 from inercal.instruments.by_angle import channel_model
-from inercal.rigs.plans import listed
+from inercal.rigs.distribution import uniform
+from inercal.rigs.plans import grid, listed
+from inercal.rigs.tables import turntable
 from inercal.turntable.model import table_model
+from inercal.turntable.planning import design
 from inercal.turntable.regression import fit
+from inercal.turntable.settings import Design
 from inercal.turntable.task import calibrate, simulate
 
 NOISE = 0.01 * DEG_H
@@ -61,3 +65,13 @@ def test_weights_that_sink_with_the_terms_do_not_settle():
     y = np.random.default_rng(4).normal(size=(6, 2))
     with pytest.raises(np.linalg.LinAlgError, match="do not settle"):
         fit(model, angles, y, [NOISE, NOISE])
+
+
+def test_noise_that_drowns_in_one_error_of_the_table_stops_no_design():
+    """One error that moves both outputs at once leaves them a covariance of rank one but for the noise, which is taken
+    for a millionth of it at least; where the error does not act, that is all there is."""
+    wobbling = turntable("two_axis_turntable", None, {"dphi_y1": uniform(2.0 * ARCMIN)})
+    posed = study(chain=wobbling, noise=1e-13 * DEG_H, terms=("DX_F", "DY_F"))
+    made = design(replace(posed, design=Design(grid((6, 6)), positions=4)))
+    assert made.judged[0].figures.rank == made.judged[0].terms == 1
+    assert np.all(made.judged[0].figures.u < 1e-6 * DEG_H)

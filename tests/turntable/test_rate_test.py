@@ -486,6 +486,8 @@ def test_bad_studies_and_records_get_one_sentence():
         calibrate(record(**{k: v for k, v in good.items() if k != "phi1"}), settings)
     with pytest.raises(RecordError, match="row 2 has no number"):
         calibrate(record(**good | {"gyro_z": ([1, np.nan, 3], "deg/s")}), settings)
+    with pytest.raises(RecordError, match="row 3 has no number for a rate, an angle, an output or its stay"):
+        calibrate(record(**good | {"position": ([1, 1, np.nan], "1")}), settings)
     moving = good | {"phi1": ([0, 0, 9], "deg"), "position": ([1, 2, 2], "1")}
     with pytest.raises(RecordError, match="expected only phi2 to turn"):
         calibrate(record(**moving), settings)

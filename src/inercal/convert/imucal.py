@@ -118,6 +118,8 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
         to_force, to_rate = str(data["acc_unit"]), str(data["gyr_unit"])
     except KeyError as error:
         raise InputError(where, f"the key {error} is missing, {expected}") from error
+    except json.JSONDecodeError as error:
+        raise InputError(where, f"not valid JSON: {error}, {expected}") from error
     except (ValueError, TypeError, RecursionError) as error:
         raise InputError(where, f"{error}, {expected}") from error
     force, rate = parse_unit(to_force, where), parse_unit(to_rate, where)

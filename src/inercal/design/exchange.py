@@ -91,10 +91,23 @@ def exchange(
                 where, f"found none that identifies all of {p} coefficients, expected more positions"
             )
         found.append(np.sort(indices[_improved(W, p, weights, first, repeats)]))
-    values = np.array([criterion.value(covariance(candidates.take(chosen))) for chosen in found])
+    values = np.array([_value(candidates.take(chosen), criterion) for chosen in found])
+    if not np.isfinite(values).any():
+        raise InputError(
+            where,
+            f"found none that tells all of {p} coefficients to working precision, expected more positions",
+        )
     # of determinants as such, whose logarithms may be near zero
     best = _first_least(np.exp(values - values.min()) if criterion.weights is None else values)
     return Design(found[best], float(values[best]), values)
+
+
+def _value(plan: Candidates, criterion: Criterion) -> float:
+    """The criterion of a design; inf where a coefficient is lost to rounding."""
+    try:
+        return criterion.value(covariance(plan))
+    except ValueError:
+        return float("inf")
 
 
 def _scaled(candidates: Candidates, criterion: Criterion) -> tuple[Array, Array | None]:

@@ -20,6 +20,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record, Triad
+from inercal.records.temperature import temperature_words
 
 Array = NDArray[np.float64]
 
@@ -152,21 +153,11 @@ def _conditions(record: Record, recording: Recording, settings: ImuSettings) -> 
         ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
     return {
         "frame": FRAME,
-        "temperature": temperature_words(record, settings),
+        "temperature": temperature_words(record, settings.temperature),
         "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,
     }
-
-
-def temperature_words(record: Record, settings: ImuSettings) -> str | None:
-    """The temperature of the instrument: as stated, else the mean of what was recorded."""
-    if settings.temperature is not None:
-        return settings.temperature.text
-    column = record.columns.get("temperature")
-    if column is None or column.unit.dimension != "temperature" or not np.isfinite(column.values).any():
-        return None
-    return f"{np.nanmean(column.si()):.1f} degC"
 
 
 def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any]]:

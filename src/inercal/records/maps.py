@@ -139,6 +139,8 @@ def read_map(path: str | Path) -> RecordMap:
         Naming the key, what was found and what was expected.
     """
     data = read_toml(path, MapError)
+    if data.keys() & {"site", "rig", "imu"} and not data.keys() & {"columns", "file"}:
+        raise MapError(path, "found a study, which goes behind --study, expected a column map")
     table = data.get("file")
     named = {}
     if isinstance(table, dict):

@@ -22,6 +22,25 @@ from inercal.turntable.settings import TurntableSettings
 
 Array = NDArray[np.float64]
 
+_INDICES = (
+    "I. M. Sobol, Sensitivity estimates for nonlinear mathematical models, Mathematical Modelling and Computational "
+    "Experiment 1 (1993) 407-414",
+    "F. Gamboa, A. Janon, T. Klein, A. Lagnoux, Sensitivity analysis for multidimensional and functional outputs, "
+    "Electronic Journal of Statistics 8 (2014) 575-603",
+)
+
+_BY_METHOD = {
+    "exact": (
+        "A. B. Owen, Sobol' indices and Shapley value, SIAM/ASA Journal on Uncertainty Quantification 2 (2014) 245-251",
+    ),
+    "sampled": (
+        "A. Saltelli et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 "
+        "(2010) 259-270",
+    ),
+    "local": ("JCGM 100:2008, Guide to the expression of uncertainty in measurement",),
+}
+"""What the methods of a study rest on besides."""
+
 
 @dataclass(frozen=True, eq=False)
 class Analysed:
@@ -56,6 +75,11 @@ class Analysed:
     def flagged(self) -> tuple[Flag, ...]:
         """Outputs and positions where interactions rule."""
         return averages.flagged(self.indices)
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The publications behind the indices and the method."""
+        return _INDICES + _BY_METHOD[self.indices.method["name"]]
 
     @property
     def message(self) -> str:

@@ -49,12 +49,8 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
         _per_g(name, *shown_unit(text, unit), gravity)
         for name, text in zip(estimate.names, estimate.units, strict=True)
     ]
-    factor = np.array([size for _, size in shown])
     return replace(
-        estimate,
-        units=tuple(text for text, _ in shown),
-        values=estimate.values / factor,
-        covariance=estimate.covariance / np.outer(factor, factor),
+        estimate.in_units(shown),
         budget=tuple(
             replace(item, u=item.u / size, unit=text)
             for item in estimate.budget

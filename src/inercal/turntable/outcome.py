@@ -17,6 +17,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
+from inercal.records.temperature import temperature_words
 from inercal.turntable.fitting import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.model import orthonormal
 from inercal.turntable.readings import Readings
@@ -103,7 +104,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     unit = found.unit.si
     common: dict[str, Any] = {
         "model": MODELS[settings.instrument.kind],
-        "conditions": _conditions(found, settings),
+        "conditions": _conditions(record, found, settings),
         "traceability": settings.traceability,
         "inputs": record.sources,
         "provenance": provenance(settings.given),
@@ -317,7 +318,7 @@ def _noise(found: Readings, fit: Regression, unit: str) -> list[dict[str, Any]]:
     ]
 
 
-def _conditions(found: Readings, settings: TurntableSettings) -> dict[str, Any]:
+def _conditions(record: Record, found: Readings, settings: TurntableSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid."""
     ranges = {
         f"reading_of_{name}": [low, high]
@@ -327,7 +328,7 @@ def _conditions(found: Readings, settings: TurntableSettings) -> dict[str, Any]:
     }
     return {
         "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
-        "temperature": None if settings.temperature is None else settings.temperature.text,
+        "temperature": temperature_words(record, settings.temperature),
         "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,

@@ -24,10 +24,16 @@ from inercal.turntable.outcome import unit_of_term
 from inercal.turntable.regression import fit, full_inputs, known, worst_rank
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import drift_shares, sphere_rows
-from inercal.turntable.weights import weights
+from inercal.turntable.weights import least_noise, weights
 from inercal.units import Unit
 
 Array = NDArray[np.float64]
+
+REFERENCES = (
+    "R. D. Cook, C. J. Nachtsheim, A comparison of algorithms for constructing exact D-optimal designs, Technometrics "
+    "22 (1980) 315-324",
+)
+"""Publications behind the choice of positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,10 +233,9 @@ def _candidates(
     """What each position tells, with the table's errors or without."""
     noise = np.full(len(model.channels), settings.instrument.noise)
     std = None if table_errors else np.zeros(len(model.chain.errors))
-    weight = weights(model, angles, c, noise, std, _samples(settings, angles))
-    return Candidates(
-        model.symbols, model.rows(angles), weight.within, weight.common if table_errors else None
-    )
+    table = weights(model, angles, c, np.zeros_like(noise), std, _samples(settings, angles))
+    within = table.within + np.diag(np.square(np.maximum(noise, least_noise(table.within))))
+    return Candidates(model.symbols, model.rows(angles), within, table.common if table_errors else None)
 
 
 def _criterion(name: str, model: TableModel) -> Criterion:

@@ -96,10 +96,13 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
         raise RecordError(where, "the angles have another length than rate, expected one table")
     y = np.stack([record[name].values for name in channels], axis=-1) * unit.factor
     table = np.stack(angles, axis=-1)
-    whole = np.isfinite(np.column_stack([rate, table, y])).all(axis=1)
+    number = record["position"].values if "position" in record else still
+    whole = np.isfinite(np.column_stack([rate, table, y, number])).all(axis=1)
     if not whole.all():
         row = int(np.argmin(whole)) + 1
-        raise RecordError(where, f"row {row} has no number for a rate, an angle or an output, expected one")
+        raise RecordError(
+            where, f"row {row} has no number for a rate, an angle, an output or its stay, expected one"
+        )
     groups = _groups(record, len(rate))
     standing = [k for k, name in enumerate(joints) if name != joint]
     for rows in groups:

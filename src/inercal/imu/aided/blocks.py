@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import RecordError
 from inercal.geometry.rotations import skew
+from inercal.imu.aided.stamps import forward
 from inercal.imu.aided.table import Motion
 from inercal.records.checks.values import saturated
 from inercal.records.record import Triad
@@ -72,8 +73,10 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     Raises
     ------
     RecordError
-        Hardly any block lies within the time of the table's angles.
+        Hardly any block lies within the time of the table's angles, or the clock falls back.
     """
+    in_order = forward(triad.t, triad.sensor, triad.source.path)
+    triad = replace(triad, t=triad.t[in_order], values=triad.values[in_order])
     interval = 1.0 / triad.rate
     if not np.isfinite(interval):
         raise RecordError(triad.source.path, f"{triad.sensor} has no increasing time stamps")
@@ -81,9 +84,9 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     length = max(LENGTH, (t[-1] - t[0]) / MOST, 2.0 * motion.step)
     s = max(1, round(length / interval))
     n = len(t) // s
-    steps = np.clip(np.nan_to_num(np.diff(t), nan=np.inf), 0.0, 1.5 * interval)
+    steps = np.clip(np.diff(t), 0.0, 1.5 * interval)
     low, high = t - 0.5 * np.r_[interval, steps], t + 0.5 * np.r_[steps, interval]
-    good = np.isfinite(triad.values).all(axis=1) & np.isfinite(t)
+    good = np.asarray(np.isfinite(triad.values).all(axis=1))
     at_end = {}
     for axis, values in zip("xyz", triad.values.T, strict=True):
         # slow motion and noise reach the same levels without a sharp end

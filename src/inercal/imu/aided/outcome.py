@@ -28,6 +28,7 @@ from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record
+from inercal.records.temperature import temperature_words
 
 Array = NDArray[np.float64]
 
@@ -95,7 +96,7 @@ def assemble(
         statistics=_statistics(fit, rests),
         budget=budget,
         model=MODEL,
-        conditions=_conditions(fit, settings),
+        conditions=_conditions(record, fit, settings),
         traceability=settings.traceability,
         inputs=record.sources,
         provenance=provenance(settings.given),
@@ -178,9 +179,9 @@ def rest_table(fit: Fit, motion: Motion, rests: Array) -> list[Mapping[str, Any]
     return rows
 
 
-def _conditions(fit: Fit, settings: ImuSettings) -> dict[str, Any]:
+def _conditions(record: Record, fit: Fit, settings: ImuSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid, as recorded."""
-    temperature, g = settings.temperature, settings.site.gravity
+    g = settings.site.gravity
     blocks = of_triad(fit, "acc")[0].side.blocks
     ranges: dict[str, Any] = {
         "specific_force_along_an_axis_m_s2": [-g, g],
@@ -192,8 +193,8 @@ def _conditions(fit: Fit, settings: ImuSettings) -> dict[str, Any]:
         ranges["rate_about_an_axis_rad_s"] = [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()]
     return {
         "frame": FRAME,
-        "temperature": None if temperature is None else temperature.text,
-        "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
+        "temperature": temperature_words(record, settings.temperature),
+        "site": {"gravity_m_s2": g, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,
     }

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError
+from inercal.imu.aided.stamps import forward
 from inercal.records.findings import Finding
 from inercal.records.places import counted
-from inercal.records.record import Record
+from inercal.records.record import Column, Record
 from inercal.rigs.chain import Chain, Error, Scope
 
 Array = NDArray[np.float64]
@@ -96,7 +97,7 @@ def motion_of(record: Record, chain: Chain) -> Motion:
     Raises
     ------
     RecordError
-        An angle is missing, or jumps faster than any table turns.
+        An angle is missing, or jumps faster than any table turns; or a clock falls back.
     """
     path = record.sources[0].path if record.sources else "record"
     missing = [name for name in chain.joints if name not in record]
@@ -108,11 +109,11 @@ def motion_of(record: Record, chain: Chain) -> Motion:
         )
     columns = [record[name] for name in chain.joints]
     t = columns[0].t
-    values = np.column_stack([np.interp(t, c.t, c.si()) if c.t is not t else c.si() for c in columns])
-    known = np.isfinite(values).all(axis=1) & np.isfinite(t)
-    t, values = t[known], values[known]
-    rising = np.r_[True, np.diff(t) > 0]
-    t, values = t[rising], values[rising]
+    values = np.column_stack([c.si() if c.t is t else _at(t, c) for c in columns])
+    rows = forward(t, chain.joints[0], path)
+    rows = rows[np.isfinite(values[rows]).all(axis=1)]
+    rows = rows[np.diff(t[rows], prepend=-np.inf) > 0.0]
+    t, values = t[rows], values[rows]
     if len(t) < 10:
         raise RecordError(path, f"found {len(t)} rows with angles, expected the table's angles over the test")
     angles = np.unwrap(values, axis=0)
@@ -136,6 +137,12 @@ def motion_of(record: Record, chain: Chain) -> Motion:
             "passes through, as its encoders give them",
         )
     return Motion(chain, t, angles, path, said)
+
+
+def _at(t: Array, column: Column) -> Array:
+    """The angle of a joint that has a clock of its own, at times ``t`` (n,) [s]; NaN where these are none."""
+    rows = forward(column.t, column.name, column.source.path)
+    return np.asarray(np.interp(t, column.t[rows], column.si()[rows]))
 
 
 def _glitches(angle: Array) -> NDArray[np.int64]:

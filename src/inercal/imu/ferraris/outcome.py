@@ -23,6 +23,7 @@ from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record, Triad
+from inercal.records.temperature import temperature_words
 
 Array = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def assemble(
         },
         budget=budget,
         model=MODEL,
-        conditions=_conditions(triads, errors, settings, options),
+        conditions=_conditions(record, triads, errors, settings, options),
         traceability=settings.traceability,
         inputs=record.sources,
         provenance=provenance(settings.given),
@@ -114,16 +115,20 @@ def _unit(name: str, acc_unit: str, gyro_unit: str) -> str:
 
 
 def _conditions(
-    triads: tuple[Triad, Triad], errors: Propagation, settings: ImuSettings, options: FerrarisSettings
+    record: Record,
+    triads: tuple[Triad, Triad],
+    errors: Propagation,
+    settings: ImuSettings,
+    options: FerrarisSettings,
 ) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid, as recorded."""
     acc, gyro = triads
-    g, temperature = settings.site.gravity, settings.temperature
+    g = settings.site.gravity
     finite = gyro.values[np.isfinite(gyro.values).all(axis=1)]
     t = acc.t[np.isfinite(acc.t)]
     return {
         "frame": FRAME,
-        "temperature": None if temperature is None else temperature.text,
+        "temperature": temperature_words(record, settings.temperature),
         "site": {"gravity_m_s2": g, "latitude_rad": settings.site.latitude},
         "turn_deg": math.degrees(options.turn),
         "date": settings.traceability.get("date", ""),

@@ -144,10 +144,10 @@ def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) ->
             "saturation", f"the gyro saturates in the turn {name}: its integral is too small", where
         )
     largest = float(np.max(np.abs(rate)))
-    edges = [float(np.max(np.abs(part.mean(axis=0)))) / largest for part in (rate[:_EDGE], rate[-_EDGE:])]
-    if max(edges) > CUT:
+    edges = [float(np.max(np.abs(part.mean(axis=0)))) for part in (rate[:_EDGE], rate[-_EDGE:])]
+    if max(edges) > CUT * largest:
         end = "beginning" if edges[0] == max(edges) else "end"
-        code = "poor_section" if max(edges) > MIDST else "turn_cut"
-        part = f"{100 * max(edges):.0f} % of its largest rate"
+        code = "poor_section" if max(edges) > MIDST * largest else "turn_cut"
+        part = f"{100 * max(edges) / largest:.0f} % of its largest rate"
         said = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
         yield Finding(code, said, where)

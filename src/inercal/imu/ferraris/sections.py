@@ -14,7 +14,7 @@ from inercal.imu.ferraris.choice import Choice, choose
 from inercal.imu.ferraris.detection import detect
 from inercal.imu.ferraris.names import NAMES, TURNS
 from inercal.imu.ferraris.settings import FerrarisSettings
-from inercal.records.places import counted_names, places
+from inercal.records.places import counted, counted_names, places
 from inercal.records.record import Record, Triad
 from inercal.units import shown
 
@@ -49,7 +49,7 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
     StudyError
         A section that lies outside the record.
     RecordError
-        Labels that do not belong to the rows, or a turn labelled in several places.
+        Labels that do not belong to the rows, a turn labelled in several places, or a section without samples.
     """
     turns = None
     if options.sections:
@@ -66,13 +66,8 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
         turns = choose(acc, gyro, seen, options)
         spans = seen.positions | {TURNS[axis]: (m.start, m.stop) for axis, m in turns.motions.items()}
         rows = {name: np.arange(start, stop) for name, (start, stop) in spans.items()}
-    known = {name: _finite(found, acc) for name, found in rows.items()}
-    for name, found in known.items():
-        if len(found) < 2:
-            raise RecordError(
-                acc.source.path, f"section {name} has {len(found)} rows of numbers, expected a recording"
-            )
-    other = {name: _finite(_on(gyro, acc, found), gyro) for name, found in known.items()}
+    known = {name: _recorded(name, found, acc) for name, found in rows.items()}
+    other = {name: _recorded(name, _on(gyro, acc, found), gyro) for name, found in known.items()}
     strange = () if options.sections else tuple(sorted(filter(_is_strange, set(record.labels))))
     return Sections(known, other, found_by, turns, strange)
 
@@ -139,9 +134,15 @@ def _rows(name: str, ends: tuple[float, float], acc: Triad) -> Integers:
     return inside
 
 
-def _finite(rows: Integers, triad: Triad) -> Integers:
-    """Rows that hold numbers."""
-    return rows[np.isfinite(triad.values[rows]).all(axis=1) & np.isfinite(triad.t[rows])]
+def _recorded(name: str, rows: Integers, triad: Triad) -> Integers:
+    """Rows of a section that hold numbers; raises `RecordError` where there are hardly any."""
+    found = rows[np.isfinite(triad.values[rows]).all(axis=1) & np.isfinite(triad.t[rows])]
+    if len(found) < 2:
+        raise RecordError(
+            triad.source.path,
+            f"section {name} has {counted(len(found), 'row')} of {triad.sensor} with numbers, expected a recording",
+        )
+    return found
 
 
 def _on(gyro: Triad, acc: Triad, rows: Integers) -> Integers:

@@ -52,10 +52,11 @@ def fit_calibrations(
     Raises
     ------
     InputError
-        Too few, a status other than ok, a calibration without a temperature, or one with other coefficients.
+        Too few, a status other than ok, a calibration without a temperature or a standard uncertainty, or one with
+        other coefficients.
     """
     if len(estimates) < FEWEST:
-        raise InputError(files[0].path, f"found {len(estimates)} calibrations, expected at least {FEWEST}")
+        raise InputError(files[0].path, f"found {len(estimates)}, expected at least {FEWEST} calibrations")
     for number, file in enumerate(files):
         if file.sha256 and file.sha256 in (other.sha256 for other in files[:number]):
             raise InputError(file.path, "holds the same as a file before it, expected each calibration once")
@@ -66,6 +67,12 @@ def fit_calibrations(
         if (estimate.names, estimate.units) != (first.names, first.units):
             raise InputError(
                 file.path, f"found other coefficients or units than in {files[0].path}, expected the same"
+            )
+        unsure = [n for n, u in zip(estimate.names, estimate.u, strict=True) if not 0.0 < u < np.inf]
+        if unsure:
+            raise InputError(
+                file.path,
+                f"{unsure[0]}: states no standard uncertainty above zero, expected that of the value",
             )
     T = np.array([_temperature(estimate, file) for estimate, file in zip(estimates, files, strict=True)])
     if np.ptp(T) < LEAST_SPAN:

@@ -64,8 +64,9 @@ class Curve:
 
     @property
     def explained(self) -> float:
-        """Part of the variance that the cubic explains (R^2)."""
-        return 1.0 - float(np.var(self.cubic.residuals) / np.var(self.values))
+        """Part of the variance that the cubic explains (R^2); all of it where there is none."""
+        whole = float(np.var(self.values))
+        return 1.0 - float(np.var(self.cubic.residuals)) / whole if whole > 0.0 else 1.0
 
     @property
     def change(self) -> float:

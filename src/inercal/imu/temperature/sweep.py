@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError
 from inercal.imu.temperature.cubic import PARTS, fit_sweep
 from inercal.imu.temperature.model import LEAST_SPAN, REFERENCE, Curve, TemperatureModel, assemble, no_span
+from inercal.records.checks.values import is_dead
 from inercal.records.places import counted
 from inercal.records.record import Column, Record
 
@@ -33,6 +34,8 @@ _RISK = 0.01
 
 def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureModel:
     """Fit every accelerometer and gyro channel of a static recording against its temperature channel.
+
+    A channel that never changes is left out: it is dead, as the record's findings say.
 
     Parameters
     ----------
@@ -58,8 +61,11 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
     low, high = float(known.min()), float(known.max())
     if high - low < LEAST_SPAN:
         return TemperatureModel(no_span(low, high, record.sources, record.findings))
-    risk = _RISK / len(channels)
-    curves = tuple(_curve(channel, temperature, reference, risk) for channel in channels)
+    live = [channel for channel in channels if not is_dead(channel.values)]
+    if not live:
+        names = ", ".join(channel.name for channel in channels)
+        raise RecordError(where, f"{names}: never changing, expected a live sensor")
+    curves = tuple(_curve(channel, temperature, reference, _RISK / len(live)) for channel in live)
     what = f"{counted(len(curves), 'channel')} at rest"
     estimate = assemble(
         curves, reference, record.sources, record.findings, {"reference_degC": reference}, what
