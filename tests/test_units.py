@@ -8,6 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import QuantityError
+from inercal.report.style import plain_unit
 from inercal.units import _TABLE, STANDARD_GRAVITY, parse_quantity, parse_unit, shown
 
 UNITS = [(unit, dimension) for dimension, (_, factors) in _TABLE.items() for unit in factors]
@@ -91,10 +92,29 @@ def test_format_and_parse_round_trip(unit_of, value):
         ("º/s", "deg/s"),  # U+00BA, which European keyboards have
         ("° s⁻¹", "deg/s"),
         ("m/s³", "m/s^3"),
+        ("°C", "degC"),
+        ("°F", "degF"),
+        ("µg/√(Hz)", "ug/sqrt(Hz)"),
+        ("°/h/√Hz", "deg/h/sqrt(Hz)"),
     ],
 )
 def test_spellings(typed, meant):
     assert parse_unit(typed) == parse_unit(meant)
+
+
+@pytest.mark.parametrize("unit", [unit for unit, _ in UNITS])
+def test_units_are_read_as_pages_write_them(unit):
+    """What a report states, as N in deg/√h, can be copied into a study."""
+    assert parse_unit(plain_unit(unit)) == parse_unit(unit)
+    if "deg" in unit:
+        assert parse_unit(plain_unit(unit).replace("deg", "°")) == parse_unit(unit)
+
+
+def test_white_noise_of_a_rate_is_a_random_walk_of_its_angle():
+    """60 deg/h/sqrt(Hz) = 60 deg/h sqrt(s) = 60 deg/h sqrt(h)/60 = 1 deg/sqrt(h)."""
+    assert parse_quantity("60 deg/h/√Hz", "angle random walk", "N").value == pytest.approx(
+        parse_quantity("1 deg/√h", "angle random walk", "N").value, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(

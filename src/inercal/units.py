@@ -50,7 +50,7 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
     "angle random walk": (
         "rad/sqrt(s)",
         {"rad/sqrt(s)": 1.0, "deg/sqrt(s)": _DEG, "deg/sqrt(h)": _DEG / 60, "deg/s/sqrt(Hz)": _DEG,
-         "rad/s/sqrt(Hz)": 1.0},
+         "deg/h/sqrt(Hz)": _DEG / 3600, "rad/s/sqrt(Hz)": 1.0},
     ),
     "velocity random walk": (
         "m/s/sqrt(s)",
@@ -90,11 +90,9 @@ _ALIASES = {
     "sec": "s",
     "seconds": "s",
     "hz": "Hz",
-    "°": "deg",
     "degrees": "deg",
     '"': "arcsec",
     "'": "arcmin",
-    "m°": "mdeg",
     "mGrad": "mdeg",
     "Grad": "deg",  # the German degree, to pint a billion rad
     "dps": "deg/s",
@@ -102,13 +100,8 @@ _ALIASES = {
     "Grad/s": "deg/s",
     "Grad/h": "deg/h",
     "mGrad/s": "mdeg/s",
-    "m°/s": "mdeg/s",
-    "°/s": "deg/s",
-    "°/h": "deg/h",
-    "°/√h": "deg/sqrt(h)",
     "deg/hr": "deg/h",
     "deg/rt(h)": "deg/sqrt(h)",
-    "°C": "degC",
     "C": "degC",
     "rads": "rad/s",
     "G": "g",
@@ -175,7 +168,8 @@ def parse_unit(text: str, where: object = "unit", dimension: str | None = None) 
         The text is no unit known here or to pint.
     """
     plain = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), text.strip())
-    plain = plain.translate(_SIGNS).replace("**", "^").replace("s2", "s^2")
+    plain = plain.translate(_SIGNS).replace("°", "deg").replace("**", "^").replace("s2", "s^2")
+    plain = re.sub(r"√\s*\(?\s*([^\W\d]+)\s*\)?", r"sqrt(\1)", plain)
     plain = re.sub(r"\s*([*/^()])\s*", r"\1", plain)
     plain = re.sub(r"\s+", "*", plain)
     plain = re.sub(r"\*([^\W\d]+)\^-(\d)\b", r"/\1^\2", plain)

@@ -224,6 +224,7 @@ def test_the_result_of_one_run_is_the_prior_of_the_next(capsys):
     for p in data["parameters"]:
         assert p["u"] <= before[p["name"]] * (1.0 + 1e-9)
         assert data["result"]["posterior"][p["name"]]["prior"] <= before[p["name"]] * (1.0 + 1e-6)
+    assert [each["path"] for each in data["inputs"]] == ["bare.csv", "aoa.toml", "run1.json"]
 
 
 def test_files_with_distinct_channels_are_one_record(capsys):
@@ -321,6 +322,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
         (["aoa", "model.csv", "--study", "model.csv"], ["model.csv"]),
         ([*AOA, "--set", "sensors.a1.axis=+y"], ["sensors.a1.axis", "+y"]),
         ([*AOA, "--set", "estimator.prior=none.json"], ["none.json"]),
+        ([*AOA, "--set", "estimator.prior=p.json", "--out", "p.json"], ["p.json", "is an input"]),
         ([*AOA, "--set", "model.roll=90 deg"], ["aoa.toml", "model.roll", "90 deg"]),
         ([*AOA, "--set", "model.roll=90 deg", "--stream"], ["aoa.toml", "model.roll", "90 deg"]),
         ([*AOA, "--set", "estimator.stats=8"], ["estimator.stats", "states"]),

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import tomllib
+from itertools import pairwise
 
 import pytest
 
@@ -81,6 +82,26 @@ def test_common_options_are_where_they_apply(helps):
         assert ("--map" in given) == (command in READ_A_RECORD), command
         assert ("--set" in given) == (command in READ_A_STUDY), command
     assert set(helps) >= READ_A_RECORD | READ_A_STUDY | WITHOUT_A_FILE
+
+
+def test_a_help_is_broken_once_at_the_width_of_the_terminal(capsys, monkeypatch):
+    """What does not fit goes on further in, and the words are those of the line that is not broken."""
+    told = {}
+    for width in (80, 500):
+        monkeypatch.setenv("COLUMNS", str(width))
+        told[width] = []
+        for words in ([], ["aoa"], ["validate"]):
+            assert run([*words, "--help"]) == 0
+            told[width].append(capsys.readouterr().out)
+    for narrow, wide in zip(told[80], told[500], strict=True):
+        assert narrow.split() == wide.split()
+        lines = re.search(r"^(Commands|Parameters):\n(.*?)\n\n", narrow, re.DOTALL | re.MULTILINE)[2].split(
+            "\n"
+        )
+        assert all(re.match(r"  \S|    \S", line) and len(line) <= 80 for line in lines)
+        for line, after in pairwise(lines):
+            if after.startswith("    "):
+                assert len(line) + 1 + len(after.split()[0]) > 80, line
 
 
 def test_every_help_has_one_shape(helps):
@@ -186,6 +207,13 @@ def test_every_name_in_a_result_has_a_row_in_the_table_of_terms(results):
 
 def test_a_name_that_no_command_gives_has_no_row():
     assert [term(name) for name in ("K9_x", "b_", "N_", "gyro_w", "K0_x_T9", "dr_x")] == [None] * 6
+
+
+def test_every_result_of_a_method_says_what_it_rests_on(results):
+    """Also that of a command that estimates nothing; a look at a file has no method."""
+    assert [command for command, (data, _) in results.items() if not data["references"]] == ["inspect"]
+    for data, page in results.values():
+        assert (">References</h" in page) == bool(data["references"])
 
 
 @pytest.mark.parametrize("section", ["Findings", "How it was done", "Command and settings", "Inputs"])

@@ -22,7 +22,7 @@ gravity = "9.80665 m/s^2"
 [rig]
 kind = "sting"
 [sensors.a1]
-axis = "-z"                      # or angle = "90 deg", lambda of spec 3
+axis = "-z"                      # or angle = "90 deg", lambda
 r = "-0.25 m"
 z = "0 m"
 scale = "1"                      # optional: scale, bias, range, temperature terms, or calibration = "file"

@@ -12,7 +12,7 @@ from sting_study import DEG, G
 from sting_text import calibrated, same, study, with_sensor
 
 from inercal.aoa.settings import Calibration
-from inercal.errors import StudyError
+from inercal.errors import InputError, StudyError
 from inercal.study.schema import json_schema
 from inercal.study.sensors import MOST
 
@@ -112,6 +112,16 @@ def test_calibrations_that_do_not_fit(tmp_path):
         StudyError, match=r"sensors\.gyro\.calibration: found no S_x and D_F_x, .. in two.json"
     ):
         with_sensor(where, "gyro", calibration="two.json")
+    for scale, offset, unit, words in (
+        (0.0, 1.0, "g", "found K1_x = 0 and K0_x = 1 in one.json, expected a scale factor and an offset"),
+        (1e-320, 1.0, "g", "expected a scale factor and an offset"),
+        (1.0, math.nan, "g", "found K1_x = 1 and K0_x = nan"),
+        (1.0, 0.0, "deg", "found K0_x in deg, expected a unit of acceleration, V or count"),
+        (1.0, 0.0, "junk", r"s\.toml: sensors\.a1\.calibration: found the unit 'junk'"),
+    ):
+        calibrated(tmp_path / "one.json", K0_x=(offset, unit), K1_x=(scale, "1"))
+        with pytest.raises(InputError, match=words):
+            with_sensor(where, scale=None, calibration="one.json")
 
 
 def test_more_accelerometers_and_gyros():

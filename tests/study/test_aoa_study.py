@@ -3,11 +3,12 @@
 import json
 import math
 import tomllib
+from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
 from sting_study import DEG, SCENARIOS, G, scenario
-from sting_text import CONTRACT, WRITTEN, same, study
+from sting_text import CONTRACT, WRITTEN, calibrated, same, study
 
 from inercal.aoa.settings import (
     AoaSettings,
@@ -21,7 +22,13 @@ from inercal.aoa.settings import (
     Zero,
 )
 from inercal.errors import StudyError
-from inercal.study.load import load_aoa_study, load_imu_study, load_selfcal_study, load_turntable_study
+from inercal.study.load import (
+    files_of,
+    load_aoa_study,
+    load_imu_study,
+    load_selfcal_study,
+    load_turntable_study,
+)
 from inercal.study.schema import json_schema
 
 SCHEMA = json_schema()
@@ -250,6 +257,17 @@ def test_set_of_an_angle_takes_the_place_of_the_axis(write):
     assert found.site.gravity == 9.81
 
 
+def test_set_of_a_calibration_takes_the_place_of_scale_and_bias_and_back(write, tmp_path):
+    file = tmp_path / "a1.json"
+    calibrated(file, K0_x=(0.0, "g"), K1_x=(2.0, "g/(m/s^2)"), K0_y=(0.0, "g"), K1_y=(4.0, "g/(m/s^2)"))
+    stated = CONTRACT.replace('scale = "1"', 'scale = "1"\nbias = "3 mg"')
+    by_file = [f"sensors.a1.calibration={file}", "sensors.a1.channel=y"]
+    found = load_aoa_study(write(stated), by_file).calibration("a1")
+    assert (found.scale, found.bias) == pytest.approx((0.25 / G, 0.0))
+    back = load_aoa_study(write(stated), [*by_file, "sensors.a1.bias=1 g"]).calibration("a1")
+    assert (back.scale, back.bias) == pytest.approx((1.0, G))
+
+
 def test_studies_of_other_commands_are_told_apart(write):
     for load in (load_imu_study, load_turntable_study, load_selfcal_study):
         with pytest.raises(StudyError, match=r"rig\.kind: found 'sting', a study for `inercal aoa`"):
@@ -260,3 +278,18 @@ def test_studies_of_other_commands_are_told_apart(write):
         load_aoa_study(write('[site]\nlatitude = "1 deg"\n[imu]\n'))
     with pytest.raises(StudyError, match="a study for `inercal selfcal`, expected one for `inercal aoa`"):
         load_aoa_study(write('[rig]\nkind = "three_axis_gimbals"\n'))
+
+
+def test_the_files_that_a_study_names():
+    """Those of sensors, prior and motion, beside the study; what a command does not read can be left out."""
+    given = {
+        "sensors": {"a1": {"axis": "-z", "calibration": "cal/a1.json"}, "a2": {"axis": "+x"}},
+        "estimator": {"prior": "last.json"},
+        "motion": {"kind": "file", "file": "pitch.csv"},
+        "traceability": {"calibration": "no file"},
+    }
+    of = Path("rig/aoa.toml")
+    read, left = Path("rig/cal/a1.json"), {"motion": "last.json", "estimator": "pitch.csv"}
+    assert files_of(of, given) == (of, read, Path("rig/last.json"), Path("rig/pitch.csv"))
+    for table, other in left.items():
+        assert files_of(of, given, unread=table) == (of, read, of.with_name(other))

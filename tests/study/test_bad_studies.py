@@ -78,6 +78,10 @@ def load(tmp_path):
         ),
         ('[rig]\nkind = "two_axis_turntable"', "a study for `inercal calibrate turntable`"),
         ("rig = 5\n" + SITE, "rig: unknown key"),
+        (
+            "[columns.t]\nfrom = 0\nunit = 's'\n",
+            "found a column map, which goes behind --map, expected a study",
+        ),
         (SITE + "[rig]\nkind = []", "rig: unknown key"),
         ("t [s],acc_x [m/s^2]\n0,1\n", "not valid TOML"),
     ],

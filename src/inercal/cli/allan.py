@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import Files, MapFile, ReportOutput, read_record, working
-from inercal.cli.outcome import hand_over
+from inercal.cli.outcome import WHOLE, hand_over
 
 
 def allan(
@@ -27,7 +27,7 @@ def allan(
     from inercal.report.allan import curves_csv, page, table
     from inercal.units import parse_quantity
 
-    output.check((".json", ".toml", ".csv"), (*files, map_file))
+    output.check((*WHOLE, ".csv"), (*files, map_file))
     span = {
         name: None if text is None else parse_quantity(text, "time", f"--{name}").value
         for name, text in (("begin", begin), ("end", end))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
-from inercal.cli.outcome import hand_over
+from inercal.cli.outcome import WHOLE, hand_over
 from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
 from inercal.errors import InputError, StudyError
 
@@ -119,10 +119,12 @@ def aoa(
     from inercal.aoa.task import load_kernels, measure
     from inercal.records.read import source_of
     from inercal.records.write import SUFFIXES
-    from inercal.study.load import load_aoa_study
+    from inercal.study.load import files_of, load_aoa_study
 
-    output.check((".json", ".toml", *SUFFIXES), (*paths, map_file, study))
+    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     settings = load_aoa_study(study, keys)
+    studied = files_of(study, settings.given, unread="motion")
+    output.spare(studied)
     methods = how.methods(settings)
     clock = time.perf_counter()
     record = _one_run(read_repeats(paths, map_file, output))
@@ -133,7 +135,7 @@ def aoa(
     with of_study(study), working(output) as progress:
         found = measure(record, settings, methods, how.compare, progress)
     timing = {"read": read_s, "solve": found.estimate.timing["solve"]}
-    inputs = (*found.estimate.inputs, source_of(study))
+    inputs = (*found.estimate.inputs, *map(source_of, studied))
     found = replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs))
     return _handed_over(found, how, output)
 

@@ -20,7 +20,7 @@ from inercal.cli.options import (
     read_repeats,
     working,
 )
-from inercal.cli.outcome import hand_over, printed
+from inercal.cli.outcome import WHOLE, hand_over, printed
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -156,7 +156,7 @@ def _solve(
     from inercal.records.read import source_of
     from inercal.study.load import files_of
 
-    output.check((".json", ".toml"), (*files, map_file, study))
+    output.check(WHOLE, (*files, map_file, study))
     told = settings()
     studied = files_of(study, told.given)
     output.spare(studied)

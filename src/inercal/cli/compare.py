@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import ReportOutput
-from inercal.cli.outcome import hand_over
+from inercal.cli.outcome import WHOLE, hand_over
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -32,7 +32,7 @@ def compare(
     from inercal.records.read import source_of
     from inercal.report.comparison import page, table
 
-    output.check((".json", ".toml"), (first, second))
+    output.check(WHOLE, (first, second))
     clock = time.perf_counter()
     files = [Saved(load(path), str(path)) for path in (first, second)]
     inputs = (source_of(first), source_of(second))

@@ -49,6 +49,7 @@ def design_positions(
     """Find the positions of a turntable that calibrate best."""
     from inercal._files import write_text
     from inercal.study.load import files_of, load_turntable_study
+    from inercal.turntable.planning import REFERENCES
     from inercal.turntable.task import design
 
     output.check((*WHOLE, ".csv"), (study,))
@@ -61,7 +62,7 @@ def design_positions(
     with of_study(study), working(output) as progress:
         designed = design(settings, progress)
     timing = {"read": read_s, "solve": time.perf_counter() - clock}
-    estimate = _told("design positions", designed, timing, inputs, settings)
+    estimate = _told("design positions", designed, timing, inputs, settings, REFERENCES)
 
     def page() -> str:
         from inercal.turntable.figures import design_page
@@ -86,7 +87,7 @@ def design_selfcal(
     from inercal._jit import compiling
     from inercal.selfcal.bounds import bounds
     from inercal.selfcal.filtered import problem
-    from inercal.selfcal.pathdesign import design
+    from inercal.selfcal.pathdesign import REFERENCES, design
     from inercal.selfcal.plan import Plan, Rest, motion
     from inercal.study.load import load_selfcal_study
 
@@ -101,7 +102,7 @@ def design_selfcal(
         with reading(output, "searching") as progress:
             designed = design(settings, *(() if progress is None else (progress,)))
     timing = {"read": read_s, "solve": time.perf_counter() - clock}
-    estimate = _told("design selfcal", designed, timing, (study,), settings)
+    estimate = _told("design selfcal", designed, timing, (study,), settings, REFERENCES)
 
     def page() -> str:
         from inercal.selfcal.figures import design_page
@@ -120,13 +121,20 @@ def _told(
     timing: Mapping[str, float],
     inputs: Iterable[Path],
     settings: TurntableSettings | SelfcalSettings,
+    references: tuple[str, ...],
 ) -> Estimate:
     """What was designed as a result."""
     from inercal.records.read import source_of
 
-    sources = map(source_of, inputs)
     return told(
-        command, designed.message, designed.result, sources, designed.findings, timing, settings.given
+        command,
+        designed.message,
+        designed.result,
+        map(source_of, inputs),
+        designed.findings,
+        timing,
+        settings.given,
+        references=references,
     )
 
 

@@ -28,6 +28,7 @@ def told(
     timing: Mapping[str, float] | None = None,
     settings: Mapping[str, Any] | None = None,
     seed: int | None = None,
+    references: tuple[str, ...] = (),
 ) -> Estimate:
     """What a command that estimates no coefficients brings back: the one type of result, ended well.
 
@@ -45,6 +46,7 @@ def told(
         findings=tuple(findings),
         timing=timing or {},
         provenance={} if settings is None else {**provenance(settings), "seed": seed},
+        references=references,
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
-from inercal.cli.outcome import hand_over, printed
+from inercal.cli.outcome import WHOLE, hand_over, printed
 from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
 from inercal.errors import InputError
 
@@ -61,7 +61,7 @@ def selfcal(
     from inercal.selfcal.task import calibrate, load_kernels
     from inercal.study.load import load_selfcal_study
 
-    output.check((".json", ".toml", *SUFFIXES), (*paths, map_file, study))
+    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     settings = load_selfcal_study(study, keys)
     clock = time.perf_counter()
     records = read_repeats(paths, map_file, output)

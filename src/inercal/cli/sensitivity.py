@@ -39,6 +39,7 @@ def sensitivity(
         map(source_of, inputs),
         timing={"read": read_s, "solve": analysed.solve},
         settings=settings.given,
+        references=analysed.references,
     )
 
     def page() -> str:

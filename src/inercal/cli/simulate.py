@@ -93,12 +93,11 @@ def simulate_aoa(
     """Simulate a wind-tunnel model that moves as its study plans."""
     from inercal.aoa.simulate import simulate as simulate_run
     from inercal.aoa.simulate import to_record
-    from inercal.study.load import load_aoa_study
+    from inercal.study.load import files_of, load_aoa_study
 
     _check(study, seed, output)
     settings = load_aoa_study(study, overrides or ())
-    plan = settings.motion
-    inputs = (study,) if plan is None or plan.path is None else (study, plan.path)
+    inputs = files_of(study, settings.given, unread="estimator")
     output.spare(inputs)
 
     def simulate(rng: Generator) -> Record:
@@ -112,7 +111,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
     from inercal._jit import compiling
     from inercal.estimate.status import Status
     from inercal.records.read import source_of
-    from inercal.selfcal.campaign import campaign
+    from inercal.selfcal.campaign import REFERENCES, campaign
     from inercal.selfcal.filtered import problem
     from inercal.selfcal.filtering import load_kernels
     from inercal.study.load import load_selfcal_study
@@ -129,9 +128,15 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
         with reading(output, "simulating") as progress:
             found = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
     timing = {"solve": time.perf_counter() - clock}
-    sources = [source_of(study)]
     estimate = told(
-        "simulate selfcal", found.message, found.result, sources, (), timing, settings.given, seed
+        "simulate selfcal",
+        found.message,
+        found.result,
+        [source_of(study)],
+        timing=timing,
+        settings=settings.given,
+        seed=seed,
+        references=REFERENCES,
     )
     estimate = estimate if found.passed else replace(estimate, status=Status.INCONSISTENT)
 

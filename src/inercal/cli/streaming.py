@@ -145,7 +145,9 @@ def _opened(file: Path | None) -> Any:
     try:
         return file.open("rb")
     except OSError as error:
-        raise RecordError(file, f"cannot be read ({error.strerror or error})") from error
+        raise RecordError(
+            file, f"cannot be read ({error.strerror or error}), expected a header and lines of numbers"
+        ) from error
 
 
 def _write(text: str) -> None:

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import MapFile, ReportOutput, read_record
-from inercal.cli.outcome import hand_over, printed
+from inercal.cli.outcome import WHOLE, hand_over, printed
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
     from inercal.imu.temperature.model import TemperatureModel
-
-_CALIBRATIONS = (".json", ".toml")
 
 
 def temperature(
@@ -36,9 +34,9 @@ def temperature(
     from inercal.units import parse_quantity
 
     reference = parse_quantity(at, "temperature", "--at").value
-    output.check((".json", ".toml"), (*files, map_file))
+    output.check(WHOLE, (*files, map_file))
     clock = time.perf_counter()
-    if all(file.suffix.lower() in _CALIBRATIONS for file in files):
+    if all(file.suffix.lower() in WHOLE for file in files):
         if map_file is not None:
             raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
         model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock

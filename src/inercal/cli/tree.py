@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
+from cyclopts.help import PlainFormatter
 
 from inercal import __version__
 from inercal.errors import UsageError
+
+if TYPE_CHECKING:
+    from cyclopts.help import HelpPanel
+    from rich.console import Console, ConsoleOptions
 
 #: verb, kind -> where it is, what it does, an example that runs
 COMMANDS = {
@@ -215,6 +222,26 @@ _GROUPS = {
 }
 
 
+class _Hanging(PlainFormatter):
+    """Entries in plain text, broken once at the width of the terminal, what follows further in."""
+
+    def __call__(self, console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
+        """Print the entries of a panel."""
+        from rich.console import Console
+
+        if not panel.entries:
+            return
+        endless = Console(width=10_000, color_system=None)
+        with endless.capture() as captured:
+            super().__call__(endless, options, panel)
+        for line in captured.get().rstrip("\n").split("\n"):
+            broken = textwrap.wrap(
+                line, console.width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+            )
+            console.print("\n".join(broken), highlight=False, markup=False, soft_wrap=True)
+        console.print()
+
+
 def app() -> App:
     """The tree of commands; the module of each is loaded only when it is asked for."""
     root = App(
@@ -224,7 +251,7 @@ def app() -> App:
         version=__version__,
         default_parameter=Parameter(negative=(), show_default=False),
         help_format="plaintext",
-        help_formatter="plain",
+        help_formatter=_Hanging(),
         exit_on_error=False,
         print_error=False,
         result_action="return_value",

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from inercal.cli import process_age
 from inercal.cli.options import ReportOutput, reading
-from inercal.cli.outcome import hand_over
+from inercal.cli.outcome import WHOLE, hand_over
 
 
 def validate(*, output: ReportOutput = ReportOutput()) -> int:  # noqa: B008  (frozen)
@@ -16,7 +16,7 @@ def validate(*, output: ReportOutput = ReportOutput()) -> int:  # noqa: B008  (f
     from inercal.validate.run import executor
     from inercal.validate.run import validate as run
 
-    output.check((".json", ".toml"))
+    output.check(WHOLE)
     with compiling("validate", output.say), reading(output, "validating") as progress:
         found = run(executor(), progress)
     found = replace(found, timing={**found.timing, "total": process_age()})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,9 @@ _ONE_OF = (
     (r"rig\.errors\.\w+", DISTRIBUTIONS),
     (r"sensors\.\w+", ("axis", "angle")),
     (r"sensors\.\w+", ("calibration", "scale")),
+    (r"sensors\.\w+", ("calibration", "bias")),
+    (r"sensors\.\w+", ("channel", "scale")),
+    (r"sensors\.\w+", ("channel", "bias")),
 )
 
 #: keys (a regular expression) that name a file
@@ -101,15 +104,26 @@ def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettin
     return aoa_study(_read(path, overrides, "aoa"), path)
 
 
-def files_of(path: Path, given: Mapping[str, Any]) -> tuple[Path, ...]:
-    """The study of a turntable, and the files that it names; ``given`` as in its settings."""
-    name = given.get("positions", {}).get("file")
-    return (path,) if name is None else (path, path.parent / name)
+def files_of(path: Path, given: Mapping[str, Any], unread: str = "") -> tuple[Path, ...]:
+    """The study, and the files that it names; ``given`` as in its settings, without those of the table ``unread``."""
+    named = {key: name for key, name in _texts(given) if re.fullmatch(_FILES, key)}
+    return (path, *(path.parent / name for key, name in named.items() if key.split(".")[0] != unread))
+
+
+def _texts(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted keys and values of all texts in a table."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _texts(value, f"{above}{key}.")
+        elif isinstance(value, str):
+            yield above + key, value
 
 
 def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
     """The file with the overrides put in; refused where it is a study for another command."""
     data = read_toml(path, StudyError)
+    if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig"}:
+        raise StudyError(path, "found a column map, which goes behind --map, expected a study")
     rig = data.get("rig")
     kind = rig.get("kind") if isinstance(rig, dict) else None
     meant_for = _COMMANDS.get(kind, command) if isinstance(kind, str) else command

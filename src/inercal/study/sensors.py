@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -226,7 +227,7 @@ def _bias(name: str, text: str, scale: float, per: str, where: str | Path) -> fl
         else:
             return _without_u(raw, key, where).value * scale
     try:
-        bias = parse_quantity(text, "rate" if name in GYROS else "acceleration", key)
+        bias = parse_quantity(text, _dimension(name), key)
     except QuantityError as error:
         also = f", or one in {per}" if electric else ""
         raise StudyError(where, f"{key}: {error.message}{also}") from error
@@ -270,9 +271,26 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
             where, f"sensors.{name}.channel: found {table.channel!r}, expected one of {', '.join(axes)}"
         )
     gain, zero = found[f"{slope}_{axis}"], found[f"{offset}_{axis}"]
-    unit = parse_unit(zero.unit, where)
+    unit = parse_unit(zero.unit, f"{where}: {key}")
+    if unit.dimension not in ELECTRIC and unit.dimension != (measured := _dimension(name)):
+        raise StudyError(
+            where, f"{key}: found {offset}_{axis} in {unit.symbol}, expected a unit of {measured}, V or count"
+        )
     per: Any = ELECTRIC.get(unit.dimension, "1")
-    return 1.0 / (gain.value * unit.factor), sign * zero.value / gain.value, per
+    over = 1.0 / gain.value if gain.value else math.nan
+    scale, bias = over / unit.factor, sign * zero.value * over
+    if not (scale and math.isfinite(scale) and math.isfinite(bias)):
+        raise StudyError(
+            where,
+            f"{key}: found {slope}_{axis} = {gain.value:g} and {offset}_{axis} = {zero.value:g} in "
+            f"{table.calibration}, expected a scale factor and an offset",
+        )
+    return scale, bias, per
+
+
+def _dimension(name: str) -> str:
+    """What a sensor measures."""
+    return "rate" if name in GYROS else "acceleration"
 
 
 def _sign(channel: str) -> float:

@@ -152,7 +152,7 @@ _TABLE_ACC_BIAS = (0.13041039201706542, 0.17227293074811315, -0.1481500012389673
 
 
 def _table_errors() -> Array:
-    """Errors of 15 coefficients of the accelerometers over their standard uncertainties."""
+    """Errors of 12 coefficients of the accelerometers over their standard uncertainties."""
     found, true = _calibrated("table"), np.array(_TABLE_ACC)
     names = [f"K1_{i}" for i in _AXES] + [f"M_{i}{j}" for i in _AXES for j in _AXES if i != j]
     values = [*np.diag(true), *(true[i, j] / true[i, i] for i in range(3) for j in range(3) if i != j)]
@@ -295,7 +295,7 @@ CASES = (
     ),
     Case(
         "table-uncertainty",
-        "Two-axis table: errors of the 15 coefficients of the accelerometers are within 4 standard uncertainties",
+        "Two-axis table: errors of the 12 coefficients of the accelerometers are within 4 standard uncertainties",
         "truth",
         np.zeros(12),
         4.0,
