@@ -314,7 +314,7 @@ def test_squared_innovations_are_those_of_each_sensor():
     rng = np.random.default_rng(3)
     values = rng.standard_normal((4000, 2)) * [1.0, 3.0]
     nis, white = innovations(np.arange(4000.0), values, ("a1", "gyro"), 5.0, Marks())
-    assert "after 2 s, 5." in nis.caption
+    assert "once settled, 5." in nis.caption
     assert {"a1", "gyro", "1, as stated", "2, inconsistent"} <= set(texts(nis))
     texts(white)
     assert innovations(np.arange(3.0), np.full((3, 2), np.nan), ("a1", "gyro"), math.nan, Marks()) == []

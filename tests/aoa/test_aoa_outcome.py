@@ -85,7 +85,7 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
     made.stated[2500] = made.reference[2500], 0.02 * DEG
     found = []
     monkeypatch.setattr("inercal.aoa.sources._items", lambda parts, names: found.extend(parts) or ())
-    parts(made, of := problem(settings), settings, smoothed)
+    parts(made, of := problem(settings), settings, smoothed, np.full(len(made.t), True))
     whole = np.sum([part for _, part in found], axis=0)
     told = estimate(made, of, smoothed)
     after = made.t >= 2.0
@@ -113,6 +113,18 @@ def test_the_budget_of_sensors_that_come_late_is_that_of_the_record_from_there_o
     for item, other in zip(late.budget, from_there.budget, strict=True):
         assert item.share == pytest.approx(other.share, rel=1e-5)
     assert sum(item.share.get("theta", 0.0) for item in late.budget) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_rows_long_after_the_rest_that_have_no_angle_do_not_empty_the_budget():
+    """Half a second of angles, and one row of silence much later: the shares are those of the half second."""
+    settings = study(motion=replace(SINE, duration=0.5))
+    made = simulate(settings, np.random.default_rng(4)).recording
+    made.acc[-1] = made.gyro[-1] = np.nan
+    made.t[-1] += 1e6
+    result, found, _ = assembled(settings, made)
+    assert np.isnan(found.theta[-1])
+    assert np.isfinite(found.theta[:-1]).all()
+    assert sum(item.share.get("theta", 0.0) for item in result.budget) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_gravity_and_a_stated_roll_widen_the_angle_as_wrong_ones_move_it():

@@ -13,10 +13,11 @@ from inercal.estimate.status import Status
 from inercal.geometry.site import GravityInput
 from inercal.selfcal import sources
 from inercal.selfcal.bounds import recorded_bounds
-from inercal.selfcal.coefficients import names, product_slope
+from inercal.selfcal.coefficients import ETA, KA1, divisor, names, product_slope, to_product
 from inercal.selfcal.diagnosis import diagnose
 from inercal.selfcal.filtered import problem
 from inercal.selfcal.filtering import estimate
+from inercal.selfcal.history import history_record
 from inercal.selfcal.observability import singular
 from inercal.selfcal.outcome import assemble
 from inercal.selfcal.plan import Plan, Turn
@@ -24,6 +25,7 @@ from inercal.selfcal.settings import Filter, Noise
 from inercal.selfcal.simulate import experiment, simulate, to_record
 from inercal.selfcal.stated import stated_errors
 from inercal.selfcal.task import calibrate
+from inercal.selfcal.unmodelled import Cause, Found, _least_squares
 
 SHORT = study(plan=Plan((Turn("x", np.pi), Turn("y", np.pi), Turn("z", np.pi)), rate=6.0 * DEG, step=1.0))
 
@@ -147,3 +149,58 @@ def test_a_statement_that_is_not_changed_changes_nothing():
         np.testing.assert_allclose(
             getattr(together, name), added, rtol=0.0, atol=1e-14 * np.linalg.norm(here)
         )
+
+
+@pytest.mark.parametrize("converged", [True, False])
+def test_an_accelerometer_without_a_scale_has_no_misalignment(converged):
+    """az = ka0z + 0 (fz + eta_pz fx - eta_oy fy): any eta gives the same; all else is told, and no number used."""
+    done = calibrate(to_record(recorded(SHORT)), SHORT)
+    lost = done.filtered.coefficients.copy()
+    lost[KA1.stop - 1] = -1.0
+    unknown = np.isin(names(18), ("eta_pz", "eta_oz"))
+    np.testing.assert_array_equal(np.isnan(to_product(lost)), unknown)
+    np.testing.assert_array_equal(
+        to_product(lost)[~unknown], (lost / divisor(done.filtered.coefficients))[~unknown]
+    )
+    np.testing.assert_array_equal(np.isnan(product_slope(lost)).any(axis=1), unknown)
+
+    history = replace(done.filtered.history, coefficients=np.tile(lost, (len(done.recording.t), 1)))
+    by = replace(
+        done.filtered, coefficients=lost, history=history, converged=converged, message="it ran away"
+    )
+    along = recorded_bounds(done.recording, done.problem, history.attitude, lost, contributions=True)
+    found = assemble(done.recording, SHORT, by, along, [])
+    assert not len(found.names)
+    assert found.status is (Status.ILL_CONDITIONED if converged else Status.NOT_CONVERGED)
+    columns = history_record(by, done.recording, done.problem.world).columns
+    for eta, each in zip(names(18)[ETA], unknown[ETA], strict=True):
+        assert np.isnan(columns[f"u_{eta}"].values).all() == each
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_no_numbers_where_the_bound_of_the_base_is_lost_in_rounding(seed):
+    """Clocks that jump by 1e13 s leave a variance of 1e26 times the encoders', beside which no double holds these."""
+    made = recorded(SHORT, seed)
+    t = made.t.copy()
+    t[40:] += 1e13
+    settings = replace(SHORT, base=replace(SHORT.base, heading=0.0), heading_unknown=True)
+    found = estimated(settings, replace(made, t=t))
+    assert found.status in (Status.ILL_CONDITIONED, Status.NOT_CONVERGED)
+    assert not len(found.names)
+
+
+def test_what_has_no_effect_is_not_fitted():
+    """A column of zeros beside others of any size: its parameter stays what it is, and is not clear of zero."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        Z = rng.standard_normal((50, 6, 8)) * 10.0 ** rng.uniform(0.0, 8.0, 8)
+        Z[..., 6] = 0.0
+        values = rng.standard_normal(8)
+        cause = Cause("any", tuple("abcdefgh"), 1e-5, lambda recording, problem, _: (recording, problem))
+        fit = _least_squares(Z, rng.standard_normal((50, 6)), [Found(cause, values, np.ones(8))])
+        assert fit.change[6] == 0.0
+        assert np.isfinite(fit.u).all()
+        others = np.delete(Z, 6, axis=-1).reshape(300, 7)
+        size = np.linalg.norm(others, axis=0)
+        u = np.sqrt(fit.left * np.diag(np.linalg.inv((others / size).T @ (others / size)))) / size
+        np.testing.assert_allclose(np.delete(fit.u, 6), u, rtol=1e-9)

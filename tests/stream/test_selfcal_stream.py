@@ -13,6 +13,7 @@ from inercal.errors import InputError, RecordError, StudyError
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.write import write_record
+from inercal.selfcal.coefficients import KA1, names
 from inercal.selfcal.filtered import problem
 from inercal.selfcal.filtering import estimate
 from inercal.selfcal.history import history_record
@@ -305,3 +306,31 @@ def test_settings_that_decide_the_digits_are_in_the_fingerprint(tmp_path):
 
     marks = {fingerprint(Selfcal(lines, problem(each)).settings) for each in (base, *others)}
     assert len(marks) == 1 + len(others)
+
+
+def test_an_accelerometer_without_a_scale_is_said(tmp_path):
+    """ka1 = -1: eta of that accelerometer is no number in the line, which has been announced."""
+    said, settings = [], study(plan=None)
+
+    def silent(rows):
+        return [row | {"acc_x [m/s^2]": "", "acc_y [m/s^2]": "", "acc_z [m/s^2]": ""} for row in rows[:3]]
+
+    lines = Lines(io.BytesIO(recorded(tmp_path, change=silent).encode()), "log", None, lambda finding: None)
+    estimator, told = Selfcal(lines, problem(settings), 0.0, said.append), []
+    step = estimator.step
+
+    def without_scale(state, sample):
+        if state.begun:
+            state.filter.coefficients[KA1.start + 1] = -1.0
+        state, out = step(state, sample)
+        told.extend(dict(zip(estimator.columns, line, strict=True)) for line in out)
+        return state, out
+
+    estimator.step = without_scale
+    lines_out(estimator, lines)
+    assert len(told) == 3
+    lost = {
+        name for name in names(18) if any(np.isnan(told[-1][k]) for k in told[-1] if k.split()[0] == name)
+    }
+    assert lost == {"eta_oy"}
+    assert [finding.code for finding in said] == ["filter_fails"]

@@ -32,7 +32,7 @@ _LARGE = {"deg/h": ("deg/s", 3600.0, 0.01), "ug": ("mg", 1000.0, 1.0)}
 
 _STATISTICS = {
     "residual_rms": "root-mean-square normalised innovation",
-    "nis_mean": "normalised innovation squared (NIS), mean after 2 s",
+    "nis_mean": "normalised innovation squared (NIS), mean once settled",
     "samples": "rows",
     "angles": "rows with an angle",
     "starts": "starts of the filter",

@@ -49,7 +49,9 @@ class Filtered:
     state : State
         Of the causal filter at the end: what it learned of the sensors.
     nis_mean : float
-        Mean of the squared innovations after the first 2 s; NaN without any.
+        Mean of the squared innovations after the first 2 s, or in the later half of less than 4 s; NaN without any.
+    nis_count : int
+        Innovations in that mean.
     starts : tuple of int
         Rows at which the filter started: one, and more where the angle was lost.
     seconds : float
@@ -67,6 +69,7 @@ class Filtered:
     states_u: Array
     state: State
     nis_mean: float
+    nis_count: int
     starts: tuple[int, ...]
     smoothed: bool
     seconds: float
@@ -103,7 +106,7 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
     if rolls is not None:
         roll[taken] = rolls
     seconds = time.perf_counter() - clock
-    judged = innovations[taken][t - t[0] >= SETTLED] if len(t) else innovations
+    judged = innovations[taken][t - t[0] >= min(SETTLED, (t[-1] - t[0]) / 2.0)] if len(t) else innovations
     squared = np.square(judged[np.isfinite(judged)])
     m = problem.size
     return Filtered(
@@ -118,6 +121,7 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
         states_u=kept[:, m:],
         state=state,
         nis_mean=float(squared.mean()) if squared.size else float("nan"),
+        nis_count=squared.size,
         starts=tuple(int(taken[each.row]) for each in trace.starts),
         smoothed=smoothed,
         seconds=seconds,

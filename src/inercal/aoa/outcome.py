@@ -136,8 +136,7 @@ def assemble(
     status, message = verdict.of_fusion(recording, filtered, angles, said)
     if status is Status.NOT_CONVERGED:
         return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
-    first = int(np.argmax(np.isfinite(filtered.theta)))
-    split = parts(recording, problem, settings, filtered.smoothed, first)
+    split = parts(recording, problem, settings, filtered.smoothed, np.isfinite(filtered.theta))
     covariance = P + split.common
     u = np.sqrt(np.diag(covariance))
     rows = zip(names, values.tolist(), u.tolist(), before.tolist(), strict=True)

@@ -196,8 +196,8 @@ def row_of(
 
 @kernel
 def root(variance: float) -> float:
-    """Standard deviation; 0 where rounding has made a variance negative."""
-    return math.sqrt(variance) if variance > 0.0 else 0.0
+    """Standard deviation; 0 where rounding has made a variance negative, NaN where there is none."""
+    return 0.0 if variance <= 0.0 else math.sqrt(variance)
 
 
 @kernel

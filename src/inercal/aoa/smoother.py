@@ -104,7 +104,8 @@ def _stretch(
         done = recursion.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0, memory)
         _backward(lam, Lam, *memory, done, *given[1:], out[block], kept, every, begin.row + block.start)
         if F is not None:
-            lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
+            with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
+                lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
 
 
 @kernel

@@ -31,6 +31,7 @@ from inercal.aoa.stated import leaning, leans, uncertain_roll
 from inercal.estimate.budget import BudgetItem
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 ANGLE = "theta"
 """Name of the angle among the shares of a budget."""
@@ -80,16 +81,18 @@ class Parts:
 
 
 def parts(
-    recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool, first: int = 0
+    recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool, known: Mask
 ) -> Parts:
     """Split what the fusion says of its uncertainty by where it comes from.
 
-    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``first`` row with an
-    angle: before it, as where sensors are switched on late, there is nothing to split.
+    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``known`` (n,): the rows
+    with an angle; before the first, as where sensors are switched on late, there is nothing to split.
     """
     taken = later(recording.t)
-    taken = taken[taken >= first][: MOST // 2 if smoothed else MOST]
+    taken = taken[taken >= np.argmax(known)][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.rows[taken]
+    settled = known[taken] & (t - t[:1] >= SETTLED)
+    judged = settled if settled.any() else known[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
     changed = [_enlarged(problem, rows, each) for each in of]
@@ -97,7 +100,9 @@ def parts(
     changes = leans(settings, problem.spatial)
     moved = [(leaning(problem, each, settings), rows) for each in changes]
     with ThreadPoolExecutor() as pool:
-        runs = pool.map(lambda run: _run(run[0], t, run[1], smoothed), [(problem, rows), *changed, *moved])
+        runs = pool.map(
+            lambda run: _run(run[0], t, run[1], smoothed, judged), [(problem, rows), *changed, *moved]
+        )
         (angle, P, x, theta), *others = runs
     found: list[tuple[Source, Array]] = []
     for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
@@ -170,13 +175,14 @@ def _known_before(problem: Problem, settings: AoaSettings) -> tuple[str, ...]:
     )
 
 
-def _run(problem: Problem, t: Array, rows: Array, smoothed: bool) -> tuple[float, Array, Array, Array]:
-    """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are judged."""
+def _run(
+    problem: Problem, t: Array, rows: Array, smoothed: bool, judged: Mask
+) -> tuple[float, Array, Array, Array]:
+    """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are ``judged`` (n,)."""
     state, trace = advance(initial(problem), problem, t, rows, last=True)
     out = smooth(problem, t, rows, trace.starts) if smoothed else trace.out
-    judged = out[t - t[0] >= SETTLED] if len(t) and t[-1] - t[0] > SETTLED else out
-    u = judged[np.isfinite(judged[:, 1]), 1]
-    return float(np.mean(np.square(u))), state.P, state.x, judged[:, 0]
+    u = out[judged & np.isfinite(out[:, 1]), 1]
+    return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
 
 
 def _enlarged(problem: Problem, rows: Array, source: Source) -> tuple[Problem, Array]:

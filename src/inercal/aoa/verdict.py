@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 NIS_LIMIT = 2.0
 """Mean squared innovation, over its variance, above which a recording contradicts the model."""
 
+NIS_CHANCE = 1e-5
+"""Chance to find a sound recording above the limit, where that is so short that scatter alone may be."""
+
 AT_PRIOR = 0.9
 """Part of its prior above which a coefficient is no better known than before."""
 
@@ -65,8 +68,9 @@ def of_fusion(
         return Status.NOT_CONVERGED, _because(_missing(known), said)
     if not (np.isfinite(state.x).all() and is_covariance(state.P)):
         return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
-    if mean > NIS_LIMIT:
-        text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {NIS_LIMIT:g}"
+    limit = nis_limit(filtered.nis_count)
+    if mean > limit:
+        text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {limit:.3g}"
         return Status.INCONSISTENT, _because(text, said)
     gross = [each for each in said if each.code in _GROSS and each not in recording.findings]
     if gross:
@@ -74,8 +78,19 @@ def of_fusion(
     lost = _lost(recording, filtered)
     if lost is not None:
         return Status.NOT_CONVERGED, _because(lost, said)
-    judged = f"mean NIS {mean:.3g}" if math.isfinite(mean) else f"too short for a NIS, {SETTLED:g} s or less"
+    judged = f"mean NIS {mean:.3g}" if math.isfinite(mean) else "too few readings for a NIS"
     return Status.OK, _doubted(f"{_words(angles)}, {judged}", said)
+
+
+def nis_limit(count: int) -> float:
+    """Most that the mean of ``count`` squared innovations may be: `NIS_LIMIT`, and more where they are few.
+
+    A sound filter's squares are chi-square with one degree of freedom each (Bar-Shalom et al., Estimation with
+    Applications to Tracking and Navigation, 2001, section 5.4).
+    """
+    from scipy.special import chdtri
+
+    return max(NIS_LIMIT, float(chdtri(count, NIS_CHANCE)) / count) if count else NIS_LIMIT
 
 
 def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:

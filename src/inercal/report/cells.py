@@ -141,7 +141,7 @@ def _strokes(
     width: float,
     zorder: float = 2.0,
 ) -> None:
-    """Lines through the points of each stroke, all of one look, at once: `Axes.hlines` takes three times as long."""
+    """Lines through the points of each stroke, all of one look, at once: `Axes.hlines` takes four times as long."""
     from matplotlib.collections import LineCollection
 
     drawn = LineCollection(strokes, colors=colour, linewidths=width, zorder=zorder)

@@ -19,6 +19,7 @@ from inercal.selfcal.bounds import recorded_bounds
 from inercal.selfcal.coefficients import BETA
 from inercal.selfcal.filtered import Filtered, problem
 from inercal.selfcal.filtering import estimate
+from inercal.selfcal.observability import singular
 from inercal.selfcal.recording import Recording
 from inercal.selfcal.rig import Base
 from inercal.selfcal.settings import SelfcalSettings
@@ -68,7 +69,9 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
     from four headings, a quarter turn apart, and the most probable of these is taken. The prior of beta about the base
     found is `LAST` times its bound, the study's where that is narrower; about level axes too, as a tilt of a minute of
     arc by a wide heading is enough to make up information. The bound is linearised at one base: it does not add up what
-    different headings would tell. Where residuals are larger than the noise that is stated, so is the prior.
+    different headings would tell. Where residuals are larger than the noise that is stated, so is the prior. Where
+    rounding leaves no bound the prior stays as it is: the covariance of the calibration is lost too, and its verdict
+    says so.
 
     What the study knows enters twice, in the base and about it: that is nothing where the recording tells a hundred
     times more, a tenth too little in u where it tells as much.
@@ -89,7 +92,10 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
     if not math.isfinite(_misfit(found)):
         return wide  # a recording that contradicts the model: the diagnosis says how
     near = replace(wide, base=base.turned(found.coefficients[BETA]))
-    u = _bound(recording, near, found)
+    bound = _bound(recording, near, found)
+    if singular(prior[BETA], bound) is not None:
+        return near
+    u = np.sqrt(np.diag(bound))
     if settings.heading_unknown:
         _told(float(vertical @ u), settings)
     scatter = math.sqrt(max(1.0, np.nansum(found.nis) / max(found.dims.sum(), 1)))
@@ -123,12 +129,13 @@ def _misfit(found: Filtered) -> float:
 
 
 def _bound(recording: Recording, settings: SelfcalSettings, found: Filtered) -> Array:
-    """(3,) standard uncertainties of beta about the base of ``settings`` [rad], along the path found."""
+    """(3, 3) covariance of beta about the base of ``settings`` [rad^2], along the path found."""
     assert found.history is not None
     coefficients = found.coefficients.copy()
     coefficients[BETA] = 0.0
     along = found.history.attitude, coefficients
-    return recorded_bounds(recording, problem(settings), *along, restarts=found.restarts).u[BETA]
+    bounds = recorded_bounds(recording, problem(settings), *along, restarts=found.restarts)
+    return bounds.covariance[BETA, BETA]
 
 
 def _vertical(base: Base) -> Array:

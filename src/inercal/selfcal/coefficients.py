@@ -87,14 +87,24 @@ def to_linear(product: Array) -> Array:
 
 
 def to_product(linear: Array) -> Array:
-    """Coefficients (*batch, p) from the linear form to the product form; the inverse of `to_linear`."""
-    return linear / scale(linear)
+    """Coefficients (*batch, p) from the linear form to the product form; the inverse of `to_linear`.
+
+    Those eta are NaN, here and in what follows, whose accelerometer has no scale, ka1 = -1: it shows no force, as may
+    come out of a fit that diverges, and eta can have any value.
+    """
+    return linear / divisor(linear)
+
+
+def divisor(c: Array) -> Array:
+    """What coefficients (*batch, p) of the linear form are divided by to give the product form: `scale`, NaN for 0."""
+    by = scale(c)
+    by[by == 0.0] = np.nan
+    return by
 
 
 def product_slope(linear: Array) -> Array:
     """(p, p) derivative of `to_product` at ``linear`` (p,): covariance of the product form is ``S P S^T``."""
-    slope = np.eye(len(linear))
-    scale = 1.0 + linear[_SCALE]
-    slope[_ETA, _ETA] = 1.0 / scale
-    slope[_ETA, _SCALE] = -linear[_ETA] / scale**2
+    by = divisor(linear)
+    slope = np.diag(1.0 / by)
+    slope[_ETA, _SCALE] = -linear[_ETA] / by[_ETA] ** 2
     return slope

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from inercal.records.made import record_of
 from inercal.records.record import Record, Source
-from inercal.selfcal.coefficients import names, scale, to_product, units
+from inercal.selfcal.coefficients import divisor, names, units
 from inercal.selfcal.filtered import Filtered
 from inercal.selfcal.kinematics import all_angles
 from inercal.selfcal.recording import Recording
@@ -56,8 +56,8 @@ def rows(
     angles = np.empty((n, 3))
     all_angles(attitude, near, world.axes, world.signs, angles)
     found[:, :3], found[:, 3:7], found[:, 7:10] = angles, attitude, attitude_u
-    found[:, 10::2] = to_product(coefficients)
-    found[:, 11::2] = u / scale(coefficients)
+    by = divisor(coefficients)
+    found[:, 10::2], found[:, 11::2] = coefficients / by, u / by
     return found
 
 

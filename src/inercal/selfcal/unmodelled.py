@@ -192,9 +192,12 @@ def _least_squares(Z: Array, z: Array, at: Sequence[Found]) -> _Fit:
     weight = scatter * np.concatenate([np.full(len(each.values), 1.0 / each.cause.prior) for each in at])
     known = weight * np.concatenate([each.values for each in at])
     columns, values = np.vstack([Z[used], np.diag(weight)]), np.append(z[used], known)
-    size = np.sqrt(np.square(columns).sum(axis=0)) + np.finfo(float).tiny
+    size = np.sqrt(np.square(columns).sum(axis=0))
+    without = size == 0.0
+    size[without] = 1.0
     columns = columns / size
     strength, ways = np.linalg.eigh(columns.T @ columns)
+    ways[without] = 0.0  # eigenvectors have them in other combinations by rounding
     inverse = np.where(strength > _FLAT, 1.0 / np.maximum(strength, _FLAT), 0.0)
     along = ways.T @ (columns.T @ values)
     gained = float(along @ (inverse * along))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import RecordError, StudyError
 from inercal.records.findings import Finding
+from inercal.selfcal.coefficients import KA1
 from inercal.selfcal.filtered import History, Problem, State, Trace, known_in
 from inercal.selfcal.filtering import LOCK, recursive
 from inercal.selfcal.filtering import load_kernels as load_filter
@@ -228,6 +229,8 @@ class Selfcal:
     def _alarmed(self, state: SelfcalState, trace: Trace) -> SelfcalState:
         """The state with the alarms that were due now."""
         above = state.nis - state.dims > _BAND * math.sqrt(2.0 * state.dims)
+        told = trace.coefficients, trace.u, trace.attitude_u
+        without_scale = bool((trace.coefficients[:, KA1] == -1.0).any())
         alarms = (
             (
                 state.rows >= _SETTLED and above,
@@ -236,7 +239,7 @@ class Selfcal:
                 f"{state.dims / max(state.rows, 1):.4g}: the rows contradict the model or the stated noise",
             ),
             (
-                not all(np.isfinite(each).all() for each in (trace.coefficients, trace.u, trace.attitude_u)),
+                without_scale or not all(np.isfinite(each).all() for each in told),
                 "filter_fails",
                 "the filter diverged: its coefficients or their uncertainties are no numbers any more",
             ),
