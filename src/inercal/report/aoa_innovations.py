@@ -39,8 +39,8 @@ def innovations(
         "Normalised innovations squared",
         "What the sensors tell beyond what the filter expected, squared and over its variance (NIS): means over pieces "
         f"of {(t[-1] - t[0]) / len(starts):.2g} s. Over the record, once settled, {nis_mean:.3g}. Below 1 is normal "
-        "where the filter allows for a sting that bends: about 0.25 for a rigid model, the gyro near 1, accelerometers far "
-        "below. Above 2 the model does not hold: the sensor that stands out is the one to look at. Peaks are "
+        "where the filter allows for a sting that bends: about 0.25 for a rigid model, the gyro near 1, accelerometers "
+        "far below. Above 2 the model does not hold: the sensor that stands out is the one to look at. Peaks are "
         "spikes, knocks, or lost rows."
         f"{marks.words}",
         middle,
