@@ -180,6 +180,7 @@ REFUSED = {
     'sensors={a1 = {axis = "+x", r = "1 mm"}, a2 = {axis = "-x", r = "1 mm"}}': "sensors: .*axes are all parallel",
     "noise.gyro=0 deg/s": "noise.gyro: .*a standard deviation above zero",
     "noise.gyro=5": "noise.gyro: found '5' without a unit",
+    "noise.accelerometer_bias=1 g": "noise.accelerometer_bias: found '1 g', .*deviation above zero, 0.3 g at most.*mg",
     "noise.accelerometer=1e-4 deg": "noise.accelerometer: found '1e-4 deg', which is of angle",
     "prior.lever=0 mm": "prior.lever: .*above zero",
     "prior.lever=3 m": "prior.lever: .*mm given as m",

@@ -40,7 +40,7 @@ from inercal.study.fields import QuantityText, positive, refusal
 from inercal.study.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
 from inercal.study.ratios import ExactText
 from inercal.study.sensors import SensorsTable, calibrations_of, layout_of
-from inercal.units import Quantity, shown
+from inercal.units import STANDARD_GRAVITY, Quantity, shown
 
 _DEVIATION = "a standard deviation above zero"
 
@@ -51,6 +51,16 @@ def _deviation(dimension: str, example: str) -> QuantityText:
 
 
 _Force = Annotated[Quantity, _deviation("acceleration", "1e-4 g")]
+# a bias near gravity leaves the angle unknown, which no u of first order can say
+_Bias = Annotated[
+    Quantity,
+    QuantityText(
+        "acceleration",
+        "1e-4 g",
+        lambda d: 0.0 < d <= 0.3 * STANDARD_GRAVITY,
+        f"{_DEVIATION}, 0.3 g at most, or gravity cannot be told from it (mg given as g?)",
+    ),
+]
 _Rate = Annotated[Quantity, _deviation("rate", "0.2 deg/s")]
 _Length = Annotated[
     Quantity,
@@ -126,8 +136,8 @@ class SensorNoiseTable(Strict):
     """Noise of each sample, and biases that nobody knows beforehand: standard deviations."""
 
     accelerometer: _Force = Field(description="of a sample of an accelerometer")
-    accelerometer_bias: _Force = Field(
-        description="of the accelerometers' biases, half its variance common to all"
+    accelerometer_bias: _Bias = Field(
+        description="of the accelerometers' biases, half its variance common to all; 0.3 g at most"
     )
     gyro: _Rate = Field(description="of a sample of a gyro")
     gyro_bias: _Rate = Field(description="of the gyros' biases")
