@@ -51,8 +51,9 @@ def test_arms_are_those_of_the_model_of_the_fusion(of, level, theta, rate, al):
     x = np.zeros(fusion.size)
     x[:3] = theta, rate, al
     at, row = np.empty(model.WIDEST, dtype=np.int64), np.empty(model.WIDEST)
+    s, c = math.sin(theta), math.cos(theta)
     read = [
-        model.accelerometer(x, i, of.geometry, fusion.places, fusion.constants, 0.0, 0.0, at, row)[0]
+        model.accelerometer(x, s, c, i, of.geometry, fusion.places, fusion.constants, 0.0, 0.0, at, row)[0]
         for i in range(5)
     ]
     level = fusion.constants[model.ROLL_COSINE]

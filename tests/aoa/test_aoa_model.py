@@ -44,7 +44,8 @@ def read(of, x, i, p=0.0, y=0.0):
     """Value, dense row and variance of accelerometer ``i``, of the gyro for i = N."""
     at, row = np.empty(model.WIDEST, np.int64), np.empty(model.WIDEST)
     if i < of.count:
-        told = model.accelerometer(x, i, of.geometry, of.places, of.constants, p, y, at, row)
+        s, c = math.sin(x[0]), math.cos(x[0])
+        told = model.accelerometer(x, s, c, i, of.geometry, of.places, of.constants, p, y, at, row)
     else:
         told = model.gyro(x, of.places, of.constants, at, row)
     value, entries, noise = told

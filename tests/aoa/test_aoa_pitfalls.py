@@ -37,9 +37,10 @@ def hard_gated(of, recording):
     for k, z in enumerate(recording.rows):
         if k:
             recursion.go_on(x, P, step, 0.0, 0.0, of.places, of.constants, F, Q, 0.0, work)
+        s, c = math.sin(x[0]), math.cos(x[0])
         for i in range(of.count + 1):
             expected, entries, noise = recursion.row_of(
-                i, x, recording.rows, k, of.geometry, of.places, of.constants, 0.0, 0.0, at, row
+                i, x, s, c, recording.rows, k, of.geometry, of.places, of.constants, 0.0, 0.0, at, row
             )
             v, h = z[i] - expected, np.zeros(n)
             h[at[:entries]] = row[:entries]

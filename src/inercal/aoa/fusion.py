@@ -104,7 +104,7 @@ def advance(
         t, rows = np.append(state.held[:, 0], t), np.vstack([state.held[:, 1:], rows])
     rows = np.ascontiguousarray(rows)
     m, at = len(t), 0
-    out = np.full((m, OUTPUTS + problem.count + 1), np.nan)
+    out = np.empty((m, OUTPUTS + problem.count + 1))
     x, P, turns, before, running, _, since = state
     dt, starts = np.diff(t, prepend=before), []
     while at < m:
@@ -112,6 +112,7 @@ def advance(
             end = min(at + HELD, m)
             if end - at < HELD and not last:
                 break
+            out[at:end] = np.nan
             anew = bool((turns[2:] >= recursion.PATIENCE).any())
             if anew:  # neither is to be believed what was learned of the sensors
                 x[:], P[:] = problem.mean, problem.covariance

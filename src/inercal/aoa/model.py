@@ -63,6 +63,8 @@ _NEAR_VERTICAL = 1e-4
 @kernel
 def accelerometer(
     x: Array,
+    s: float,
+    c: float,
     i: int,
     geometry: Array,
     places: Indices,
@@ -74,18 +76,17 @@ def accelerometer(
 ) -> tuple[float, int, float]:
     """What accelerometer ``i`` reads [m/s^2]: its value, the number of entries of its ``row``, and its variance.
 
-    ``geometry`` (N, 4): cos lambda, sin lambda, r, z [m]. ``p``, ``y`` [rad/s] the indications of the roll and yaw
-    gyros, not used without a state of roll; their noise adds to the variance. ``at`` and ``row`` receive the places
-    and values of the derivatives.
+    ``s``, ``c`` are sine and cosine of theta, which all of them share. ``geometry`` (N, 4): cos lambda, sin lambda,
+    r, z [m]. ``p``, ``y`` [rad/s] the indications of the roll and yaw gyros, not used without a state of roll; their
+    noise adds to the variance. ``at`` and ``row`` receive the places and values of the derivatives.
     """
-    g, theta, w, al = constants[GRAVITY], x[0], x[1], x[2]
+    g, w, al = constants[GRAVITY], x[1], x[2]
     ca, sa, r, z = geometry[i, 0], geometry[i, 1], geometry[i, 2], geometry[i, 3]
     levers, res, heights, roll = places[LEVERS], places[RESONATORS], places[HEIGHTS], places[ROLL]
     if levers >= 0:
         r += x[levers + i]
     if heights >= 0:
         z += x[heights + i]
-    s, c = math.sin(theta), math.cos(theta)
     noise = constants[NOISE]
     at[0], at[1], at[2], at[3] = 0, 1, 2, BIASES + i
     row[3] = 1.0

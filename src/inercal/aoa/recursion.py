@@ -181,13 +181,16 @@ def update(
 
 @kernel
 def row_of(
-    i: int, x: Array, z: Array, k: int, geometry: Array, places: Indices, constants: Array, p: float, y: float,
-    at: Indices, row: Array,
+    i: int, x: Array, s: float, c: float, z: Array, k: int, geometry: Array, places: Indices, constants: Array,
+    p: float, y: float, at: Indices, row: Array,
 ) -> tuple[float, int, float]:  # fmt: skip
-    """Scalar ``i`` of row ``k`` of measurements: what it should read, entries of its row, its variance."""
+    """Scalar ``i`` of row ``k`` of measurements: what it should read, entries of its row, its variance.
+
+    ``s``, ``c`` are sine and cosine of theta in ``x``.
+    """
     n = places[COUNT]
     if i < n:
-        return accelerometer(x, i, geometry, places, constants, p, y, at, row)
+        return accelerometer(x, s, c, i, geometry, places, constants, p, y, at, row)
     if i == n:
         return gyro(x, places, constants, at, row)
     at[0], row[0] = 0, 1.0
@@ -291,11 +294,14 @@ def _advance(
             p, y = turns[0], turns[1]
         for i in range(n):
             ahead[i] = x[i]
+        sine, cosine = math.sin(x[0]), math.cos(x[0])
         of_rate, of_acceleration = told(x[1], P[1, 1]), told(x[2], P[2, 2])
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:
-                expected, entries, noise = row_of(i, ahead, z, k, geometry, places, constants, p, y, at, row)
+                expected, entries, noise = row_of(
+                    i, ahead, sine, cosine, z, k, geometry, places, constants, p, y, at, row
+                )
                 believed(at, row, entries, places, of_rate, of_acceleration)
                 v = z[k, i] - expected
                 for a in range(entries):
