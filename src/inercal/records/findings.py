@@ -44,6 +44,7 @@ CODES: dict[str, str] = {
     "turn_doubtful": "which motion is a turn is not certain",
     "skipped_turn": "a turn was left out of the fit",
     "stated_earth_rate": "earth rate is subtracted and its terms are not fitted",
+    "uncertain_site": "gravity or earth rate is known so badly that it rules the uncertainties",
     "whole_turns": "the angle of a turning axis is not known, and whole turns are taken for granted",
     "weak_term": "a term is hardly known",
     "noise_misfit": "the noise is not of the kinds that are fitted",

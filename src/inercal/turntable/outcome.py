@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.design.comparison import in_basis
-from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.instruments.terms import TERMS
@@ -35,6 +35,9 @@ WORST_CONDITION = 100.0
 
 SURPRISE = 1e-4
 """Probability of a misfit as large by chance, below which the readings contradict what is stated of them."""
+
+_RULES = 0.75
+"""Share of a variance by the site from which it is named: without it u is less than half."""
 
 MODELS = {
     "gyrowheel": (
@@ -143,7 +146,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     names = fit.model.symbols
     covariance, dof, budget = combine(names, sources(fit, terms, unit))
     status, message = _verdict(found, fitting)
-    findings += _too_large(fit)
+    findings += _too_large(fit) + _of_site(fit, budget)
     return Estimate(
         command=COMMAND,
         names=names,
@@ -216,6 +219,19 @@ def _too_large(fit: Regression) -> list[Finding]:
         "uncertainties hold for small errors"
     )
     return [Finding("large_errors", said)]
+
+
+def _of_site(fit: Regression, budget: Sequence[BudgetItem]) -> list[Finding]:
+    """What is to be said where u is more of the site than of table and noise."""
+    site = [item.share for item in budget if item.source in fit.model.site]
+    ruled = [name for name in fit.model.symbols if sum(share.get(name, 0.0) for share in site) > _RULES]
+    if not ruled:
+        return []
+    said = (
+        f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(fit.model.site)}): with an exact site it "
+        "would be less than half"
+    )
+    return [Finding("uncertain_site", said)]
 
 
 def _dead(fit: Regression, known: NDArray[np.bool_]) -> str:

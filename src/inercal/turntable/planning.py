@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -34,6 +35,10 @@ REFERENCES = (
     "22 (1980) 315-324",
 )
 """Publications behind the choice of positions."""
+
+
+_RULES = 2.0
+"""Ratio of u with an uncertain site to u with an exact one from which the site is named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +149,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
         plans.append(settings.plan)
     plans += [named(name) for name in asked.compare if name != settings.plan.name]
     judged = tuple(_judged(plan, settings, model) for plan in plans)
+    findings += _of_site(judged[0], settings)
     unit = settings.instrument.unit.si
     return Designed(
         plan=plans[0],
@@ -172,9 +178,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
     )
     used, seen, _ = choose_terms(settings, channels, plan.angles)
     c, (rank, terms) = _expected(settings, used), worst_rank(whole)
-    candidates = _candidates(used, plan.angles, c, settings, True)
-    prediction = i_criterion(sphere_rows(used) / np.sqrt(len(used.channels)))
-    figures = judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
+    figures = _figures(plan, settings, used)
     shares: Mapping[str, float] = {}
     if not any(each.words for each in seen):
         noise, samples = [settings.instrument.noise] * len(channels), _samples(settings, plan.angles)
@@ -192,6 +196,29 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
         earth_rate_of(used),
         shares,
     )
+
+
+def _figures(plan: Plan, settings: TurntableSettings, used: TableModel) -> PlanFigures:
+    """Figures of a plan for the terms ``used``, with table errors."""
+    candidates = _candidates(used, plan.angles, _expected(settings, used), settings, True)
+    prediction = i_criterion(sphere_rows(used) / np.sqrt(len(used.channels)))
+    return judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
+
+
+def _of_site(judged: Judged, settings: TurntableSettings) -> list[Finding]:
+    """A remark where it is the site, not the table or the noise, that rules what a plan is worth."""
+    used, _, _ = choose_terms(settings, channels_of(settings), judged.plan.angles)
+    rms = judged.figures.rms_prediction
+    best = _figures(judged.plan, settings, replace(used, references=())).rms_prediction
+    if not _RULES * best < rms < math.inf:
+        return []
+    unit = settings.instrument.unit
+    said = (
+        f"what [site] states is so uncertain ({', '.join(used.site)}) that the rms u of the output is "
+        f"{rms / unit.factor:.3g} {unit.symbol}; with an exact site it would be {best / unit.factor:.3g} "
+        f"{unit.symbol}: state the site better, and search again"
+    )
+    return [Finding("uncertain_site", said)]
 
 
 def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:

@@ -1,0 +1,73 @@
+"""What an uncertain latitude does to a calibration and to a plan, and that both say so."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study, table
+
+from inercal.geometry.earth import EARTH_RATE
+from inercal.geometry.site import Site
+from inercal.rigs.plans import grid
+from inercal.turntable.planning import design
+from inercal.turntable.settings import Design
+from inercal.turntable.simulate import simulate
+from inercal.turntable.task import calibrate
+
+NOISE = 0.01 * DEG_H
+
+
+def at(u, **more):
+    """A gyrowheel on a good table at a latitude known to ``u`` [rad]."""
+    return study(site=Site(9.8, (), LATITUDE, u), coefficients=WHEEL_X, noise=NOISE, **more)
+
+
+def calibrated(settings):
+    return calibrate(simulate(settings, np.random.default_rng(20261122)), settings).estimate
+
+
+def remarks(findings):
+    return [each.message for each in findings if each.code == "uncertain_site"]
+
+
+@pytest.mark.parametrize("u", [0.002, 0.05, 0.3])
+def test_what_a_wrong_latitude_costs_is_that_of_the_closed_form(u):
+    """The north part of earth rate gives k, that along gravity goes with D: with a latitude L' for the true L one finds
+    k' = k cos L / cos L' and D' = D - k W (sin L - cos L tan L'), so dk/dL' = k tan L and dD/dL' = k W / cos L."""
+    found, exact = calibrated(at(u)), calibrated(at(0.0))
+    u_of, value = (dict(zip(found.names, each, strict=True)) for each in (found.u, found.values))
+    without = dict(zip(exact.names, exact.u, strict=True))
+    for axis in "xyz":
+        k = abs(value[f"k_{axis}"])
+        assert u_of[f"k_{axis}"] == pytest.approx(
+            np.hypot(without[f"k_{axis}"], k * np.tan(LATITUDE) * u), rel=1e-3
+        )
+        of_drift = k * EARTH_RATE / np.cos(LATITUDE) * u
+        drift = f"DX_{axis.upper()}"
+        assert u_of[drift] == pytest.approx(np.hypot(without[drift], of_drift), rel=1e-3)
+
+
+def test_a_calibration_names_the_terms_that_the_site_rules():
+    """Those whose u would be less than half at an exact site, and no others."""
+    found, exact = calibrated(at(0.05)), calibrated(at(0.0))
+    ruled = [name for name, u, best in zip(found.names, found.u, exact.u, strict=True) if best < 0.5 * u]
+    assert {"k_x", "DX_X"} <= set(ruled) < set(found.names)
+    assert remarks(found.findings) == [
+        f"u of {', '.join(ruled)} is mostly of what [site] states (latitude): with an exact site it would be less than "
+        "half"
+    ]
+    assert not remarks(exact.findings)
+
+
+def test_a_design_says_what_a_better_latitude_would_be_worth():
+    """The number it names is that of the same positions at an exact site."""
+    few = Design(grid((12, 12)), positions=24, compare=())
+    made = {u: design(replace(at(u, chain=table()), design=few)) for u in (0.0, 0.3)}
+    assert not remarks(made[0.0].findings)
+    (said,) = remarks(made[0.3].findings)
+    same = replace(few, candidates=made[0.3].plan, positions=24)
+    (best, *_) = design(replace(at(0.0, chain=table()), design=same)).judged
+    rms = [each.figures.rms_prediction / DEG_H for each in (made[0.3].judged[0], best)]
+    assert rms[0] > 2.0 * rms[1]
+    assert f"(latitude) that the rms u of the output is {rms[0]:.3g} deg/h" in said
+    assert f"with an exact site it would be {rms[1]:.3g} deg/h" in said
