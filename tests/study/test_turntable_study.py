@@ -436,7 +436,5 @@ def test_a_study_is_for_its_own_commands(write, tmp_path):
     with pytest.raises(StudyError, match="a study for `inercal calibrate imu`, expected one of a turntable"):
         load_turntable_study(other)
     other.write_text(Path(tmp_path / "study.toml").read_text().replace("two_axis_turntable", "sting"))
-    with pytest.raises(
-        StudyError, match="a study for `inercal aoa`, expected one for `inercal calibrate turn"
-    ):
+    with pytest.raises(StudyError, match="a study for `inercal aoa`, expected one of a turntable"):
         load_turntable_study(other)

@@ -78,6 +78,26 @@ def test_the_way_between_positions_is_left_out(speed):
     assert_allclose(found.y[:, 0] / DEG_H, [0.0, 10.0, 30.0, 60.0], atol=2e-3)
 
 
+def test_a_stay_that_is_left_out_as_too_short_is_named():
+    """The table waits a third of the usual time at 20 deg, and turns at 5 deg a sample otherwise: only that is said."""
+    ways = np.arange(5.0, 20.0, 5.0), np.arange(25.0, 60.0, 5.0)
+    parts = [np.full(300, 0.0), ways[0], np.full(100, 20.0), ways[1], np.full(300, 60.0)]
+    phi1 = np.concatenate(parts)
+    angles = np.stack([phi1, np.zeros_like(phi1)], axis=-1)
+    found = readings(record_of(angles, phi1), JOINTS, "gyrowheel")
+    assert_allclose(np.degrees(found.angles[:, 0]), [0.0, 60.0])
+    (said,) = found.findings
+    assert said.code == "poor_section"
+    assert said.message.startswith("1 stay of less than half the usual length")
+    assert said.where == "row 304"
+    numbers = np.concatenate(
+        [np.full(len(part), k if k % 2 == 0 else np.nan) for k, part in enumerate(parts)]
+    )
+    numbered = readings(record_of(angles, phi1, numbers), JOINTS, "gyrowheel")
+    assert_allclose(np.degrees(numbered.angles[:, 0]), [0.0, 20.0, 60.0])
+    assert "poor_section" not in {each.code for each in numbered.findings}
+
+
 @pytest.mark.parametrize("numbered", [True, False])
 def test_the_noise_of_the_encoders_is_averaged_and_breaks_no_position(numbered):
     """10 arcsec on each of 1000 samples: the mean is good to 0.32 arcsec."""

@@ -30,6 +30,7 @@ _COMMANDS = {
 }
 
 _EXPECTED = {
+    "calibrate imu": "one for `inercal calibrate imu`",
     "calibrate turntable": "one of a turntable",
     "selfcal": "one for `inercal selfcal`",
     "aoa": "one for `inercal aoa`",
@@ -130,8 +131,7 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
     if meant_for != command:
         raise StudyError(
             path,
-            f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, "
-            f"expected one for `inercal {command}`",
+            f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, expected {_EXPECTED[command]}",
         )
     if rig is None and "imu" in data and command != "calibrate imu":
         raise StudyError(

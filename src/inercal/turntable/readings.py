@@ -93,10 +93,19 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     if len(angles) != len(columns[0].values):
         raise RecordError(where, f"{joints[0]} and {channels[0]} have different lengths, expected one table")
     values = np.stack([column.values for column in columns], axis=-1) * columns[0].unit.factor
-    groups = _by_number(record, angles, where) if "position" in record else _by_angle(angles)
+    groups, short = (_by_number(record, angles, where), []) if "position" in record else _by_angle(angles)
     if not groups:
         raise RecordError(where, "found no rows with angles, expected one or more for each position")
     found = _averaged(angles, values, groups, channels, columns[0].unit, where)
+    if short:
+        said = (
+            f"{counted(len(short), 'stay')} of less than half the usual length: the readings there are left out; a "
+            "column position that numbers the stays keeps them"
+        )
+        starts = [int(rows[0]) + 1 for rows in short]
+        found = replace(
+            found, findings=(*found.findings, Finding("poor_section", said, places("row", starts)))
+        )
     nowhere = np.flatnonzero(~np.isfinite(_places(record, angles)) & np.isfinite(values).any(axis=1)) + 1
     if not len(nowhere):
         return found
@@ -124,11 +133,11 @@ def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int
     return parts
 
 
-def _by_angle(angles: Array) -> list[NDArray[np.int64]]:
+def _by_angle(angles: Array) -> tuple[list[NDArray[np.int64]], list[NDArray[np.int64]]]:
     """Rows of each stretch of angles near those of its first row; short ones, where others are long, are motion.
 
-    The usual length is that of the stretch in which the middle row stands when stretches are sorted by length: a
-    slow turn makes many short ones, but of few rows.
+    Those among the short ones that do not move come second. The usual length is that of the stretch in which the middle
+    row stands when stretches are sorted by length: a slow turn makes many short ones, but of few rows.
     """
     known = np.flatnonzero(np.isfinite(angles).all(axis=1))
     still = angles[known]
@@ -138,10 +147,16 @@ def _by_angle(angles: Array) -> list[NDArray[np.int64]]:
         parts.append(known[start:stop])
         start = stop
     if not parts:
-        return []
+        return [], []
     lengths = np.sort([len(part) for part in parts])
     usual = lengths[np.searchsorted(np.cumsum(lengths), 0.5 * len(known))]
-    return [part for part in parts if len(part) >= SHORT * usual]
+    long = [part for part in parts if len(part) >= SHORT * usual]
+    return long, [part for part in parts if len(part) < SHORT * usual and _at_rest(angles[part])]
+
+
+def _at_rest(angles: Array) -> bool:
+    """Whether the angles of three rows or more stand still: a turn takes all the room that a position has."""
+    return len(angles) > 2 and bool(np.abs(_apart(angles, angles[0])).max() < 0.2 * STILL)
 
 
 def _departure(angles: Array, start: int) -> int:
