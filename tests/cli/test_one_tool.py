@@ -192,6 +192,28 @@ def test_every_result_has_the_same_keys_in_the_same_order(results):
         assert data["inputs"]
 
 
+@pytest.mark.parametrize("command", ["selfcal", "aoa", "calibrate turntable"])
+def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_path, monkeypatch, command):
+    """An example, or a simulated test, with a column of 21.5 and 22.5 degC by turns."""
+    monkeypatch.chdir(tmp_path)
+    name = command.split()[-1]
+    assert run(["new", name, "--quiet"]) == 0
+    small = ["--set", "positions.grid={phi1=6, phi2=6}"] if name == "turntable" else []
+    assert run(["simulate", name, f"{name}.toml", *small, "--seed", "1", "--out", "made.csv", "--quiet"]) == 0
+    head, *rows = (tmp_path / "made.csv").read_text("utf-8").splitlines()
+    warm = [
+        f"{head},temperature [degC]",
+        *(f"{row},{21.5 + k % 2}" for k, row in enumerate(rows[: len(rows) & ~1])),
+    ]
+    (tmp_path / "warm.csv").write_text("\n".join(warm) + "\n", "utf-8")
+    words = [*command.split(), "warm.csv", "--study", f"{name}.toml", "--quiet"]
+    for more, expected in (([], "22.0 degC"), (["--set", "conditions.temperature=20 degC"], "20 degC")):
+        assert run([*words, *more, "--out", "found.json"]) in (0, BAD_VERDICT)
+        assert (
+            json.loads((tmp_path / "found.json").read_text("utf-8"))["conditions"]["temperature"] == expected
+        )
+
+
 def test_every_name_in_a_result_has_a_row_in_the_table_of_terms(results):
     """And the unit of that row, whatever that of the output is."""
     names = {p["name"]: p["unit"] for data, _ in results.values() for p in data["parameters"]}

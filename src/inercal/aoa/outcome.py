@@ -23,6 +23,7 @@ from inercal.aoa.stated import by_fusion, gravity_u
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
+from inercal.records.temperature import temperature_words
 
 if TYPE_CHECKING:
     from inercal.aoa.delay import Delay
@@ -234,7 +235,7 @@ def _fields(recording: Recording, settings: AoaSettings, angles: Angles, model: 
             "angles": float(len(known)),
         },
         "conditions": {
-            "temperature": None if settings.temperature is None else settings.temperature.text,
+            "temperature": temperature_words(settings.temperature, recording.temperature),
             "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
             "date": settings.traceability.get("date", ""),
             "sensors": geometry(settings),

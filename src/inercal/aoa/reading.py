@@ -18,6 +18,7 @@ from inercal.records.clocks import usable_interval
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Column, Record
+from inercal.records.temperature import recorded_temperature
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -102,6 +103,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         masked=masked,
         findings=tuple(findings + rows.findings),
         sources=record.sources,
+        temperature=recorded_temperature(record),
     )
 
 

@@ -34,6 +34,8 @@ class Recording:
         of a turn.
     masked : (n, N + 1) bool or None
         Samples of accelerometers and gyro that were saturated.
+    temperature : str or None
+        That was recorded, its mean in words.
     """
 
     t: Array
@@ -47,6 +49,7 @@ class Recording:
     masked: NDArray[np.bool_] | None = None
     findings: tuple[Finding, ...] = ()
     sources: tuple[Source, ...] = ()
+    temperature: str | None = None
 
     @property
     def rows(self) -> Array:

@@ -20,7 +20,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record, Triad
-from inercal.records.temperature import temperature_words
+from inercal.records.temperature import recorded_temperature, temperature_words
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def _conditions(record: Record, recording: Recording, settings: ImuSettings) -> 
         ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
     return {
         "frame": FRAME,
-        "temperature": temperature_words(record, settings.temperature),
+        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
         "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,

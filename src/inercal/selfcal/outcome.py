@@ -16,6 +16,7 @@ from inercal.estimate.result import Estimate, coverage_factor, provenance, witho
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted
+from inercal.records.temperature import temperature_words
 from inercal.selfcal.bounds import Bounds
 from inercal.selfcal.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.display import shown_unit
@@ -371,7 +372,7 @@ def _conditions(recording: Recording, settings: SelfcalSettings) -> dict[str, An
     site = settings.site
     return {
         "frame": "p, of the platform: X_p along accelerometer x, Y_p in the plane of accelerometers x and y",
-        "temperature": None if settings.temperature is None else settings.temperature.text,
+        "temperature": temperature_words(settings.temperature, recording.temperature),
         "site": {"gravity_m_s2": site.gravity, "latitude_rad": site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": {

@@ -18,6 +18,7 @@ from inercal.errors import RecordError
 from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Column, Record
+from inercal.records.temperature import recorded_temperature
 from inercal.selfcal.gaps import with_held
 from inercal.selfcal.kinematics import TWO_PI
 from inercal.selfcal.plausibility import implausible, off_the_path
@@ -80,7 +81,8 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     said = (*worth_saying(record, columns), *findings)
     gained = all(column.increment for column in columns[:3])
     rate, held = with_held(t, rate, th, settings.world, gained)
-    recording = Recording(t, rate, th, acc, sensor == "gyro", said, record.sources, held)
+    warm = recorded_temperature(record)
+    recording = Recording(t, rate, th, acc, sensor == "gyro", said, record.sources, held, warm)
     findings = implausible(recording, settings, where)
     if settings.plan is not None:
         began = float(time[np.argmax(np.isfinite(time))])

@@ -33,6 +33,8 @@ class Recording:
     held : tuple of int
         Steps whose rate was not recorded, and is that of a platform that turns on as before
         (`inercal.selfcal.gaps`).
+    temperature : str or None
+        That was recorded, its mean in words.
     """
 
     t: Array
@@ -43,6 +45,7 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     sources: tuple[Source, ...] = ()
     held: tuple[int, ...] = ()
+    temperature: str | None = None
 
     @property
     def dt(self) -> Array:

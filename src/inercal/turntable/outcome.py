@@ -17,7 +17,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.records.temperature import temperature_words
+from inercal.records.temperature import recorded_temperature, temperature_words
 from inercal.turntable.fitting import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.model import orthonormal
 from inercal.turntable.readings import Readings
@@ -344,7 +344,7 @@ def _conditions(record: Record, found: Readings, settings: TurntableSettings) ->
     }
     return {
         "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
-        "temperature": temperature_words(record, settings.temperature),
+        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
         "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,

@@ -15,7 +15,7 @@ from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.records.temperature import temperature_words
+from inercal.records.temperature import recorded_temperature, temperature_words
 from inercal.turntable.outcome import COMMAND, WORST_CONDITION, unit_of_term
 from inercal.turntable.rate import Input, RateDwells
 from inercal.turntable.rate_fit import RateFit, approaches
@@ -230,7 +230,7 @@ def _common(record: Record, found: RateDwells, settings: TurntableSettings) -> d
         "model": MODEL,
         "conditions": {
             "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
-            "temperature": temperature_words(record, settings.temperature),
+            "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
             "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
             "date": settings.traceability.get("date", ""),
             "ranges": {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]},

@@ -28,7 +28,7 @@ from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record
-from inercal.records.temperature import temperature_words
+from inercal.records.temperature import recorded_temperature, temperature_words
 
 Array = NDArray[np.float64]
 
@@ -193,7 +193,7 @@ def _conditions(record: Record, fit: Fit, settings: ImuSettings) -> dict[str, An
         ranges["rate_about_an_axis_rad_s"] = [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()]
     return {
         "frame": FRAME,
-        "temperature": temperature_words(record, settings.temperature),
+        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
         "site": {"gravity_m_s2": g, "latitude_rad": settings.site.latitude},
         "date": settings.traceability.get("date", ""),
         "ranges": ranges,

@@ -23,7 +23,7 @@ from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record, Triad
-from inercal.records.temperature import temperature_words
+from inercal.records.temperature import recorded_temperature, temperature_words
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ def _conditions(
     t = acc.t[np.isfinite(acc.t)]
     return {
         "frame": FRAME,
-        "temperature": temperature_words(record, settings.temperature),
+        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
         "site": {"gravity_m_s2": g, "latitude_rad": settings.site.latitude},
         "turn_deg": math.degrees(options.turn),
         "date": settings.traceability.get("date", ""),
