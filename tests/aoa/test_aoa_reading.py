@@ -9,7 +9,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 from sting_study import BASE, DEG, G, scenario, study
 
-from inercal.aoa.reading import recording_of
+from inercal.aoa.reading import of_sensors, recording_of
 from inercal.aoa.settings import Calibration
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError
@@ -156,6 +156,16 @@ def test_missing_sensors():
     assert the(recording_of(record(a4=("g", np.cos(T))), SHORT), "not_stated").message.startswith(
         "a4: not under"
     )
+
+
+def test_a_calibration_that_ended_badly_is_named_in_files_and_streams():
+    """Its numbers are used: whether they are good enough is for the user to say."""
+    settings = study(sensors={"a2": Calibration(caution="a2.json ended inconsistent: why")})
+    assert (
+        the(recording_of(record(), settings), "bad_verdict").message == "a2: a2.json ended inconsistent: why"
+    )
+    told = of_sensors(["a1", "a3"], ["gyro"], record(), settings)
+    assert all(finding.code != "bad_verdict" for finding in told)  # of a sensor that is not there, nothing
 
 
 def test_a_sensor_that_sticks_for_a_while():

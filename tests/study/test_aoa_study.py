@@ -269,6 +269,17 @@ def test_set_of_a_calibration_takes_the_place_of_scale_and_bias_and_back(write, 
     assert (back.scale, back.bias) == pytest.approx((1.0, G))
 
 
+@pytest.mark.parametrize("status", ["ok", "inconsistent"])
+def test_what_a_calibration_says_against_itself_goes_with_it(write, tmp_path, status):
+    file = tmp_path / "a1.json"
+    calibrated(file, K0_x=(0.0, "g"), K1_x=(2.0, "g/(m/s^2)"))
+    data = json.loads(file.read_text())
+    data["status"] = {"code": status, "message": "as it was"}
+    file.write_text(json.dumps(data))
+    found = load_aoa_study(write(CONTRACT), [f"sensors.a1.calibration={file}"]).calibration("a1")
+    assert found.caution == ("" if status == "ok" else "a1.json ended inconsistent: as it was")
+
+
 def test_studies_of_other_commands_are_told_apart(write):
     for load in (load_imu_study, load_turntable_study, load_selfcal_study):
         with pytest.raises(StudyError, match=r"rig\.kind: found 'sting', a study for `inercal aoa`"):

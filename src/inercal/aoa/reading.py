@@ -85,7 +85,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
             masked[:, measured.index(name)] = out
         values[name] = on_rows
         findings += _said(name, out, stuck, settings.calibration(name))
-    findings += missing(there, gyros, record, settings)
+    findings += of_sensors(there, gyros, record, settings)
     both = all(name in gyros for name in GYROS[1:])
     turns = np.column_stack([values[name] if both else none for name in GYROS[1:]])
     return Recording(
@@ -254,9 +254,11 @@ def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding
     return findings
 
 
-def missing(there: list[str], gyros: list[str], record: Record, settings: AoaSettings) -> list[Finding]:
-    """Sensors that are not there or say nothing, and accelerometers that the study does not know."""
-    findings = []
+def of_sensors(there: list[str], gyros: list[str], record: Record, settings: AoaSettings) -> list[Finding]:
+    """Sensors that are not there or say nothing, accelerometers that the study does not know, and calibrations that
+    ended badly."""
+    cautions = ((name, settings.calibration(name).caution) for name in (*there, *gyros))
+    findings = [Finding("bad_verdict", f"{name}: {caution}") for name, caution in cautions if caution]
     for name in settings.layout.names:
         if name not in there:
             why = "holds no number" if name in record else "is not in the record"

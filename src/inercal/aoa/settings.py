@@ -75,7 +75,7 @@ class Calibration:
 
     ``scale`` SI per SI unit of the record's column, or ``per`` volt or count of it; ``bias`` [SI]; ``scale_slope``
     [1/K] and ``bias_slope`` [SI/K] about ``temperature`` [degC]; ``range`` [SI] of what it measures, at or beyond
-    which it is saturated, None where not known.
+    which it is saturated, None where not known. ``caution``: what the file that it is of says against itself.
     """
 
     scale: float = 1.0
@@ -85,6 +85,7 @@ class Calibration:
     bias_slope: float = 0.0
     temperature: float = 20.0
     per: Per = "1"
+    caution: str = ""
 
     def measured(self, indication: Array, temperature: Array | float | None = None) -> Array:
         """What indications (n,) mean [SI]; at the calibration's own temperature where ``temperature`` is None."""

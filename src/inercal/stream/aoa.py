@@ -26,7 +26,7 @@ from inercal.aoa.model import GATE
 from inercal.aoa.posterior import corrected
 from inercal.aoa.posterior import load as load_posterior
 from inercal.aoa.problem import problem
-from inercal.aoa.reading import missing
+from inercal.aoa.reading import of_sensors
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.aoa.stated import gravity_u, leaning, leans, widened
 from inercal.aoa.zero import stated_at
@@ -125,7 +125,7 @@ class Aoa:
         spatial = all(name in gyros for name in GYROS[1:])
         if not spatial:
             level_of(settings)
-        self._missing = missing(there, gyros, record, settings)
+        self._remarks = of_sensors(there, gyros, record, settings)
         places = list(record.columns)
         used = [*there, *(GYROS if spatial else GYROS[:1])]
         self._sensors: list[tuple[int, int, Column]] = []
@@ -228,10 +228,10 @@ class Aoa:
         return state, values
 
     def _told_of_sensors(self, state: AoaState) -> AoaState:
-        """The state with what is missing said."""
+        """The state with what there is to say of the sensors said."""
         if state.said & 1 << _BEGUN:
             return state
-        for finding in self._missing:
+        for finding in self._remarks:
             self._say(finding)
         return state._replace(said=state.said | 1 << _BEGUN)
 

@@ -13,6 +13,7 @@ from inercal._toml import Strict
 from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.settings import GYROS, Calibration, Per
 from inercal.errors import InputError, QuantityError, StudyError
+from inercal.estimate.status import Status
 from inercal.study.fields import QuantityText, Temperature, positive, refusal
 from inercal.study.ratios import ELECTRIC, ExactText, Ratio, ScaleText, SlopeText
 from inercal.units import Quantity, parse_quantity, parse_unit, shown
@@ -199,8 +200,9 @@ def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, Calibra
 def _calibration(name: str, table: Any, where: str | Path) -> Calibration:
     """The calibration of one sensor."""
     if table.calibration is not None:
-        scale, bias, per = _from_file(name, table, where)
+        scale, bias, per, caution = _from_file(name, table, where)
     else:
+        caution = ""
         scale, per = (1.0, "1") if table.scale is None else (table.scale.value, table.scale.per)
         bias = 0.0 if table.bias is None else _bias(name, table.bias, scale, per, where)
     usual = Calibration()
@@ -212,6 +214,7 @@ def _calibration(name: str, table: Any, where: str | Path) -> Calibration:
         bias_slope=0.0 if table.bias_slope is None else table.bias_slope.value,
         temperature=usual.temperature if table.temperature is None else table.temperature.value,
         per=per,
+        caution=caution,
     )
 
 
@@ -245,16 +248,19 @@ def _without_u(quantity: Quantity, key: str, where: str | Path) -> Quantity:
     return quantity
 
 
-def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, Per]:
-    """Scale, bias and what the column holds, from a calibration of ours: output = K0 + K1 a, or D_F + S w."""
+def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, Per, str]:
+    """Scale, bias, what the column holds, and what is said against it, from a calibration of ours: output = K0 + K1 a,
+    or D_F + S w."""
     from inercal.estimate.files import load
 
     key = f"sensors.{name}.calibration"
     slope, offset = ("S", "D_F") if name in GYROS else ("K1", "K0")
     try:
-        found = load(Path(where).parent / table.calibration).parameters
+        estimate = load(Path(where).parent / table.calibration)
     except InputError as error:
         raise StudyError(where, f"{key}: {error}") from error
+    found, ended = estimate.parameters, estimate.status
+    caution = "" if ended is Status.OK else f"{table.calibration} ended {ended.value}: {estimate.message}"
     axes = [axis for axis in "xyz" if {f"{slope}_{axis}", f"{offset}_{axis}"} <= found.keys()]
     if not axes:
         raise StudyError(
@@ -285,7 +291,7 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
             f"{key}: found {slope}_{axis} = {gain.value:g} and {offset}_{axis} = {zero.value:g} in "
             f"{table.calibration}, expected a scale factor and an offset",
         )
-    return scale, bias, per
+    return scale, bias, per, caution
 
 
 def _dimension(name: str) -> str:
