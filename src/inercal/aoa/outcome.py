@@ -20,10 +20,10 @@ from inercal.aoa.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.aoa.sources import parts
 from inercal.aoa.stated import by_fusion, gravity_u
+from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
-from inercal.records.temperature import temperature_words
 
 if TYPE_CHECKING:
     from inercal.aoa.delay import Delay
@@ -234,17 +234,16 @@ def _fields(recording: Recording, settings: AoaSettings, angles: Angles, model: 
             "rate_hz": 1.0 / step,
             "angles": float(len(known)),
         },
-        "conditions": {
-            "temperature": temperature_words(settings.temperature, recording.temperature),
-            "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
-            "date": settings.traceability.get("date", ""),
-            "sensors": geometry(settings),
-            "ranges": {
+        "conditions": conditions(
+            settings,
+            recording.temperature,
+            {
                 "duration_s": float(t[-1] - t[0]) if len(t) else 0.0,
                 "theta_rad": _span(known),
                 "rate_rad_s": float(np.abs(rate).max()) if len(rate) else None,
             },
-        },
+            sensors=geometry(settings),
+        ),
         "traceability": settings.traceability,
         "inputs": recording.sources,
         "provenance": provenance(settings.given),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import combine, common
+from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
@@ -20,7 +21,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record, Triad
-from inercal.records.temperature import recorded_temperature, temperature_words
+from inercal.records.temperature import recorded_temperature
 
 Array = NDArray[np.float64]
 
@@ -151,13 +152,7 @@ def _conditions(record: Record, recording: Recording, settings: ImuSettings) -> 
     if recording.gyro is not None:
         finite = recording.gyro.values[np.isfinite(recording.gyro.values).all(axis=1)]
         ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
-    return {
-        "frame": FRAME,
-        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
-        "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
-        "date": settings.traceability.get("date", ""),
-        "ranges": ranges,
-    }
+    return conditions(settings, recorded_temperature(record), ranges, frame=FRAME)
 
 
 def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any]]:

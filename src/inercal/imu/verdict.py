@@ -50,7 +50,10 @@ def pose_words(direction: Array) -> str:
 
 
 def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
-    """The direction, of the 26 along axes, edges and corners, that tells most of the weakest combination."""
+    """The direction (3,) of specific force in b, a unit vector, that tells most of the weakest combination.
+
+    One of the 26 along axes, edges and corners of a cube; ``gravity`` [m/s^2] is the size it would have there.
+    """
     known = fit.fit.identifiability
     weak = known.directions[-1] / known.scale
     grid = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])

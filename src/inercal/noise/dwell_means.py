@@ -75,7 +75,8 @@ class AllanFit:
 
 
 def fit(x: Array, interval: float) -> AllanFit:
-    """Fit noise coefficients to a static recording: `fit_pooled` of a single stretch, n >= 16."""
+    """Fit noise coefficients to a static recording ``x`` (n, channels), n >= 16, each ``interval`` [s] a sample:
+    `fit_pooled` of a single stretch."""
     return fit_pooled([x], interval)
 
 

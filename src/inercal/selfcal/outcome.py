@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import BudgetItem, combine, common
+from inercal.estimate.conditions import conditions
 from inercal.estimate.consistency import Nis, nis
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted
-from inercal.records.temperature import temperature_words
 from inercal.selfcal.bounds import Bounds
 from inercal.selfcal.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.display import shown_unit
@@ -34,6 +34,8 @@ from inercal.selfcal.unmodelled import likely
 Array = NDArray[np.float64]
 
 COMMAND = "selfcal"
+
+FRAME = "p, of the platform: X_p along accelerometer x, Y_p in the plane of accelerometers x and y"
 
 MODEL = (
     "w_Ip^p = w_c + M w_c + kg0, M = [[0, ds_x, -do_x], [-do_y, 0, ds_y], [ds_z, -do_z, 0]]; "
@@ -369,13 +371,10 @@ def _rms(filtered: Filtered) -> float:
 def _conditions(recording: Recording, settings: SelfcalSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid."""
     angles = recording.th[np.isfinite(recording.th).all(axis=1)]
-    site = settings.site
-    return {
-        "frame": "p, of the platform: X_p along accelerometer x, Y_p in the plane of accelerometers x and y",
-        "temperature": temperature_words(settings.temperature, recording.temperature),
-        "site": {"gravity_m_s2": site.gravity, "latitude_rad": site.latitude},
-        "date": settings.traceability.get("date", ""),
-        "ranges": {
+    return conditions(
+        settings,
+        recording.temperature,
+        {
             "duration_s": float(recording.t[-1] - recording.t[0]),
             "step_s": float(np.median(recording.dt)),
             "rate_rad_s": float(np.linalg.norm(recording.rate, axis=1).max()),
@@ -384,5 +383,6 @@ def _conditions(recording: Recording, settings: SelfcalSettings) -> dict[str, An
                 for name, low, high in zip(JOINTS, angles.min(axis=0), angles.max(axis=0), strict=True)
             },
         },
-        "rate": "measured" if recording.measured else "commanded",
-    }
+        frame=FRAME,
+        rate="measured" if recording.measured else "commanded",
+    )

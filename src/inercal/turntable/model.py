@@ -19,6 +19,9 @@ from inercal.turntable.settings import TurntableSettings
 
 Array = NDArray[np.float64]
 
+FRAME = "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors"
+"""Axes of the results."""
+
 
 @dataclass(frozen=True, eq=False)
 class Stated:

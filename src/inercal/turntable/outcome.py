@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from inercal.design.comparison import in_basis
 from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
+from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature, temperature_words
+from inercal.records.temperature import recorded_temperature
 from inercal.turntable.fitting import Fitting, earth_rate_of, fewest_positions
-from inercal.turntable.model import orthonormal
+from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression, worst_rank
 from inercal.turntable.settings import TurntableSettings
@@ -342,13 +343,7 @@ def _conditions(record: Record, found: Readings, settings: TurntableSettings) ->
             found.channels, found.y.min(axis=0).tolist(), found.y.max(axis=0).tolist(), strict=True
         )
     }
-    return {
-        "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
-        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
-        "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
-        "date": settings.traceability.get("date", ""),
-        "ranges": ranges,
-    }
+    return conditions(settings, recorded_temperature(record), ranges, frame=FRAME)
 
 
 def _plan(found: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:

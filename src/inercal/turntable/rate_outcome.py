@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.conditions import conditions
 from inercal.estimate.identifiability import Identifiability
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature, temperature_words
+from inercal.records.temperature import recorded_temperature
+from inercal.turntable.model import FRAME
 from inercal.turntable.outcome import COMMAND, WORST_CONDITION, unit_of_term
 from inercal.turntable.rate import Input, RateDwells
 from inercal.turntable.rate_fit import RateFit, approaches
@@ -228,13 +230,12 @@ def _common(record: Record, found: RateDwells, settings: TurntableSettings) -> d
     """What every estimate of a rate test says."""
     return {
         "model": MODEL,
-        "conditions": {
-            "frame": "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors",
-            "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
-            "site": {"gravity_m_s2": settings.site.gravity, "latitude_rad": settings.site.latitude},
-            "date": settings.traceability.get("date", ""),
-            "ranges": {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]},
-        },
+        "conditions": conditions(
+            settings,
+            recorded_temperature(record),
+            {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]},
+            frame=FRAME,
+        ),
         "traceability": settings.traceability,
         "inputs": record.sources,
         "provenance": provenance(settings.given),

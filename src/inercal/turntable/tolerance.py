@@ -116,7 +116,10 @@ class Alternatives:
 
 
 def alternatives(fit: Regression, slope: Array) -> Alternatives:
-    """What halving each tolerance would bring, and what the scopes mean; the fit is weighted anew each time."""
+    """What halving each tolerance would bring, and what the scopes mean; the fit is weighted anew each time.
+
+    ``slope`` (p, p) of the terms as reported by the linear coefficients; u is of those, in the unit of the fit.
+    """
     chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
 
     def u(changed: Chain) -> Array:

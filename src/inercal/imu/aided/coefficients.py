@@ -63,7 +63,11 @@ def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]
 
 
 def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[TypeA]:
-    """What the noise in the data does to the coefficients: white noise and the wander of the biases, by triad."""
+    """What the noise in the data does to the coefficients: white noise and the wander of the biases, by triad.
+
+    ``rows`` (p, n) derivatives of the coefficients ``names`` (p,) by the unknowns of the fit; ``own`` (p,) variance
+    that a coefficient has beside them.
+    """
     sources = []
     gain = rows @ fit.covariance
     for triad in dict.fromkeys(sensor.side.sensor for sensor in fit.sensors):
@@ -102,8 +106,9 @@ def type_b(
 ) -> list[TypeB]:
     """What is known from elsewhere: gravity and the clock, earth rate, the errors of the table.
 
-    Gravity sets the scale of specific force, the clock that of rate. Earth rate and the errors of the table are
-    unknowns of the fit with a prior; what the data do not tell of them is left here.
+    Gravity sets the scale of specific force, the clock, known to the part ``clock_u``, that of rate. Earth rate and the
+    errors of the table are unknowns of the fit with a prior; what the data do not tell of them is left here. ``rows``
+    and ``names`` as in `type_a`, ``values`` (p,) of the coefficients in SI.
     """
 
     def scaled(factor: float, *prefixes: str) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import TypeB, combine, common
+from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.aided.coefficients import (
@@ -28,7 +29,7 @@ from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature, temperature_words
+from inercal.records.temperature import recorded_temperature
 
 Array = NDArray[np.float64]
 
@@ -191,10 +192,4 @@ def _conditions(record: Record, fit: Fit, settings: ImuSettings) -> dict[str, An
     if "gyro" in fit.known:
         rate = fit.references["gyro"].rate
         ranges["rate_about_an_axis_rad_s"] = [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()]
-    return {
-        "frame": FRAME,
-        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
-        "site": {"gravity_m_s2": g, "latitude_rad": settings.site.latitude},
-        "date": settings.traceability.get("date", ""),
-        "ranges": ranges,
-    }
+    return conditions(settings, recorded_temperature(record), ranges, frame=FRAME)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.estimate.budget import combine, common
+from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.estimate.status import Status
 from inercal.imu.ferraris.method import NAMES, coefficients
@@ -23,7 +24,7 @@ from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.findings import Finding
 from inercal.records.record import Record, Triad
-from inercal.records.temperature import recorded_temperature, temperature_words
+from inercal.records.temperature import recorded_temperature
 
 Array = NDArray[np.float64]
 
@@ -126,20 +127,19 @@ def _conditions(
     g = settings.site.gravity
     finite = gyro.values[np.isfinite(gyro.values).all(axis=1)]
     t = acc.t[np.isfinite(acc.t)]
-    return {
-        "frame": FRAME,
-        "temperature": temperature_words(settings.temperature, recorded_temperature(record)),
-        "site": {"gravity_m_s2": g, "latitude_rad": settings.site.latitude},
-        "turn_deg": math.degrees(options.turn),
-        "date": settings.traceability.get("date", ""),
-        "ranges": {
+    return conditions(
+        settings,
+        recorded_temperature(record),
+        {
             "specific_force_along_an_axis_m_s2": [-g, g],
             "duration_s": float(t[-1] - t[0]),
             "rate_hz": acc.rate,
             "gyro_output": [finite.min(axis=0), finite.max(axis=0)],
             "rate_of_turn_rad_s": float(np.max(np.abs(options.turn / errors.readings.inputs.durations))),
         },
-    }
+        frame=FRAME,
+        turn_deg=math.degrees(options.turn),
+    )
 
 
 def _section_table(acc: Triad, sections: Sections) -> list[Mapping[str, Any]]:
