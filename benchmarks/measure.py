@@ -183,6 +183,13 @@ def machine() -> dict[str, object]:
     }
 
 
+def yardstick() -> float:
+    """Milliseconds of the processor that a fixed piece of work takes just now: how fast the machine is."""
+    began = PROCESSOR()
+    sum(k * k for k in range(1_000_000))
+    return 1e3 * (PROCESSOR() - began)
+
+
 def peak() -> float:
     """Largest memory of this process so far [MiB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0

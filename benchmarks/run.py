@@ -12,11 +12,12 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from textwrap import fill
 
-from measure import Row, Spread, machine, table
+from measure import Row, Spread, machine, spread, table, yardstick
 
 FOLDER = Path(__file__).parent
 
@@ -34,8 +35,12 @@ PARTS = {
 }
 
 
-def objects_of(script: str, quick: bool) -> list[dict]:
-    """What a script says as JSON; it is told on standard error that it runs, and for how long it did."""
+def objects_of(script: str, quick: bool, moments: list[float]) -> list[dict]:
+    """What a script says as JSON; it is told on standard error that it runs, and for how long it did.
+
+    ``moments`` receives what the yardstick is before it.
+    """
+    moments.append(yardstick())
     began = time.perf_counter()
     print(f"{script:16s}", end="", file=sys.stderr, flush=True)
     command = [sys.executable, str(FOLDER / f"{script}.py"), *(["--quick"] if quick else [])]
@@ -61,7 +66,8 @@ def as_markdown(results: dict) -> str:
         "# Benchmarks",
         fill(
             f"{results['date']}; {made['system']}, {made['processors']} processors, load {load}, "
-            f"Python {made['python']}, {versions}. Median (least to largest) of the rounds.",
+            f"Python {made['python']}, {versions}. Median (least to largest) of the rounds. Between the parts a fixed "
+            f"piece of work took {Spread(**results['yardstick'])} ms: so much does the machine vary by itself.",
             120,
         ),
     ]
@@ -93,11 +99,13 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="little work, once; no figure is to be judged")
     parser.add_argument("--out", type=Path, default=Path("build/bench"))
     options = parser.parse_args()
+    moments: list[float] = []
     results = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": machine(),
-        "rows": {title: objects_of(script, options.quick) for title, script in PARTS.items()},
-        "curves": objects_of("scaling", options.quick),
+        "rows": {title: objects_of(script, options.quick, moments) for title, script in PARTS.items()},
+        "curves": objects_of("scaling", options.quick, moments),
+        "yardstick": asdict(spread([*moments, yardstick()])),
     }
     written(results, options.out)
     broken = [told["what"] for rows in results["rows"].values() for told in rows if told["holds"] is False]

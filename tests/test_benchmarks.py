@@ -9,7 +9,7 @@ import re
 import runpy
 import sys
 from collections import Counter
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -57,6 +57,7 @@ def test_table_objects_and_picture_are_written(quick, tmp_path):
         "machine": measure.machine(),
         "rows": {title: measure.as_objects(rows) for title, rows in quick.items()},
         "curves": scaling.as_objects(scaling.curves(True)),
+        "yardstick": asdict(measure.spread([measure.yardstick() for _ in range(3)])),
     }
     told = json.loads(json.dumps(told))
     bench.written(told, tmp_path)
