@@ -166,6 +166,13 @@ def test_a_calibration_that_ended_badly_is_named_in_files_and_streams():
     )
     told = of_sensors(["a1", "a3"], ["gyro"], record(), settings)
     assert all(finding.code != "bad_verdict" for finding in told)  # of a sensor that is not there, nothing
+    rolling = study(sensors={"gyro_roll": Calibration(caution="roll.json ended inconsistent: why")})
+    for gyros, count in (
+        (["gyro", "gyro_roll"], 0),
+        (["gyro", "gyro_roll", "gyro_yaw"], 1),
+    ):  # used with yaw alone
+        told = of_sensors(["a1", "a2", "a3"], gyros, record(), rolling)
+        assert [finding.code for finding in told].count("bad_verdict") == count
 
 
 def test_a_sensor_that_sticks_for_a_while():

@@ -274,7 +274,7 @@ def test_what_a_calibration_says_against_itself_goes_with_it(write, tmp_path, st
     file = tmp_path / "a1.json"
     calibrated(file, K0_x=(0.0, "g"), K1_x=(2.0, "g/(m/s^2)"))
     data = json.loads(file.read_text())
-    data["status"] = {"code": status, "message": "as it was"}
+    data["status"] = {"code": status, "message": "as it\nwas"}
     file.write_text(json.dumps(data))
     found = load_aoa_study(write(CONTRACT), [f"sensors.a1.calibration={file}"]).calibration("a1")
     assert found.caution == ("" if status == "ok" else "a1.json ended inconsistent: as it was")

@@ -7,12 +7,11 @@ import pytest
 from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study, table
 
 from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import Site
+from inercal.geometry.site import GravityInput, Site
 from inercal.rigs.plans import grid
 from inercal.turntable.planning import design
-from inercal.turntable.settings import Design
-from inercal.turntable.simulate import simulate
-from inercal.turntable.task import calibrate
+from inercal.turntable.settings import Design, RateTest
+from inercal.turntable.task import calibrate, simulate
 
 NOISE = 0.01 * DEG_H
 
@@ -57,6 +56,34 @@ def test_a_calibration_names_the_terms_that_the_site_rules():
         "half"
     ]
     assert not remarks(exact.findings)
+
+
+def test_only_what_acts_is_named():
+    """Accelerometers feel gravity and no earth rate: of an uncertain latitude with gravity stated, nothing is said."""
+    gravity = GravityInput("gravity", 0.02, "m/s^2", 1.0)
+    scales = {f"K1_{axis}": 1.0 for axis in "xyz"}
+    site = Site(9.806, (gravity,), LATITUDE, 0.01)
+    of_force = study(
+        grid((7, 8)), site=site, kind="accelerometer", unit="m/s^2", coefficients=scales, noise=1e-4
+    )
+    (said,) = remarks(calibrated(of_force).findings)
+    assert said.startswith("u of K1_x, K1_y, K1_z is mostly of what [site] states (gravity): ")
+    few = Design(grid((7, 8)), positions=40, compare=())
+    (said,) = remarks(design(replace(of_force, chain=table(), design=few)).findings)
+    assert "so uncertain (gravity) that" in said
+
+
+def test_a_rate_test_says_so_too():
+    """The vertical part of earth rate is in the mean of both senses of turning: all of it goes into D_F_z."""
+    u = 0.1
+    posed = study(
+        site=Site(9.8, (), LATITUDE, u), kind="gyro", unit="deg/s", coefficients={"S_z": 1.0}, noise=1e-9
+    )
+    rates = tuple(np.radians([-20.0, -10.0, 10.0, 20.0]))
+    estimate = calibrated(replace(posed, rate_test=RateTest(rates=rates)))
+    assert estimate["D_F_z"].u == pytest.approx(EARTH_RATE * np.cos(LATITUDE) * u, rel=1e-3)
+    (said,) = remarks(estimate.findings)
+    assert said.startswith("u of D_F_z is mostly of what [site] states (latitude)")
 
 
 def test_a_design_says_what_a_better_latitude_would_be_worth():

@@ -257,7 +257,9 @@ def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding
 def of_sensors(there: list[str], gyros: list[str], record: Record, settings: AoaSettings) -> list[Finding]:
     """Sensors that are not there or say nothing, accelerometers that the study does not know, and calibrations that
     ended badly."""
-    cautions = ((name, settings.calibration(name).caution) for name in (*there, *gyros))
+    both = all(name in gyros for name in GYROS[1:])
+    used = [*there, *(name for name in gyros if both or name == GYROS[0])]
+    cautions = ((name, settings.calibration(name).caution) for name in used)
     findings = [Finding("bad_verdict", f"{name}: {caution}") for name, caution in cautions if caution]
     for name in settings.layout.names:
         if name not in there:

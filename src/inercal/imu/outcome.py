@@ -192,7 +192,7 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
         message = (
             f"found {counted(len(dwells), 'static interval')} of at least {window / recording.accelerometer.rate:.1f} "
             f"s at a threshold of {best:g} times the variance at rest, expected at least {FEWEST}: hold the "
-            "instrument still for 2 s and more in 12 to 40 different poses, each side up and the edges between"
+            "instrument still for 3 s or more in 12 to 40 different poses, each side up and the edges between"
         )
     else:
         status = Status.UNOBSERVABLE

@@ -260,7 +260,8 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
     except InputError as error:
         raise StudyError(where, f"{key}: {error}") from error
     found, ended = estimate.parameters, estimate.status
-    caution = "" if ended is Status.OK else f"{table.calibration} ended {ended.value}: {estimate.message}"
+    said = " ".join(estimate.message.split())  # one line, whoever wrote the file
+    caution = "" if ended is Status.OK else f"{table.calibration} ended {ended.value}: {said}"
     axes = [axis for axis in "xyz" if {f"{slope}_{axis}", f"{offset}_{axis}"} <= found.keys()]
     if not axes:
         raise StudyError(

@@ -26,7 +26,7 @@ _IMU = """\
 schema = 1                          # version of this format
 
 [site]                              # its gravity is what the accelerometers are calibrated against
-latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere on Earth
+latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere in the north
 height = "0(300) m"                 # above sea level [m]; replace it: this is most inhabited places
 # gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
 
@@ -56,7 +56,7 @@ _TURNTABLE = """
 schema = 1                          # version of this format
 
 [site]                              # gravity and earth rate, in which the instrument turns
-latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere on Earth
+latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere in the north
 height = "0(300) m"                 # above sea level [m]; replace it: this is most inhabited places
 # gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
 
@@ -129,7 +129,7 @@ def imu_template(
 ) -> str:
     """A study for ``inercal calibrate imu`` with every key in it, each explained.
 
-    It loads as it is; its latitude and height then stand for anywhere on Earth, with the uncertainty of
+    It loads as it is; its latitude and height then stand for anywhere in the north, with the uncertainty of
     gravity that goes with it.
 
     Parameters
@@ -157,7 +157,7 @@ def turntable_template(
     """A study of a turntable with every key in it, each explained; arguments as for `imu_template`.
 
     ``channels`` are those of the recordings with their units, where known: they tell the kind of instrument. It
-    loads as it is, with eleven errors of 2 arcmin and a latitude that stands for anywhere on Earth.
+    loads as it is, with eleven errors of 2 arcmin and a latitude that stands for anywhere in the north.
     """
     following = f"sensitivity {_words([study_path])}"
     if record_paths:
@@ -176,7 +176,7 @@ def selfcal_template(
 ) -> str:
     """A study of a self-calibration with every key in it, each explained; arguments as for `imu_template`.
 
-    It loads as it is: the paper's path and platform, at a latitude that stands for anywhere on Earth.
+    It loads as it is: the paper's path and platform, at a latitude that stands for anywhere in the north.
     """
     following = f"simulate selfcal {_words([study_path])} --out simulated.csv"
     if record_paths:
@@ -191,7 +191,7 @@ def aoa_template(
 ) -> str:
     """A study of an angle of attack with every key in it, each explained; arguments as for `imu_template`.
 
-    It loads as it is: the paper's three axes, pitching by 10 deg, at a latitude that stands for anywhere on Earth.
+    It loads as it is: the paper's three axes, pitching by 10 deg, at a latitude that stands for anywhere in the north.
     """
     following = f"simulate aoa {_words([study_path])} --out simulated.csv"
     if record_paths:

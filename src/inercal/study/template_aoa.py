@@ -8,7 +8,7 @@ AOA: Final = """
 schema = 1                          # version of this format
 
 [site]                              # its gravity is what the accelerometers measure the angle by
-latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere on Earth
+latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere in the north
 height = "0(300) m"                 # above sea level [m]; replace it: this is most inhabited places
 # gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
 
@@ -136,4 +136,4 @@ states = 19                         # or 15, 11, 8: fewer errors of the sensors 
 # end = "5 s"                       # of the stretch [s]
 # angle = "0.00(1) deg"             # pitch in that stretch, with its standard uncertainty [deg]
 """
-"""All but the head and the tables that studies have in common; loads as it is, in a tunnel anywhere on Earth."""
+"""All but the head and the tables that studies have in common; loads as it is, in a tunnel anywhere in the north."""

@@ -8,7 +8,7 @@ SELFCAL: Final = """
 schema = 1                          # version of this format
 
 [site]                              # gravity and earth rate, in which the platform turns
-latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere on Earth
+latitude = "45(26) deg"             # north positive [deg]; replace it: this is anywhere in the north
 height = "0(300) m"                 # above sea level [m]; replace it: this is most inhabited places
 # gravity = "9.81744(2) m/s^2"      # local gravity if known [m/s^2]; wins over latitude and height
 
@@ -87,4 +87,4 @@ turns = 5                           # how many at most
 # criterion = "mean"                # of all u on a log scale; or "worst", the largest u over goal or prior
 # seed = 1                          # of the random starts
 """
-"""All but the head and the tables that studies have in common; loads as it is, on a rig anywhere on Earth."""
+"""All but the head and the tables that studies have in common; loads as it is, on a rig anywhere in the north."""

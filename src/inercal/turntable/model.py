@@ -89,12 +89,6 @@ class TableModel:
         return tuple(symbol for channel in self.channels for symbol in channel.symbols)
 
     @property
-    def site(self) -> tuple[str, ...]:
-        """Sources of the `references` that change anything."""
-        acting = [each.source for each in self.references if np.any(each.a_n) or np.any(each.w_n)]
-        return tuple(dict.fromkeys(acting))
-
-    @property
     def blocks(self) -> tuple[slice, ...]:
         """Where the terms of each channel stand among `symbols`."""
         ends = np.cumsum([len(channel.symbols) for channel in self.channels]).tolist()

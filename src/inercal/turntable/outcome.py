@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,7 +147,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     names = fit.model.symbols
     covariance, dof, budget = combine(names, sources(fit, terms, unit))
     status, message = _verdict(found, fitting)
-    findings += _too_large(fit) + _of_site(fit, budget)
+    findings += _too_large(fit) + of_site(names, budget, [each.source for each in fit.model.references])
     return Estimate(
         command=COMMAND,
         names=names,
@@ -222,15 +222,16 @@ def _too_large(fit: Regression) -> list[Finding]:
     return [Finding("large_errors", said)]
 
 
-def _of_site(fit: Regression, budget: Sequence[BudgetItem]) -> list[Finding]:
-    """What is to be said where u is more of the site than of table and noise."""
-    site = [item.share for item in budget if item.source in fit.model.site]
-    ruled = [name for name in fit.model.symbols if sum(share.get(name, 0.0) for share in site) > _RULES]
+def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collection[str]) -> list[Finding]:
+    """What is to be said where u of terms ``names`` is more of the ``sources`` of the site than of all else."""
+    site = [item for item in budget if item.source in sources]
+    ruled = [name for name in names if sum(item.share.get(name, 0.0) for item in site) > _RULES]
     if not ruled:
         return []
+    acting = [item.source for item in site if any(item.share.get(name) for name in ruled)]
     said = (
-        f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(fit.model.site)}): with an exact site it "
-        "would be less than half"
+        f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(acting)}): with an exact site it would "
+        "be less than half"
     )
     return [Finding("uncertain_site", said)]
 

@@ -208,15 +208,16 @@ def _figures(plan: Plan, settings: TurntableSettings, used: TableModel) -> PlanF
 def _of_site(judged: Judged, settings: TurntableSettings) -> list[Finding]:
     """A remark where it is the site, not the table or the noise, that rules what a plan is worth."""
     used, _, _ = choose_terms(settings, channels_of(settings), judged.plan.angles)
+    acting, _ = used.beside(judged.plan.angles, _expected(settings, used))
     rms = judged.figures.rms_prediction
     best = _figures(judged.plan, settings, replace(used, references=())).rms_prediction
     if not _RULES * best < rms < math.inf:
         return []
     unit = settings.instrument.unit
     said = (
-        f"what [site] states is so uncertain ({', '.join(used.site)}) that the rms u of the output is "
-        f"{rms / unit.factor:.3g} {unit.symbol}; with an exact site it would be {best / unit.factor:.3g} "
-        f"{unit.symbol}: state the site better, and search again"
+        f"what [site] states is so uncertain ({', '.join(each.source for each in acting if not each.term)}) that the "
+        f"rms u of the output is {rms / unit.factor:.3g} {unit.symbol}; with an exact site it would be "
+        f"{best / unit.factor:.3g} {unit.symbol}: state the site better"
     )
     return [Finding("uncertain_site", said)]
 

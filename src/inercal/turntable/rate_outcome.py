@@ -18,7 +18,7 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.model import FRAME
-from inercal.turntable.outcome import COMMAND, WORST_CONDITION, unit_of_term
+from inercal.turntable.outcome import COMMAND, WORST_CONDITION, of_site, unit_of_term
 from inercal.turntable.rate import Input, RateDwells
 from inercal.turntable.rate_fit import RateFit, approaches
 from inercal.turntable.settings import RateTest, TurntableSettings
@@ -81,7 +81,7 @@ def assemble(
         k=np.array([coverage_factor(float(each)) for each in dof]),
         status=status,
         message=message,
-        findings=tuple(findings),
+        findings=(*findings, *of_site(names, budget, ("latitude",))),
         statistics={
             "dof": float(min(fit.dof for fit in fits)),
             "condition": known.condition,

@@ -20,7 +20,8 @@ STILL = np.radians(3.0 / 60.0)
 """Angle [rad] within which rows are one position: above the noise of an encoder, below any step of a plan."""
 
 SHORT = 0.5
-"""A stay of less than this part of the usual one is the table on its way, where dwells are found by angle."""
+"""A stay of less than this part of the usual one is left out, where dwells are found by angle: the table on its way, or
+a stop, which is named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +156,10 @@ def _by_angle(angles: Array) -> tuple[list[NDArray[np.int64]], list[NDArray[np.i
 
 
 def _at_rest(angles: Array) -> bool:
-    """Whether the angles of three rows or more stand still: a turn takes all the room that a position has."""
-    return len(angles) > 2 and bool(np.abs(_apart(angles, angles[0])).max() < 0.2 * STILL)
+    """Whether most of three rows or more stand still: those of a turn take all the room that a position has, which puts
+    their median a quarter of it from the middle one."""
+    away = np.abs(_apart(angles, angles[len(angles) // 2]))
+    return len(angles) > 2 and bool(np.median(away, axis=0).max() < 0.15 * STILL)
 
 
 def _departure(angles: Array, start: int) -> int:
