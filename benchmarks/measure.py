@@ -91,11 +91,8 @@ class Row:
         """What is promised, and whether it holds."""
         if self.holds is None:
             return ""
-        what = (
-            f"≤ {self.at_most:.3g} {self.unit}"
-            if self.at_most is not None
-            else f"ratio ≥ {self.at_least:.3g}"
-        )
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        what = f"≤ {self.at_most:.3g}{unit}" if self.at_most is not None else f"ratio ≥ {self.at_least:.3g}"
         return f"{what}: {'holds' if self.holds else '**does not hold**'}"
 
 

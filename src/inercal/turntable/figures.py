@@ -359,7 +359,8 @@ def _rig_facts(settings: TurntableSettings) -> list[tuple[str, str, str]]:
     site = settings.site
     facts = [("rig", "", settings.rig.replace("_", " ")), ("gravity", "m/s²", f"{site.gravity:.7g}")]
     if site.latitude is not None:
-        facts.append(("latitude", "", f"{np.degrees(site.latitude):.6g}°"))
+        u = f" (u {np.degrees(site.latitude_u):.2g}°)" if site.latitude_u else ""
+        facts.append(("latitude", "", f"{np.degrees(site.latitude):.6g}°{u}"))
     return facts
 
 
