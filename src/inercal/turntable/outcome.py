@@ -37,8 +37,8 @@ WORST_CONDITION = 100.0
 SURPRISE = 1e-4
 """Probability of a misfit as large by chance, below which the readings contradict what is stated of them."""
 
-_RULES = 0.75
-"""Share of a variance by the site from which it is named: without it u is less than half."""
+RULED = 2.0
+"""Ratio of u to what it would be at an exact site from which the site is named."""
 
 MODELS = {
     "gyrowheel": (
@@ -225,7 +225,8 @@ def _too_large(fit: Regression) -> list[Finding]:
 def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collection[str]) -> list[Finding]:
     """What is to be said where u of terms ``names`` is more of the ``sources`` of the site than of all else."""
     site = [item for item in budget if item.source in sources]
-    ruled = [name for name in names if sum(item.share.get(name, 0.0) for item in site) > _RULES]
+    most = 1.0 - 1.0 / RULED**2  # of a variance
+    ruled = [name for name in names if sum(item.share.get(name, 0.0) for item in site) > most]
     if not ruled:
         return []
     acting = [item.source for item in site if any(item.share.get(name) for name in ruled)]

@@ -21,7 +21,7 @@ from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
 from inercal.turntable.fitting import choose_terms, earth_rate_of, rate_terms
 from inercal.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
-from inercal.turntable.outcome import unit_of_term
+from inercal.turntable.outcome import RULED, unit_of_term
 from inercal.turntable.regression import fit, full_inputs, known, worst_rank
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import drift_shares, sphere_rows
@@ -37,25 +37,29 @@ REFERENCES = (
 """Publications behind the choice of positions."""
 
 
-_RULES = 2.0
-"""Ratio of u with an uncertain site to u with an exact one from which the site is named."""
-
-
 @dataclass(frozen=True, eq=False)
 class Judged:
     """A plan and what it is worth.
 
-    ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``names`` (p,) of ``figures.u``, without
-    the terms of the earth rate where ``earth_rate`` is stated because the plan does not identify them;
-    ``drift_shares`` of the table's errors, as in `inercal.turntable.tolerance.drift_shares`.
+    ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``model`` with the terms that ``figures.u``
+    is of; ``drift_shares`` of the table's errors, as in `inercal.turntable.tolerance.drift_shares`.
     """
 
     plan: Plan
     figures: PlanFigures
     terms: int
-    names: tuple[str, ...]
-    earth_rate: str
+    model: TableModel
     drift_shares: Mapping[str, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Terms (p,) of ``figures.u``, without those of the earth rate where that is stated."""
+        return self.model.symbols
+
+    @property
+    def earth_rate(self) -> str:
+        """Whether the terms of the earth rate are fitted, or stated because the plan does not identify them."""
+        return earth_rate_of(self.model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +196,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
             unidentified=tuple(words for each in whole for words in each.words),
         ),
         terms,
-        used.symbols,
-        earth_rate_of(used),
+        used,
         shares,
     )
 
@@ -207,11 +210,10 @@ def _figures(plan: Plan, settings: TurntableSettings, used: TableModel) -> PlanF
 
 def _of_site(judged: Judged, settings: TurntableSettings) -> list[Finding]:
     """A remark where it is the site, not the table or the noise, that rules what a plan is worth."""
-    used, _, _ = choose_terms(settings, channels_of(settings), judged.plan.angles)
-    acting, _ = used.beside(judged.plan.angles, _expected(settings, used))
+    acting, _ = judged.model.beside(judged.plan.angles, _expected(settings, judged.model))
     rms = judged.figures.rms_prediction
-    best = _figures(judged.plan, settings, replace(used, references=())).rms_prediction
-    if not _RULES * best < rms < math.inf:
+    best = _figures(judged.plan, settings, replace(judged.model, references=())).rms_prediction
+    if not RULED * best < rms < math.inf:
         return []
     unit = settings.instrument.unit
     said = (
