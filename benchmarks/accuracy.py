@@ -18,7 +18,7 @@ from sting_bands import FIGURES, FILTERS, PAPER, UPPER, errors_of, judged
 
 from inercal.examples import FOLDER
 from inercal.selfcal.campaign import campaign
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 
 SEED = 20261121
 

@@ -20,10 +20,11 @@ import plain_fusion
 from measure import WALL, Row, alone, in_turn, named, peak, row, spread
 from sting_study import BASE, G, study
 
-from inercal.aoa import fusion, model, smoother
-from inercal.aoa.filtered import estimate
-from inercal.aoa.live import Live
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion import model, smoother
+from inercal.aoa.fusion import run as fusion
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.live import Live
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.simulate import simulate
 
 #: states -> microseconds a row that are promised of the filter, and of filter and smoother

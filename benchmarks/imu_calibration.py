@@ -25,7 +25,7 @@ from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.turns import carried, carried_with_derivatives
 from inercal.records.maps import read_map
 from inercal.records.read import read
-from inercal.study.load import load_imu_study
+from inercal.studies.load import load_imu_study
 
 XSENS = EXAMPLES["xsens"]
 

@@ -25,8 +25,9 @@ from measure import in_turn, named
 from sting_study import BASE, study
 
 import sensitivity
-from inercal.aoa import fusion, smoother
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion import run as fusion
+from inercal.aoa.fusion import smoother
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.simulate import simulate
 from inercal.geometry.site import Site
 from inercal.imu.multiposition import calibrate_multiposition
@@ -37,7 +38,7 @@ from inercal.noise.deviation import allan_deviation
 from inercal.report.style import COLOURS, figure, powers_of_ten, svg
 from inercal.rigs.chain import Chain, Error
 from inercal.rigs.plans import grid
-from inercal.sensitivity.exact import analyse
+from inercal.sensitivities.exact import analyse
 
 
 @dataclass(frozen=True)

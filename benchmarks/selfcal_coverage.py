@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from inercal.examples import FOLDER
 from inercal.selfcal.campaign import campaign
 from inercal.selfcal.settings import KINDS
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 
 SEED = 20261121
 

@@ -17,11 +17,11 @@ import plain_filterpy
 from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.settings import Filter
-from inercal.selfcal.simulate import experiment, simulate
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 
 CHOLESKY, EIGEN = "Cholesky first", "eigen"
 PEERS = {CHOLESKY: plain_filterpy.cholesky_first, EIGEN: plain_filterpy.eigen}

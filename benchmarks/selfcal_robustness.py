@@ -17,13 +17,13 @@ import numpy as np
 
 from inercal.examples import FOLDER
 from inercal.geometry.rotations import boxplus
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.plan import Plan, Turn
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import KINDS, Disturbances
-from inercal.selfcal.simulate import experiment, simulate
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 
 SEED = 20261121
 STUDY = load_selfcal_study(FOLDER / "selfcal.toml")

@@ -23,7 +23,7 @@ from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity.exact import analyse
+from inercal.sensitivities.exact import analyse
 
 ROWS = 1024
 SIZE = np.radians(2.0 / 60.0)

@@ -86,7 +86,7 @@ def _meaning(argument: Any) -> str:
 
 def study(kind: str) -> str:
     """Every key of one kind of study (``imu``, ``turntable``, ``selfcal``, ``aoa``), table by table."""
-    from inercal.study.schema import json_schema
+    from inercal.studies.schema import json_schema
 
     whole = json_schema()
     return _tables(whole["$defs"][f"{kind.capitalize()}StudyFile"], whole["$defs"])
@@ -95,7 +95,7 @@ def study(kind: str) -> str:
 def maps() -> str:
     """Every key of a column map, table by table."""
     from inercal.records.maps import MapEntry, NamedFileEntry
-    from inercal.study.schema import TomlSchema
+    from inercal.studies.schema import TomlSchema
 
     whole, named = (
         model.model_json_schema(schema_generator=TomlSchema) for model in (MapEntry, NamedFileEntry)
@@ -225,16 +225,19 @@ def _literal(value: object) -> str:
 
 def status() -> str:
     """Codes of the verdict."""
-    from inercal.estimate.status import Status
+    from inercal.findings import Status
 
     return table(("code", "meaning"), ((code(each.value), each.meaning) for each in Status))
 
 
 def findings() -> str:
     """Codes of the findings."""
-    from inercal.records.findings import CODES
+    from inercal.findings import CODES
 
-    return table(("code", "meaning"), ((code(each), meaning) for each, meaning in sorted(CODES.items())))
+    return table(
+        ("code", "meaning", "shifts values"),
+        ((code(name), each.meaning, each.harm.value) for name, each in sorted(CODES.items())),
+    )
 
 
 def terms() -> str:

@@ -10,6 +10,8 @@ import graphlib
 import re
 from pathlib import Path
 
+import pytest
+
 import inercal
 
 PACKAGE = Path(inercal.__file__).parent
@@ -17,8 +19,8 @@ ROOT = Path(__file__).parents[1]
 
 #: lowest first; a module imports from its own floor and those below
 FLOORS = [
-    {"errors"},
-    {"units"},
+    {"arrays", "errors", "inputs"},
+    {"findings", "units"},
     {"_jit", "_files", "_toml"},
     {"geometry"},
     {"instruments"},
@@ -26,11 +28,11 @@ FLOORS = [
     {"rigs"},
     {"estimate"},
     {"noise"},
-    {"sensitivity"},
-    {"design"},
+    {"sensitivities"},
+    {"designs"},
     {"imu", "turntable", "selfcal", "aoa"},
     {"convert"},
-    {"study"},
+    {"studies"},
     {"report"},
     {"stream"},
     {"examples"},
@@ -129,7 +131,7 @@ def test_imports_come_from_below():
 def test_records_stand_on_their_own():
     """A record is data: units and errors, no numerics."""
     rooms = {room(other) for other in imports("inercal.records.record") if other.startswith("inercal")}
-    assert rooms <= {"units", "errors", "records"}
+    assert rooms <= {"arrays", "units", "errors", "findings", "inputs", "records"}
 
 
 def test_no_circles():
@@ -141,6 +143,51 @@ def test_no_circles():
         own = {each for each in MODULES if module.startswith(each + ".")}
         graph[module] = (needed | around) - own - {module}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError, naming the circle
+
+
+#: rooms within a system, lowest first: a module imports from its own room and those before it
+WITHIN = {
+    "aoa": (
+        "layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task figures"
+    ),
+    "selfcal": (
+        "platform display settings filters before diagnosis find_base campaign reading result task figures"
+    ),
+}
+
+
+def all_imports(module):
+    """Modules of the package that a module names in any import, for type checking and inside functions too."""
+    for node in ast.walk(TREES[module]):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in SOURCES)
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                yield from (each for each in [name if name in SOURCES else node.module] if each in SOURCES)
+
+
+def test_no_circles_of_any_kind():
+    """Also none through imports for type checking alone, or inside functions."""
+    lazy = "inercal"  # its own names are resolved when asked for
+    graph = {module: set(all_imports(module)) - {module} for module in MODULES if module != lazy}
+    graphlib.TopologicalSorter(graph).prepare()
+
+
+@pytest.mark.parametrize("system", WITHIN)
+def test_rooms_within_a_system_stand_on_each_other(system):
+    order = WITHIN[system].split()
+    of = {
+        module: module.split(".")[2] for module in MODULES if room(module) == system and module.count(".") > 1
+    }
+    assert set(of.values()) == set(order)
+    up = [
+        f"{module} imports {other}"
+        for module, inside in of.items()
+        for other in all_imports(module)
+        if other in of and order.index(of[other]) > order.index(inside)
+    ]
+    assert up == []
 
 
 def test_the_package_itself_computes_nothing():

@@ -7,15 +7,15 @@ from absurd.draws import Draws
 from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
-from inercal.aoa.display import delays, rest_of_fit, use_of_fit
-from inercal.aoa.history import angles_record, points_record
+from inercal.aoa.result.columns import angles_record, points_record
+from inercal.aoa.result.display import delays, rest_of_fit, use_of_fit
+from inercal.aoa.result.tables import answer, on_page, on_terminal
 from inercal.aoa.settings import GYROS, Methods
 from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.tables import answer, on_page, on_terminal
 from inercal.aoa.task import load_kernels, measure
 from inercal.errors import StudyError
 from inercal.stream.aoa import Aoa
-from inercal.study.aoa import aoa_study
+from inercal.studies.aoa import aoa_study
 
 _NOISE = {
     "accelerometer": (1e-4, "g"),
@@ -25,7 +25,7 @@ _NOISE = {
 }
 
 SEARCH = {
-    "inercal.aoa.plausibility._explaining": lambda *_: [],
+    "inercal.aoa.diagnosis.plausibility._explaining": lambda *_: [],
     "inercal.aoa.task.diagnose": lambda *_: [],
 }
 """The search for named faults -> what it finds where there are none; most of the time of a run."""

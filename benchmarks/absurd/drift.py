@@ -7,7 +7,7 @@ from inercal.instruments.by_angle import CHANNELS, channel_model
 from inercal.instruments.terms import TERMS
 from inercal.rigs.plans import NAMED
 from inercal.rigs.tables import slots
-from inercal.study.turntable import turntable_study
+from inercal.studies.turntable import turntable_study
 from inercal.turntable.display import tolerances
 from inercal.turntable.task import Calibration, calibrate, simulate
 

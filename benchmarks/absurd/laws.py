@@ -8,7 +8,7 @@ import numpy as np
 from inercal.errors import InputError
 from inercal.estimate.files import to_json
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
+from inercal.findings import Status
 
 FAR = 1000.0
 """Standard uncertainties by which the result of a run that obeys its study must not be off, where it is called ok."""

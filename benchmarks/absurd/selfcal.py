@@ -6,16 +6,16 @@ from absurd import laws
 from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
-from inercal.selfcal.base_search import stated_well
-from inercal.selfcal.coefficients import GROUPS
-from inercal.selfcal.display import compared, displayed
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.history import history_record
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.display import displayed
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.find_base import stated_well
+from inercal.selfcal.platform.coefficients import GROUPS
+from inercal.selfcal.result.columns import history_record
 from inercal.selfcal.settings import KINDS
-from inercal.selfcal.simulate import experiment, simulate, to_record
-from inercal.selfcal.task import calibrate, load_kernels
+from inercal.selfcal.task import calibrate, compared, load_kernels
 from inercal.stream.selfcal import Selfcal
-from inercal.study.selfcal import selfcal_study
+from inercal.studies.selfcal import selfcal_study
 
 #: group -> its usual prior and unit
 _PRIOR = {

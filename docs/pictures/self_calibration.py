@@ -8,12 +8,12 @@ import numpy as np
 from inercal.geometry.earth import gravity
 from inercal.geometry.site import Site
 from inercal.report.selfcal import attitude_errors
+from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.figures import relative_errors
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.plan import path
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.plan import path
 from inercal.selfcal.settings import Noise, SelfcalSettings
-from inercal.selfcal.simulate import experiment, simulate
 from inercal.units import parse_unit
 
 DEG_H, ARCSEC, UG = (parse_unit(unit).factor for unit in ("deg/h", "arcsec", "ug"))

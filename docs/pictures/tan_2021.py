@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from inercal.aoa import lever, static
 from inercal.aoa.arms import axes, centrifugal_arms, tangential_arms
 from inercal.aoa.layout import Layout
+from inercal.aoa.paper import lever, static
 from inercal.report.style import COLOURS, QUIET, WIDTH, envelope, few_powers, figure, svg
 from inercal.units import STANDARD_GRAVITY as G
 

@@ -10,7 +10,7 @@ from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import averages, exact
+from inercal.sensitivities import averages, exact
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
 chain = turntable("two_axis_turntable", uniform(np.radians(2.0 / 60.0)))

@@ -22,13 +22,13 @@ Rigs: chains of joints, fixed transforms and elementary errors, base first (`ine
                    scope sample, position, run or rig: how long a value lasts
 
     gimbals        th_x outer, th_y inner, th_z platform; frame b of the encoders, p of the platform; q_bp(th);
-                   at zero angles p lies along north-up-east (or as the study says); `inercal.selfcal.rig`
+                   at zero angles p lies along north-up-east (or as the study says); `inercal.selfcal.platform.rig`
 
-Self-calibration: what a platform finds out about itself (`inercal.selfcal.coefficients`)
+Self-calibration: what a platform finds out about itself (`inercal.selfcal.platform.coefficients`)
     rate           w_Ip^p = w_c + M w_c + kg0, M from ds, do (kg1); w_c commanded, kg0 gyro bias
     accelerometers ka0 bias, ka1 scale error, eta misalignments pz, oy, oz; beta base against encoders
 
-Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.model`)
+Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.fusion.model`)
     body           x forward, y left, z up, about the pivot; theta nose-up pitch, w = theta', phi roll right wing down
     accelerometer  at (r, 0, z), lambda from +x towards -z: reads g sin(theta - lambda) at rest; gyro nose-up positive
     errors         b_i, b_g biases; dr_i, zo_i of the positions; k_g gyro scale; tau_g gyro delay
@@ -45,25 +45,26 @@ Uncertainty
     an `inercal.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
 
 Map, lower floors first; each imports only from those above its own line
-    errors, units              what goes wrong; texts with units
+    arrays, errors, inputs     the type of arrays; what goes wrong; files that a result rests on
+    findings, units            what is said of a recording or result, and the verdict; texts with units
     geometry                   rotations, earth, site
     instruments                terms, triad, polynomial, by_angle, noise
-    records                    record, made, channels, findings, maps, read, write, checks, dwells
+    records                    record, column, clocks, made, channels, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
-    estimate                   result, status, budget, linear, nonlinear, runs, coverage, files, repeat, compare,
+    estimate                   result, budget, linear, nonlinear, runs, coverage, files, repeat, compare,
                                checkpoint, consistency, identifiability; kernels: factor, sigma_point, kalman
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
-    sensitivity                exact, sampled, local, dense, averages
-    design                     candidates, criteria, exchange, comparison
+    sensitivities              exact, sampled, local, dense, averages
+    designs                    candidates, criteria, exchange, comparison
     imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, temperature, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
-    selfcal                    rig, plan, model, simulate; filters: error_state, multiplicative, quaternion, gimbal,
-                               batch, start (behind filtering); bounds, pathdesign, diagnosis, outcome, campaign, task
-    aoa                        layout, motion, model, simulate; the fusion: recursion, smoother (behind filtered);
-                               the paper's ways: static, lever, frequency (behind methods); delay, points, flow,
-                               verification, diagnosis, outcome, task
+    selfcal                    platform (rig, plan, model), filters (error_state, multiplicative, quaternion,
+                               gimbal, batch), before (bounds, observability, path_design,
+                               simulate), diagnosis, result, task
+    aoa                        layout, motion, simulate; reading, fusion (model, loop, smoother), paper (static, lever,
+                               frequency), reference, diagnosis, result, task
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
-    study, report, examples    files people write; pages people read; recordings that ship
+    studies, report, examples  files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     cli                        one module per verb
@@ -79,7 +80,7 @@ if TYPE_CHECKING:
     from inercal.records.read import read as read
     from inercal.records.record import Record as Record
     from inercal.selfcal.task import calibrate as calibrate_platform
-    from inercal.sensitivity.exact import analyse as exact_sobol
+    from inercal.sensitivities.exact import analyse as exact_sobol
     from inercal.turntable.task import calibrate as calibrate_turntable
 
 __version__ = "0.1.0"
@@ -91,7 +92,7 @@ _WHERE = {
     "calibrate_imu": ("inercal.imu.task", "calibrate"),
     "calibrate_platform": ("inercal.selfcal.task", "calibrate"),
     "calibrate_turntable": ("inercal.turntable.task", "calibrate"),
-    "exact_sobol": ("inercal.sensitivity.exact", "analyse"),
+    "exact_sobol": ("inercal.sensitivities.exact", "analyse"),
     "load": ("inercal.estimate.files", "load"),
     "measure_angle_of_attack": ("inercal.aoa.task", "measure"),
     "read": ("inercal.records.read", "read"),

@@ -17,10 +17,19 @@ Every message is one sentence: where, what was found, what was expected. The com
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
-if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
+
+class Judged(Protocol):
+    """A result with a verdict: `inercal.estimate.result.Estimate`, which stands above this floor."""
+
+    @property
+    def status(self) -> Any:
+        """The verdict (`inercal.findings.Status`)."""
+
+    @property
+    def message(self) -> str:
+        """The verdict in a sentence."""
 
 
 class InercalError(Exception):
@@ -71,6 +80,6 @@ class MissingExtraError(InercalError):
 class CalibrationError(InercalError):
     """An estimate that ended with a bad verdict; ``estimate`` holds it in full."""
 
-    def __init__(self, message: str, estimate: Estimate) -> None:
+    def __init__(self, message: str, estimate: Judged) -> None:
         self.estimate = estimate
         super().__init__(message)

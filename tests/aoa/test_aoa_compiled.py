@@ -15,9 +15,10 @@ import json
 from dataclasses import replace
 import numpy as np
 from sting_study import BASE, DEG, study
-from inercal.aoa import recursion, smoother
-from inercal.aoa.filtered import estimate
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion import loop
+from inercal.aoa.fusion import smoother
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.settings import Disturbances, Oscillation, Timing
 from inercal.aoa.simulate import simulate
 
@@ -34,7 +35,7 @@ for states in (8, 19):
         for smoothed in (False, True):
             got = estimate(recording, problem(settings, spatial), smoothed)
             found[f"{states} {spatial} {smoothed}"] = [*got.theta, *got.u, *got.rate, *got.rate_u, got.nis_mean]
-kernels = [recursion._advance, smoother._backward]
+kernels = [loop._advance, smoother._backward]
 missed = sum(sum(each.stats.cache_misses.values()) for each in kernels) if hasattr(kernels[0], "stats") else None
 types = [len(each.signatures) for each in kernels] if missed is not None else None
 print(json.dumps({"found": found, "missed": missed, "types": types}))

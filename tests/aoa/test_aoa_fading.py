@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sting_study import BASE, study
 
-from inercal.aoa import fading
-from inercal.aoa.filtered import estimate
-from inercal.aoa.live import Live
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion import fading
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.live import Live
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.simulate import simulate
 
 SLOW = replace(BASE, duration=700.0, sample_rate=20.0, frequency=0.2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sting_study import DEG, NOISE, layout
 
-from inercal.aoa.frequency import WINDOW, oscillation_frequency
+from inercal.aoa.paper.frequency import WINDOW, oscillation_frequency
 
 THREE = layout()
 

@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, G, scenario, study
 
-from inercal.aoa import smoother
-from inercal.aoa.filtered import estimate
-from inercal.aoa.fusion import HELD, advance, initial
+from inercal.aoa.fusion import smoother
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.loop import OUTPUTS
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.layout import Layout
-from inercal.aoa.problem import problem
-from inercal.aoa.recording import plain
-from inercal.aoa.recursion import OUTPUTS
+from inercal.aoa.reading.clock import HELD
+from inercal.aoa.reading.recording import plain
 from inercal.aoa.settings import Attitude, Disturbances, Estimator, MotionPlan, Oscillation, Timing
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit

@@ -10,11 +10,11 @@ import pytest
 from scipy.io import netcdf_file
 from sting_study import DEG, study
 
-from inercal.aoa.angles import of_fusion, stated_roll
-from inercal.aoa.filtered import estimate
-from inercal.aoa.history import angles_record, columns, points_record, rows
-from inercal.aoa.points import points
-from inercal.aoa.problem import problem
+from inercal.aoa.angles import stated_roll
+from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.result.columns import angles_record, columns, points_record, rows
+from inercal.aoa.result.points import points
 from inercal.aoa.settings import Attitude, MotionPlan
 from inercal.aoa.simulate import simulate
 from inercal.records.write import SUFFIXES, write_record

@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import DEG, NOISE, G, layout, study
 
-from inercal.aoa import model, residuals
 from inercal.aoa.arms import all_weights, axes, centrifugal_arms, pair_weights, tangential_arms
+from inercal.aoa.fusion import model
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.layout import Layout
-from inercal.aoa.lever import centrifugal, differentiated, dual, peak_rate
-from inercal.aoa.problem import problem
+from inercal.aoa.paper import residuals
+from inercal.aoa.paper.lever import centrifugal, differentiated, dual, peak_rate
+from inercal.aoa.paper.static import angle as angle_of
 from inercal.aoa.settings import Attitude
-from inercal.aoa.static import angle as angle_of
 from inercal.errors import StudyError
 from inercal.units import parse_quantity
 

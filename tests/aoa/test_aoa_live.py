@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from sting_study import BASE, DEG, G, study
 
-from inercal.aoa import fusion
-from inercal.aoa.clock import PATIENCE
-from inercal.aoa.filtered import estimate
-from inercal.aoa.live import Live, LiveState, Told
-from inercal.aoa.problem import problem
-from inercal.aoa.recording import Recording
+from inercal.aoa.fusion import run as fusion
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.live import Live, LiveState, Told
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reading.clock import PATIENCE
+from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import Attitude
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError

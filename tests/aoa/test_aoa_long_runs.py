@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, study
 
-from inercal.aoa.filtered import estimate
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.layout import Layout
-from inercal.aoa.problem import problem
 from inercal.aoa.settings import MotionPlan
 from inercal.aoa.simulate import drawn, simulate
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, SCENARIOS, clipped, scenario, study
 
-from inercal.aoa.methods import MEASURED, label, low_passed, measure
-from inercal.aoa.recording import plain
+from inercal.aoa.paper.methods import MEASURED, label, low_passed, measure
+from inercal.aoa.reading.recording import plain
 from inercal.aoa.settings import Attitude, Disturbances, Methods, Prior, Timing
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import RecordError, StudyError

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from sting_study import DEG, G, study
 
-from inercal.aoa import model
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion import model
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.settings import Attitude, Timing
 from inercal.units import Quantity, parse_unit
 

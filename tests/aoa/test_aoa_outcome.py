@@ -9,20 +9,19 @@ import pytest
 from sting_study import DEG, G, scenario, study
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.filtered import estimate
-from inercal.aoa.judged import of_rows
-from inercal.aoa.outcome import assemble, assemble_paper
-from inercal.aoa.problem import problem
+from inercal.aoa.diagnosis.fit_quality import of_rows
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reading.wind_off_zero import with_zero
+from inercal.aoa.result.budget import parts
+from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.systematic import by_fusion, by_methods
+from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
 from inercal.aoa.simulate import simulate
-from inercal.aoa.sources import parts
-from inercal.aoa.stated import by_fusion, by_methods
-from inercal.aoa.verification import errors
-from inercal.aoa.zero import with_zero
 from inercal.estimate.files import from_json, to_json
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.geometry.site import GravityInput, Site
-from inercal.records.findings import Finding
 from inercal.units import Quantity, parse_unit
 
 UNCERTAIN = Site(G, (GravityInput("gravity", 1e-3, "m/s^2", 1.0),))
@@ -84,7 +83,7 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
     made = simulate(settings, np.random.default_rng(1)).recording
     made.stated[2500] = made.reference[2500], 0.02 * DEG
     found = []
-    monkeypatch.setattr("inercal.aoa.sources._items", lambda parts, names: found.extend(parts) or ())
+    monkeypatch.setattr("inercal.aoa.result.budget._items", lambda parts, names: found.extend(parts) or ())
     parts(made, of := problem(settings), settings, smoothed, np.full(len(made.t), True))
     whole = np.sum([part for _, part in found], axis=0)
     told = estimate(made, of, smoothed)
@@ -101,7 +100,7 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
 @pytest.mark.parametrize("smooth", [False, True])
 def test_the_budget_of_sensors_that_come_late_is_that_of_the_record_from_there_on(smooth, monkeypatch):
     """Rows without accelerometers, more than are looked at, tell of no angle: they split nothing."""
-    monkeypatch.setattr("inercal.aoa.sources.MOST", 600)
+    monkeypatch.setattr("inercal.aoa.result.budget.MOST", 600)
     settings = study(
         motion=replace(SINE, sample_rate=250.0), estimator=Estimator(19, smooth=smooth), site=UNCERTAIN
     )

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, clipped, scenario, study
 
-from inercal.aoa import model, recursion
-from inercal.aoa.filtered import estimate
-from inercal.aoa.fusion import HELD, advance, initial
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion import loop, model
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.fusion.run import advance, initial
+from inercal.aoa.reading.clock import HELD
 from inercal.aoa.settings import Disturbances, Estimator, MotionPlan, Noise, Prior, Resonance
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError
@@ -36,16 +37,16 @@ def hard_gated(of, recording):
     theta = []
     for k, z in enumerate(recording.rows):
         if k:
-            recursion.go_on(x, P, step, 0.0, 0.0, of.places, of.constants, F, Q, 0.0, work)
+            loop.go_on(x, P, step, 0.0, 0.0, of.places, of.constants, F, Q, 0.0, work)
         s, c = math.sin(x[0]), math.cos(x[0])
         for i in range(of.count + 1):
-            expected, entries, noise = recursion.row_of(
+            expected, entries, noise = loop.row_of(
                 i, x, s, c, recording.rows, k, of.geometry, of.places, of.constants, 0.0, 0.0, at, row
             )
             v, h = z[i] - expected, np.zeros(n)
             h[at[:entries]] = row[:entries]
             if v * v <= 25.0 * (h @ P @ h + noise):
-                recursion.update(P, x, v, entries, at, row, noise, math.inf, line)
+                loop.update(P, x, v, entries, at, row, noise, math.inf, line)
         theta.append(x[0])
     return np.array(theta)
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, SCENARIOS, G, clipped, scenario, study
 
-from inercal.aoa.angles import of_fusion as of_filter
-from inercal.aoa.diagnosis import diagnose
-from inercal.aoa.faults import faults
-from inercal.aoa.filtered import estimate
-from inercal.aoa.plausibility import implausible
-from inercal.aoa.problem import problem
+from inercal.aoa.diagnosis.causes import diagnose
+from inercal.aoa.diagnosis.gross import faults
+from inercal.aoa.diagnosis.plausibility import implausible
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.filter_result import of_fusion as of_filter
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.result.verdict import of_fusion
 from inercal.aoa.settings import Disturbances, MotionPlan, Oscillation, Timing
 from inercal.aoa.simulate import simulate
-from inercal.aoa.verdict import of_fusion
-from inercal.estimate.status import Status
+from inercal.findings import Status
 
 SHORT = study(motion=replace(BASE, duration=1.6))
 REST = study(motion=MotionPlan("static", duration=1.6, first=10.0 * DEG, last=10.0 * DEG))

@@ -8,14 +8,14 @@ import pytest
 from scipy.signal import lfilter
 from sting_study import BASE, DEG, SCENARIOS, scenario, study
 
-from inercal.aoa.angles import Angles, of_fusion, stated_roll
-from inercal.aoa.filtered import estimate
+from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.flow import theta_by_roll
+from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.motion import Sines, buffet
-from inercal.aoa.pauses import at_rest, pauses
-from inercal.aoa.points import COSINES, mean_u, points
-from inercal.aoa.problem import problem
-from inercal.aoa.recording import plain
+from inercal.aoa.reading.pauses import at_rest, pauses
+from inercal.aoa.reading.recording import plain
+from inercal.aoa.result.points import COSINES, mean_u, points
 from inercal.aoa.settings import Attitude, MotionPlan
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit

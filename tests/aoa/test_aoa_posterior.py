@@ -7,20 +7,19 @@ import numpy as np
 import pytest
 from sting_study import DEG, NOISE, G, study
 
-from inercal.aoa.angles import of_fusion
-from inercal.aoa.corrections import corrected as put_right
-from inercal.aoa.filtered import estimate
+from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.layout import Layout
-from inercal.aoa.outcome import assemble, assemble_paper
-from inercal.aoa.posterior import corrected, load
-from inercal.aoa.problem import problem
-from inercal.aoa.sensor_fit import fit
+from inercal.aoa.reference.corrections import corrected as put_right
+from inercal.aoa.reference.sensor_fit import fit
+from inercal.aoa.result.carry_over import corrected, load
+from inercal.aoa.result.outcome import assemble, assemble_paper
 from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import InputError, StudyError
 from inercal.estimate.files import save
 from inercal.estimate.result import without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 
 SWEEP = MotionPlan("pitch-pause", first=-10.0 * DEG, last=90.0 * DEG, step=20.0 * DEG, move=1.0, pause=1.0)

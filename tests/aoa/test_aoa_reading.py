@@ -9,13 +9,15 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 from sting_study import BASE, DEG, G, scenario, study
 
-from inercal.aoa.reading import of_sensors, recording_of
+from inercal.aoa.reading.from_record import of_sensors, recording_of
 from inercal.aoa.settings import Calibration
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError
 from inercal.geometry.rotations import principal
+from inercal.inputs import Source
+from inercal.records.column import Column
 from inercal.records.read import read
-from inercal.records.record import Column, Record, Source
+from inercal.records.record import Record
 from inercal.units import parse_unit
 
 SHORT = study(motion=replace(BASE, duration=2.0))

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sting_study import DEG, SCENARIOS, G, scenario
 
 from inercal.aoa.motion import course, duration
-from inercal.aoa.reading import recording_of
+from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.settings import Calibration, Disturbances, MotionPlan, Oscillation
 from inercal.aoa.simulate import simulate, to_record
 from inercal.errors import StudyError

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, study
 
-from inercal.aoa import filtered
-from inercal.aoa.angles import of_fusion
-from inercal.aoa.filtered import estimate
-from inercal.aoa.points import points
-from inercal.aoa.problem import problem
-from inercal.aoa.roll import tracked
+from inercal.aoa.fusion import filter_result
+from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.fusion.roll import tracked
+from inercal.aoa.result.points import points
+from inercal.aoa.result.systematic import by_fusion
 from inercal.aoa.settings import Attitude, Disturbances, Oscillation
 from inercal.aoa.simulate import simulate
-from inercal.aoa.stated import by_fusion
 from inercal.units import Quantity, parse_unit
 
 ROLL = Quantity(10.0 * DEG, 0.5 * DEG, parse_unit("rad"), "")
@@ -36,7 +35,7 @@ def true_roll(t):
 @pytest.mark.parametrize("smoothed", [False, True])
 def test_the_roll_of_each_row_is_as_good_as_that_of_the_kept_ones(smoothed, monkeypatch):
     # kept each 0.4 s: at 6 Hz a line between them is off by the oscillation's 0.7 deg rms
-    monkeypatch.setattr(filtered, "KEPT", 50)
+    monkeypatch.setattr(filter_result, "KEPT", 50)
     _, made, of = turned()
     found = estimate(made, of, smoothed)
     assert len(found.kept_t) == 50

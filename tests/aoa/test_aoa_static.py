@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sting_study import DEG, G, layout
 
 from inercal.aoa.layout import Layout
-from inercal.aoa.static import angle, bound, complementary, difference, gls, improved, segmented, spread
+from inercal.aoa.paper.static import angle, bound, complementary, difference, gls, improved, segmented, spread
 from inercal.errors import StudyError
 
 DA = 1e-4 * G

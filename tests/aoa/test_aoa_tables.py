@@ -9,18 +9,16 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, study
 
-from inercal.aoa.angles import Angles, of_fusion
-from inercal.aoa.corrections import told
-from inercal.aoa.display import delays, displayed, in_words, rest_of_fit, shown_unit, sized, use_of_fit
-from inercal.aoa.filtered import estimate
-from inercal.aoa.outcome import assemble, assemble_paper
-from inercal.aoa.points import points
-from inercal.aoa.posterior import corrected
-from inercal.aoa.problem import problem
-from inercal.aoa.sensor_fit import fit
-from inercal.aoa.settings import Calibration, MotionPlan, Timing
-from inercal.aoa.simulate import simulate
-from inercal.aoa.tables import (
+from inercal.aoa.angles import Angles
+from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reference.corrections import told
+from inercal.aoa.reference.sensor_fit import fit
+from inercal.aoa.result.carry_over import corrected
+from inercal.aoa.result.display import delays, displayed, in_words, rest_of_fit, shown_unit, sized, use_of_fit
+from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.points import points
+from inercal.aoa.result.tables import (
     angle,
     answer,
     fitted,
@@ -31,7 +29,9 @@ from inercal.aoa.tables import (
     sensors,
     uncertainty,
 )
-from inercal.aoa.verification import errors
+from inercal.aoa.result.verification import errors
+from inercal.aoa.settings import Calibration, MotionPlan, Timing
+from inercal.aoa.simulate import simulate
 from inercal.estimate.files import save, to_json
 
 PAUSES = MotionPlan(

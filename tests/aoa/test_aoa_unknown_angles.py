@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 from sting_study import BASE, DEG, G, layout, study
 
-from inercal.aoa.methods import measure as by_method
-from inercal.aoa.pauses import at_rest
-from inercal.aoa.recursion import root, told
-from inercal.aoa.sensor_fit import fit
+from inercal.aoa.fusion.loop import root, told
+from inercal.aoa.paper.methods import measure as by_method
+from inercal.aoa.paper.static import gls
+from inercal.aoa.reading.pauses import at_rest
+from inercal.aoa.reference.sensor_fit import fit
+from inercal.aoa.result.verdict import NIS_CHANCE, NIS_LIMIT, is_covariance, nis_limit
 from inercal.aoa.settings import Methods
 from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.static import gls
 from inercal.aoa.task import measure
-from inercal.aoa.verdict import NIS_CHANCE, NIS_LIMIT, is_covariance, nis_limit
-from inercal.estimate.status import Status
-from inercal.study.aoa import aoa_study
+from inercal.findings import Status
+from inercal.studies.aoa import aoa_study
 
 
 def test_readings_that_do_not_change_with_the_angle_tell_nothing_of_it():

@@ -8,12 +8,12 @@ import pytest
 from sting_study import DEG, G, layout, study
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.recording import plain
-from inercal.aoa.reference import reference
-from inercal.aoa.sensor_fit import _linearised, _terms, fit
+from inercal.aoa.reading.recording import plain
+from inercal.aoa.reference.readings import reference
+from inercal.aoa.reference.sensor_fit import _linearised, _terms, fit
+from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import MotionPlan
 from inercal.aoa.simulate import simulate
-from inercal.aoa.verification import errors
 from inercal.errors import RecordError
 
 WIDE = MotionPlan(

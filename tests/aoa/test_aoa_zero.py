@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from sting_study import DEG, NOISE, G, study
 
-from inercal.aoa.filtered import estimate
-from inercal.aoa.problem import problem
-from inercal.aoa.recording import plain
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reading.recording import plain
+from inercal.aoa.reading.wind_off_zero import at_rest, tare, with_zero
 from inercal.aoa.settings import MotionPlan, Noise, Zero
 from inercal.aoa.simulate import simulate
-from inercal.aoa.zero import at_rest, tare, with_zero
 from inercal.errors import RecordError
 
 REST = MotionPlan("buffet", duration=8.0, sample_rate=500.0, mean=20.0 * DEG, rms=0.0)

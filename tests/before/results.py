@@ -24,7 +24,17 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 CLOSE = 1e-6
 #: keys whose values tell of the machine, the moment or the version
-PASSING = {"timing_s", "step_us", "sample_share", "versions", "inercal", "sha256", "path", "seconds", "checksum"}
+PASSING = {
+    "timing_s",
+    "step_us",
+    "sample_share",
+    "versions",
+    "inercal",
+    "sha256",
+    "path",
+    "seconds",
+    "checksum",
+}
 
 
 def rows_of(path):
@@ -37,7 +47,9 @@ def rows_of(path):
 def changed(source, target, change):
     """A copy of a CSV file, its columns (dict of name -> list of floats) changed."""
     head, rows = rows_of(source)
-    columns = {name.split(" ")[0]: np.array([float(r[k] or "nan") for r in rows]) for k, name in enumerate(head)}
+    columns = {
+        name.split(" ")[0]: np.array([float(r[k] or "nan") for r in rows]) for k, name in enumerate(head)
+    }
     change(columns)
     with open(target, "w", newline="") as file:
         writer = csv.writer(file)
@@ -49,36 +61,42 @@ def changed(source, target, change):
 def negate(name):
     def change(c):
         c[name] = -c[name]
+
     return change
 
 
 def exchange(a, b):
     def change(c):
         c[a], c[b] = c[b], c[a]
+
     return change
 
 
 def scaled(name, by):
     def change(c):
         c[name] = c[name] * by
+
     return change
 
 
 def added(name, by):
     def change(c):
         c[name] = c[name] + by
+
     return change
 
 
 def late(name, rows):
     def change(c):
         c[name] = np.concatenate([np.repeat(c[name][:1], rows), c[name][:-rows]])
+
     return change
 
 
 def harmonic(name, amplitude, order):
     def change(c):
         c[name] = c[name] + amplitude * np.sin(order * np.radians(c[name]))
+
     return change
 
 
@@ -86,24 +104,39 @@ def cut(a, b):
     def change(c):
         for name in c:
             c[name] = np.delete(c[name], slice(a, b))
+
     return change
 
 
 def frozen(name, a, b):
     def change(c):
         c[name][a:b] = c[name][a]
+
     return change
 
 
 SELFCAL_FAULTS = {
-    "sign": negate("acc_y"), "swap": exchange("acc_x", "acc_y"), "unit": scaled("acc_z", 1.02),
-    "harmonic": harmonic("th_z", 20.0 / 3600, 2), "late": late("wc_z", 2), "gap": cut(900, 940),
-    "stuck": frozen("th_x", 400, 700), "zero": added("th_x", 0.02), "scale": scaled("wc_z", 1.0005),
-    "encoder": late("th_z", 1), "rates": scaled("wc_z", math.pi / 180),
+    "sign": negate("acc_y"),
+    "swap": exchange("acc_x", "acc_y"),
+    "unit": scaled("acc_z", 1.02),
+    "harmonic": harmonic("th_z", 20.0 / 3600, 2),
+    "late": late("wc_z", 2),
+    "gap": cut(900, 940),
+    "stuck": frozen("th_x", 400, 700),
+    "zero": added("th_x", 0.02),
+    "scale": scaled("wc_z", 1.0005),
+    "encoder": late("th_z", 1),
+    "rates": scaled("wc_z", math.pi / 180),
 }
 STING_FAULTS = {
-    "sign": negate("gyro"), "sign_a": negate("a2"), "swap": exchange("a1", "a3"), "unit": scaled("a2", 9.80665),
-    "late": late("gyro", 3), "scale": scaled("a1", 1.01), "bias": added("a2", 0.05), "gap": cut(3000, 3100),
+    "sign": negate("gyro"),
+    "sign_a": negate("a2"),
+    "swap": exchange("a1", "a3"),
+    "unit": scaled("a2", 9.80665),
+    "late": late("gyro", 3),
+    "scale": scaled("a1", 1.01),
+    "bias": added("a2", 0.05),
+    "gap": cut(3000, 3100),
     "stuck": frozen("gyro", 2000, 5000),
 }
 
@@ -135,13 +168,29 @@ def cases(folder):
     for name, change in STING_FAULTS.items():
         changed(sting, folder / f"sting-{name}.csv", change)
         yield f"sting-{name}", ["aoa", str(folder / f"sting-{name}.csv"), "--study", sting_study]
-    for words in ("--static segmented", "--static complementary", "--static improved", "--static difference",
-                  "--static gls", "--centrifugal low-pass", "--centrifugal mechanical", "--centrifugal decision",
-                  "--tangential differentiated", "--states 8", "--states 11", "--states 15", "--smooth",
-                  "--compare", "--points"):
+    for words in (
+        "--static segmented",
+        "--static complementary",
+        "--static improved",
+        "--static difference",
+        "--static gls",
+        "--centrifugal low-pass",
+        "--centrifugal mechanical",
+        "--centrifugal decision",
+        "--tangential differentiated",
+        "--states 8",
+        "--states 11",
+        "--states 15",
+        "--smooth",
+        "--compare",
+        "--points",
+    ):
         yield f"sting{words.replace(' ', '-').replace('--', '-')}", [*shipped["sting"], *words.split()]
-    for name, position in (("r", "sensors.a1.r=-0.27 m"), ("axis", "sensors.a2.angle=1 deg"),
-                           ("noise", "noise.accelerometer=2e-5 g")):
+    for name, position in (
+        ("r", "sensors.a1.r=-0.27 m"),
+        ("axis", "sensors.a2.angle=1 deg"),
+        ("noise", "noise.accelerometer=2e-5 g"),
+    ):
         key = ["--set", position] if name != "axis" else ["--set", "sensors.a1.axis=-x"]
         yield f"sting-study-{name}", [*shipped["sting"], *key]
     for study in ("turntable", "imu-table", "rate"):
@@ -150,14 +199,21 @@ def cases(folder):
         yield f"{study}-simulate", ["simulate", "turntable", path, "--seed", "1", "--out", run]
         yield f"{study}-calibrate", ["calibrate", "turntable", run, "--study", path]
     path = str(HERE / "turntable.toml")
-    for words in (["sensitivity", path], ["sensitivity", path, "--set", "analysis.method=sampled"],
-                  ["design", "positions", path], ["design", "selfcal", selfcal_study]):
+    for words in (
+        ["sensitivity", path],
+        ["sensitivity", path, "--set", "analysis.method=sampled"],
+        ["design", "positions", path],
+        ["design", "selfcal", selfcal_study],
+    ):
         yield "-".join(w for w in words[:-1] if "/" not in w and "=" not in w) + str(len(words)), words
     for kind, study in (("selfcal", selfcal_study), ("aoa", str(HERE / "aoa.toml"))):
         out = str(folder / f"{kind}-made.csv")
         yield f"simulate-{kind}", ["simulate", kind, study, "--seed", "3", "--out", out]
         yield f"{kind}-made", [kind, out, "--study", study]
-    yield "aoa-made-smooth", ["aoa", str(folder / "aoa-made.csv"), "--study", str(HERE / "aoa.toml"), "--smooth"]
+    yield (
+        "aoa-made-smooth",
+        ["aoa", str(folder / "aoa-made.csv"), "--study", str(HERE / "aoa.toml"), "--smooth"],
+    )
     head, rows = rows_of(folder / "imu-table.csv") if (folder / "imu-table.csv").exists() else (None, None)
     for name in ("xsens", "ferraris", "table"):
         yield f"{name}-saved", [*shipped[name], "--out", str(folder / f"{name}.saved.json")]
@@ -193,7 +249,12 @@ def make(target):
         text = json.dumps(found, indent=1).replace(str(folder), "FOLDER")
         with gzip.GzipFile(target / f"{name}.json.gz", "wb", mtime=0) as file:
             file.write(text.encode())
-        print(name, found["exit"], found.get("json", {}).get("status", {}).get("code", found.get("error", "")[:150]), flush=True)
+        print(
+            name,
+            found["exit"],
+            found.get("json", {}).get("status", {}).get("code", found.get("error", "")[:150]),
+            flush=True,
+        )
 
 
 def differences(a, b, where="", u=None):

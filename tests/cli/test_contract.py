@@ -14,7 +14,7 @@ import pytest
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.study.template import imu_template
+from inercal.studies.template import imu_template
 
 
 def inercal(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:

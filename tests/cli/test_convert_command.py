@@ -10,7 +10,7 @@ from inercal.convert.correct import ImuModel
 from inercal.convert.other_tools import CONVENTIONS
 from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.instruments.triad import TriadModel
 
 NAMES = (

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from inercal.cli import run
-from inercal.study.template import imu_template
+from inercal.studies.template import imu_template
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="a shell and file names as on POSIX")
 CSV = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]\n"

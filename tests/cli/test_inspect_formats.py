@@ -9,7 +9,9 @@ from rosbags import rosbag2
 from rosbags.typesys import Stores, get_typestore
 
 from inercal.cli import run
-from inercal.records.record import Column, Record, Source
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.records.write import SUFFIXES, write_record
 from inercal.units import parse_unit
 

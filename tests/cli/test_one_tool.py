@@ -14,8 +14,8 @@ from inercal.cli.completion import script
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES
 from inercal.instruments.terms import term
-from inercal.study.load import load_aoa_study, load_imu_study, load_selfcal_study, load_turntable_study
-from inercal.study.template import aoa_template, imu_template, selfcal_template, turntable_template
+from inercal.studies.load import load_aoa_study, load_imu_study, load_selfcal_study, load_turntable_study
+from inercal.studies.template import aoa_template, imu_template, selfcal_template, turntable_template
 
 BAD_VERDICT = 1
 OPTION = re.compile(r"^ {2}(--[\w-]+)(?: (PATH|STR\.\.\.|STR|INT|CHOICE))?: (.*)$", re.MULTILINE)
@@ -127,7 +127,7 @@ def test_every_template_is_a_study_that_its_command_reads(kind, tmp_path):
     """Untouched, and under the JSON Schema that editors check by."""
     from jsonschema import Draft202012Validator
 
-    from inercal.study.schema import json_schema
+    from inercal.studies.schema import json_schema
 
     template, load = TEMPLATES[kind]
     path = tmp_path / f"{kind}.toml"

@@ -18,9 +18,9 @@ from paper_study import TRUTH
 from inercal.cli import run
 from inercal.cli.selfcal import Kind
 from inercal.estimate.files import load
-from inercal.selfcal.coefficients import NAMES
+from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.settings import KINDS
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")

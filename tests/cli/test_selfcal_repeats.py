@@ -8,8 +8,8 @@ import pytest
 
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.selfcal.coefficients import NAMES
-from inercal.study.load import load_selfcal_study
+from inercal.selfcal.platform.coefficients import NAMES
+from inercal.studies.load import load_selfcal_study
 
 SHORT = ["--set", 'plan.turns=[["x", "-60 deg"], ["z", "-90 deg"], ["x", "-60 deg"]]']
 STUDY = FOLDER / "selfcal.toml"

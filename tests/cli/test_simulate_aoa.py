@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from inercal.aoa.reading import recording_of
+from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.simulate import simulate
 from inercal.cli import run
 from inercal.records.read import read
-from inercal.study.load import load_aoa_study
+from inercal.studies.load import load_aoa_study
 
 SHORT = ["--set", "motion.duration=2 s", "--set", "site.latitude=40 deg"]
 PAUSES = 'motion={kind="pitch-pause", first="0 deg", last="4 deg", step="2 deg", move="1 s", pause="1 s"}'

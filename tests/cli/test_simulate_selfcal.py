@@ -12,11 +12,11 @@ from paper_study import TRUTH
 from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.records.read import read
-from inercal.selfcal.coefficients import NAMES
-from inercal.selfcal.plan import path
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.platform.coefficients import NAMES
+from inercal.selfcal.platform.plan import path
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.simulate import experiment, simulate
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 
 SHORT = [
     "--set", 'plan.turns=[["z", "30 deg"], ["x", "20 deg", "2 deg/s"], ["rest", "4 s"]]',

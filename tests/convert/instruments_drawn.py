@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from inercal.convert.correct import ImuModel
 from inercal.convert.other_tools import CONVENTIONS
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.instruments.triad import TriadModel
 from inercal.units import parse_unit
 

@@ -14,12 +14,14 @@ from inercal.convert.correct import apply_to
 from inercal.convert.platform import not_applied, platform_model
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
+from inercal.findings import Status
+from inercal.inputs import Source
+from inercal.records.column import Column
 from inercal.records.read import read
-from inercal.records.record import Column, Record, Source
+from inercal.records.record import Record
 from inercal.records.write import write_record
-from inercal.selfcal.coefficients import names, to_linear, units
-from inercal.selfcal.simulate import experiment, simulate
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.platform.coefficients import names, to_linear, units
 from inercal.units import parse_unit
 
 QUIET = replace(NOISE["low"], angle_random_walk=0.0, accelerometer=0.0, encoder=0.0)
@@ -156,7 +158,7 @@ def test_what_is_not_applied_is_said():
 def folder(tmp_path, monkeypatch):
     """A calibration and a record of the paper's path with missing values, here."""
     from inercal.estimate.files import save
-    from inercal.selfcal.simulate import to_record
+    from inercal.selfcal.before.simulate import to_record
 
     monkeypatch.chdir(tmp_path)
     save(estimate(TRUTH[:18]), tmp_path / "cal.json")

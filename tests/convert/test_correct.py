@@ -7,8 +7,10 @@ import pytest
 
 from inercal.convert.correct import ImuModel, apply_to, imu_model, not_applied
 from inercal.errors import InputError
+from inercal.inputs import Source
 from inercal.instruments.triad import TriadModel
-from inercal.records.record import Column, Record, Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.units import parse_unit
 
 TRIAD = TriadModel(np.array([2.0, 3.0, 4.0]), np.eye(3) + 0.01 * np.triu(np.ones((3, 3)), 1), np.ones(3))

@@ -12,7 +12,7 @@ from inercal.convert.correct import imu_model
 from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
 from inercal.errors import InputError
 from inercal.estimate.files import load, save
-from inercal.records.findings import Finding
+from inercal.findings import Finding
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from inercal.design import candidates as ca
-from inercal.design.spherical import NAMES, basis
+from inercal.designs import candidates as ca
+from inercal.designs.spherical import NAMES, basis
 from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.rigs.tables import turntable
 

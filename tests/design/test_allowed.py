@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, gravity
 
-from inercal.design.allowed import insensitive, within
-from inercal.design.criteria import D
-from inercal.design.exchange import exchange
+from inercal.designs.allowed import insensitive, within
+from inercal.designs.criteria import D
+from inercal.designs.exchange import exchange
 from inercal.errors import InputError
 from inercal.rigs.plans import grid
 

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import RATES, TERMS, drift, from_monomials, gravity, with_rates
 
-from inercal.design.candidates import Candidates, plain
-from inercal.design.comparison import judge
-from inercal.design.criteria import D, a_criterion, i_criterion
-from inercal.design.spherical import NAMES, basis
+from inercal.designs.candidates import Candidates, plain
+from inercal.designs.comparison import judge
+from inercal.designs.criteria import D, a_criterion, i_criterion
+from inercal.designs.spherical import NAMES, basis
 from inercal.geometry.rotations import elementary
 from inercal.rigs.plans import grid, named
 

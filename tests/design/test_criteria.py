@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, with_rates
 
-from inercal.design.candidates import Candidates
-from inercal.design.criteria import D, a_criterion, covariance, i_criterion
+from inercal.designs.candidates import Candidates
+from inercal.designs.criteria import D, a_criterion, covariance, i_criterion
 from inercal.rigs.plans import grid, named
 
 

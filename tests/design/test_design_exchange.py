@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, with_rates
 
-from inercal.design.candidates import Candidates, plain
-from inercal.design.criteria import D, a_criterion, covariance, i_criterion
-from inercal.design.exchange import exchange
+from inercal.designs.candidates import Candidates, plain
+from inercal.designs.criteria import D, a_criterion, covariance, i_criterion
+from inercal.designs.exchange import exchange
 from inercal.errors import InputError
 from inercal.rigs.plans import grid
 

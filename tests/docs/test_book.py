@@ -13,9 +13,9 @@ from urllib.parse import unquote
 import pytest
 
 from inercal.cli.tree import COMMANDS
+from inercal.findings import CODES
 from inercal.instruments.terms import NOISE_TERMS, TERMS
 from inercal.records.channels import _EXAMPLES
-from inercal.records.findings import CODES
 
 ROOT = Path(__file__).parents[2]
 VOID = {"area", "base", "br", "col", "embed", "hr", "img", "input", "link", "meta", "source", "track", "wbr"}

@@ -106,7 +106,7 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
     from inercal.records.maps import read_map
-    from inercal.study.load import (
+    from inercal.studies.load import (
         load_aoa_study,
         load_imu_study,
         load_selfcal_study,

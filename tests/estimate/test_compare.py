@@ -13,8 +13,8 @@ from inercal.estimate.budget import BudgetItem
 from inercal.estimate.compare import FAMILY, Saved, compare
 from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate, coverage_factor
-from inercal.estimate.status import Status
-from inercal.records.record import Source
+from inercal.findings import Status
+from inercal.inputs import Source
 
 SITE = {"site": {"gravity_m_s2": 9.81, "latitude_rad": None}}
 

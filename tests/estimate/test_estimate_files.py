@@ -15,9 +15,8 @@ from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import from_json, load, plain_objects, save, to_json
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
-from inercal.records.findings import CODES, Finding
-from inercal.records.record import Source
+from inercal.findings import CODES, Finding, Status
+from inercal.inputs import Source
 
 
 def example(**more):

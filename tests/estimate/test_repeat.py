@@ -12,9 +12,8 @@ from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import from_json, to_json
 from inercal.estimate.repeat import combine_runs, mandel_paule
 from inercal.estimate.result import Estimate, without_parameters
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
-from inercal.records.record import Source
+from inercal.findings import Finding, Status
+from inercal.inputs import Source
 
 
 def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:

@@ -11,7 +11,7 @@ from scipy import stats
 
 from inercal.errors import CalibrationError
 from inercal.estimate.result import Estimate, Parameter, coverage_factor, rounded
-from inercal.estimate.status import Status
+from inercal.findings import Status
 
 
 def estimate(values=(1.0, 2.0), covariance=((0.04, 0.01), (0.01, 0.09)), dof=(5.0, np.inf), **more):

@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import StudyError
-from inercal.study.aoa import aoa_study
-from inercal.study.imu import imu_study
-from inercal.study.load import load_aoa_study, load_selfcal_study
-from inercal.study.selfcal import selfcal_study
-from inercal.study.template import aoa_template, imu_template, selfcal_template, turntable_template
-from inercal.study.turntable import turntable_study
+from inercal.studies.aoa import aoa_study
+from inercal.studies.imu import imu_study
+from inercal.studies.load import load_aoa_study, load_selfcal_study
+from inercal.studies.selfcal import selfcal_study
+from inercal.studies.template import aoa_template, imu_template, selfcal_template, turntable_template
+from inercal.studies.turntable import turntable_study
 
 # the seed of the examples is fixed: that of each test's own source
 FIXED = settings(

@@ -6,10 +6,12 @@ import numpy as np
 
 from inercal.examples import EXAMPLES, FOLDER
 from inercal.imu.settings import ImuSettings
+from inercal.inputs import Source
+from inercal.records.column import Column
 from inercal.records.maps import read_map
 from inercal.records.read import read
-from inercal.records.record import Column, Record, Source
-from inercal.study.load import load_imu_study
+from inercal.records.record import Record
+from inercal.studies.load import load_imu_study
 from inercal.units import parse_unit
 
 

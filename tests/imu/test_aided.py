@@ -13,7 +13,7 @@ from inercal._toml import check
 from inercal.errors import RecordError, StudyError
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import run
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.aided.campaign import LATITUDE, PROGRAM, draw_truth, one_calibration
@@ -22,11 +22,12 @@ from inercal.imu.aided.settings import AidedSettings, mounting_of, mountings
 from inercal.imu.aided.simulate import simulate
 from inercal.imu.aided.walk import whiten
 from inercal.imu.settings import ImuSettings
-from inercal.records.record import Column, Record
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.report.html import render
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
-from inercal.study.imu_aided import AidedTable, aided_settings
+from inercal.studies.imu_aided import AidedTable, aided_settings
 from inercal.units import parse_quantity, parse_unit
 
 CHAIN = turntable("two_axis_turntable", None)

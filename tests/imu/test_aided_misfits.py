@@ -11,7 +11,7 @@ import pytest
 
 from inercal._toml import check
 from inercal.errors import StudyError
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
@@ -22,7 +22,7 @@ from inercal.imu.settings import ImuSettings
 from inercal.records.record import Record
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
-from inercal.study.imu_aided import AidedTable
+from inercal.studies.imu_aided import AidedTable
 
 CHAIN = turntable("two_axis_turntable", None)
 ACC, GYRO = ("acc_x", "acc_y", "acc_z"), ("gyro_x", "gyro_y", "gyro_z")

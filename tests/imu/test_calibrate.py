@@ -7,7 +7,7 @@ import pytest
 from recordings import arrays, record_of, shipped
 
 from inercal.errors import InputError
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.rotations import conjugate, exp, rotate
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.multiposition import calibrate_multiposition as calibrate

@@ -14,7 +14,7 @@ from ferraris_sessions import SETTINGS, session, with_values
 from inercal.convert.correct import imu_model
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import run
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris

@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from ferraris_sessions import SETTINGS, UNSURE, options_of, record_of
 
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.figures import pictures
 from inercal.report.html import render

@@ -24,10 +24,10 @@ from ferraris_sessions import (
 )
 
 from inercal.errors import InputError, RecordError, StudyError
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.carried import carry
 from inercal.imu.ferraris.detection import detect
+from inercal.imu.ferraris.gravity_transfer import carry
 from inercal.imu.ferraris.names import NAMES, POSITIONS
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.records.record import Record

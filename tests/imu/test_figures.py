@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.rotations import conjugate, exp
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.figures import pictures
 from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, simulate
-from inercal.records.record import Column, Record, Source
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.report.html import render
 from inercal.units import parse_unit
 

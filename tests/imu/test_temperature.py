@@ -11,12 +11,14 @@ from inercal.cli import run
 from inercal.errors import InputError, RecordError
 from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.imu.temperature.calibrations import fit_calibrations
 from inercal.imu.temperature.cubic import fit_points, fit_sweep
 from inercal.imu.temperature.figures import pictures
 from inercal.imu.temperature.sweep import branches, fit_recording
-from inercal.records.record import Column, Record, Source
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.units import parse_unit
 
 TRUTH = np.array([1.0, -0.02, 3e-4, -2e-6])

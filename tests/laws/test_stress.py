@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from inercal.estimate.result import without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Status
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

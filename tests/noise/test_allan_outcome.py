@@ -5,11 +5,13 @@ import pytest
 
 from inercal.errors import InputError, RecordError
 from inercal.estimate.files import load, save
-from inercal.estimate.status import Status
+from inercal.findings import Status
+from inercal.inputs import Source
 from inercal.instruments.noise import SYMBOLS, NoiseModel
 from inercal.noise.outcome import noise_of, within
 from inercal.noise.rest import unrest
-from inercal.records.record import Column, Record, Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.units import STANDARD_GRAVITY, parse_unit
 
 RATE = 100.0

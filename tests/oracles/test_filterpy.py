@@ -8,11 +8,11 @@ import pytest
 from paper_study import study
 
 from inercal.estimate.factor import EIGEN, root
-from inercal.selfcal import quaternion
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.plan import Plan, Turn
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters import quaternion
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import Filter
-from inercal.selfcal.simulate import experiment, simulate
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import plain_filterpy

@@ -10,8 +10,8 @@ from scipy.stats import sobol_indices
 from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import exact
-from inercal.sensitivity.estimators import draw, estimate, evaluate
+from inercal.sensitivities import exact
+from inercal.sensitivities.estimators import draw, estimate, evaluate
 
 H = np.radians(2.0 / 60.0)
 TABLE = turntable("two_axis_turntable", uniform(H))

@@ -14,13 +14,13 @@ import pytest
 
 from inercal._toml import check
 from inercal.errors import StudyError
-from inercal.estimate.status import Status
 from inercal.examples import FOLDER
+from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.settings import ImuSettings
 from inercal.records.read import read
-from inercal.study.imu_aided import AidedTable, aided_settings
+from inercal.studies.imu_aided import AidedTable, aided_settings
 
 ACC = np.array(
     [

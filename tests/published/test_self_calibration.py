@@ -12,18 +12,18 @@ from paper_study import ARCSEC, DEG, NOISE, PPM, PRIOR, TRUTH, gating_costs, stu
 
 from inercal.estimate.factor import NEGATIVE
 from inercal.geometry.rotations import boxminus, boxplus
-from inercal.selfcal import quaternion
-from inercal.selfcal.bounds import bounds
+from inercal.selfcal.before.bounds import bounds
+from inercal.selfcal.before.path_design import at_rest, with_stops
+from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.campaign import campaign
-from inercal.selfcal.coefficients import NAMES, to_linear, to_product
-from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.kinematics import attitude
-from inercal.selfcal.pathdesign import at_rest, with_stops
-from inercal.selfcal.plan import Plan, Rest, Turn, motion, path
-from inercal.selfcal.rig import Base
+from inercal.selfcal.filters import quaternion
+from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
+from inercal.selfcal.platform.kinematics import attitude
+from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion, path
+from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.settings import KINDS, Filter, Gating
-from inercal.selfcal.simulate import experiment, simulate
 
 SEED, SEEDS = 20261121, range(8)
 SIZE = np.abs(TRUTH[:18])

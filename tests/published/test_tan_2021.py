@@ -17,10 +17,10 @@ from scipy.optimize import brentq
 from scipy.signal import butter, sosfilt, sosfreqz
 from sting_study import DEG, G, clipped, layout, scenario, study
 
-from inercal.aoa import lever, residuals, static
-from inercal.aoa.filtered import estimate
-from inercal.aoa.methods import low_passed, measure
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.paper import lever, residuals, static
+from inercal.aoa.paper.methods import low_passed, measure
 from inercal.aoa.settings import Disturbances, Methods, MotionPlan, Noise
 from inercal.aoa.simulate import simulate
 

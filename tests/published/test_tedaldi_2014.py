@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
 from recordings import shipped
 
 from inercal.convert.other_tools import to_tool
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.imu.multiposition import calibrate_multiposition as calibrate
 from inercal.imu.poses import choose, sweep
 from inercal.imu.recording import prepare

@@ -20,7 +20,7 @@ from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import averages, exact, local, sampled
+from inercal.sensitivities import averages, exact, local, sampled
 from inercal.turntable import planning, regression
 from inercal.turntable.model import stated_values, table_model
 from inercal.turntable.settings import Constraint, Design, Instrument, TurntableSettings

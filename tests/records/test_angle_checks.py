@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from inercal.inputs import Source
 from inercal.records.checks import check
-from inercal.records.record import Column, Source
+from inercal.records.column import Column
 from inercal.units import parse_unit
 
 ARCSEC = 1.0 / 3600.0

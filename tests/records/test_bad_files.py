@@ -12,7 +12,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from inercal.errors import InputError
-from inercal.records.findings import CODES
+from inercal.findings import CODES
 from inercal.records.guess import guess_map
 from inercal.records.maps import read_map
 from inercal.records.read import read

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from inercal.errors import RecordError
-from inercal.records.findings import CODES, Finding
-from inercal.records.record import Column, Record, Source
+from inercal.findings import CODES, Finding
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.units import parse_unit
 
 SOURCE = Source("run7.csv", "0" * 64)
@@ -163,7 +165,7 @@ CONTRACT = {
 def test_codes_of_the_contract():
     """interfaces.md, "Finding codes"; more may be added, none may go."""
     assert CODES.keys() >= CONTRACT
-    assert all(len(meaning) > 10 for meaning in CODES.values())
+    assert all(len(each.meaning) > 10 for each in CODES.values())
     for code in CONTRACT:
         assert Finding(code, "").code == code
 

@@ -6,10 +6,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import InputError
+from inercal.findings import Finding
+from inercal.inputs import Source
 from inercal.records.clocks import clocks
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.read import read
-from inercal.records.record import Column, Record, Source
+from inercal.records.record import Record
 from inercal.records.write import SUFFIXES, write_record
 from inercal.units import parse_unit
 
@@ -110,7 +112,7 @@ def test_a_table_has_one_clock(suffix, tmp_path):
 
 
 def test_clocks_go_by_their_first_sensor():
-    named = clocks(two_clocks(), "t")
+    named = clocks(two_clocks().columns, "t")
     assert named.of_column == {
         "acc_x": "t_acc",
         "gyro_x": "t_gyro",
@@ -123,7 +125,7 @@ def test_clocks_go_by_their_first_sensor():
 def test_equal_stamps_are_one_clock():
     t = np.array([0.0, np.nan, 1.0])
     columns = [column("acc_x", "g", t, t), column("acc_y", "g", t, t.copy())]
-    assert list(clocks(Record({each.name: each for each in columns}), "t").axes) == ["t"]
+    assert list(clocks({each.name: each for each in columns}, "t").axes) == ["t"]
 
 
 @pytest.mark.parametrize(("suffix", "engine"), [(".h5", "h5netcdf"), (".nc", "scipy")])

@@ -7,9 +7,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from inercal.inputs import Source
 from inercal.instruments.noise import NoiseModel
 from inercal.noise.outcome import noise_of
-from inercal.records.record import Column, Record, Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.report.allan import cells, page, pictures, shown_units
 from inercal.units import parse_unit
 

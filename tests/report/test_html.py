@@ -11,10 +11,9 @@ import pytest
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import from_json, to_json
 from inercal.estimate.result import Estimate, coverage_factor
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
+from inercal.inputs import Source
 from inercal.instruments.terms import TERMS
-from inercal.records.findings import Finding
-from inercal.records.record import Source
 from inercal.report.html import Picture, render
 from inercal.report.style import plain_unit
 

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from inercal.estimate.result import without_parameters
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
-from inercal.records.record import Column, Record, Source
+from inercal.findings import Finding, Status
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.report.inspection import (
     channels_table,
     inspection_pictures,

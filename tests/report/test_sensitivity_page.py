@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from inercal.estimate.result import without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.report.sensitivity import _even_grid, _map, interactions, maps
 from inercal.rigs.distribution import normal, uniform

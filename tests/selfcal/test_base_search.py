@@ -12,16 +12,16 @@ from paper_study import ARCSEC, DEG, TRUTH, study
 from scipy.stats import chi2
 
 from inercal.errors import StudyError
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.earth import gravity
 from inercal.geometry.rotations import exp, to_matrix
 from inercal.geometry.site import Site
-from inercal.selfcal.base_search import heading, is_rough, relative, with_base
-from inercal.selfcal.coefficients import BETA
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.rig import Base, Gimbals
-from inercal.selfcal.simulate import experiment, simulate, to_record
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.find_base import heading, is_rough, relative, with_base
+from inercal.selfcal.platform.coefficients import BETA
+from inercal.selfcal.platform.rig import Base, Gimbals
 from inercal.selfcal.task import calibrate
 
 FRAMES = st.sampled_from(["nue", "enu", "ned"])

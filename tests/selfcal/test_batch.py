@@ -19,20 +19,20 @@ from inercal.geometry.rotations import (
     multiply,
     right_jacobian,
 )
-from inercal.selfcal.batch import _terms, estimate_map, inverse_diagonal
-from inercal.selfcal.bounds import bounds
-from inercal.selfcal.coefficients import product_slope, to_linear
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.plan import path
-from inercal.selfcal.residuals import (
+from inercal.selfcal.before.bounds import bounds
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters.batch import _terms, estimate_map, inverse_diagonal
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.residuals import (
     first_reading,
     readings,
     sensed,
     turns,
 )
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import product_slope, to_linear
+from inercal.selfcal.platform.plan import path
 from inercal.selfcal.settings import Filter, Gating
-from inercal.selfcal.simulate import experiment, simulate
 
 EXTENDED_TRUTH = TRUTH + np.append(np.zeros(18), [40e-6, -60e-6, 80e-6, 1e-4, -2e-4, 1.5e-4])
 
@@ -258,7 +258,7 @@ def test_gate_stops_the_same_measurements_as_in_the_filter(rule, stops):
 
 
 def test_other_gimbals_and_base():
-    from inercal.selfcal.rig import Base, Gimbals
+    from inercal.selfcal.platform.rig import Base, Gimbals
 
     rig = {"gimbals": Gimbals(("y", "z", "x"), (1, -1, 1)), "base": Base("ned", 0.7, (0.01, -0.02))}
     recording, given, truth = recorded(41, "best", 1.0, **rig)

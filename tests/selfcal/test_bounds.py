@@ -10,17 +10,17 @@ from paper_study import ARCSEC, MICRO_G, PPM, PRIOR, TRUTH, gating_costs, study
 from scipy import stats
 
 from inercal.geometry.rotations import boxminus, exp, multiply, rotate
-from inercal.selfcal.bounds import SOURCES, bounds, recorded_bounds
-from inercal.selfcal.coefficients import KA0, KG0, product_slope, to_linear
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.kinematics import attitude
-from inercal.selfcal.model import accelerometers, platform_rate
-from inercal.selfcal.observability import seen
-from inercal.selfcal.plan import Plan, Rest, motion
-from inercal.selfcal.rig import Gimbals
+from inercal.selfcal.before.bounds import SOURCES, bounds, recorded_bounds
+from inercal.selfcal.before.observability import seen
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import KA0, KG0, product_slope, to_linear
+from inercal.selfcal.platform.kinematics import attitude
+from inercal.selfcal.platform.model import accelerometers, platform_rate
+from inercal.selfcal.platform.plan import Plan, Rest, motion
+from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.settings import Filter, Gating, Noise
-from inercal.selfcal.simulate import experiment, simulate
 
 
 def along(study, **other):

@@ -14,13 +14,17 @@ RUN = """
 import json, sys
 import numpy as np
 from paper_study import study
-from inercal.selfcal import bounds, error_state, gimbal, multiplicative, quaternion
-from inercal.selfcal.bounds import recorded_bounds
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.plan import Plan, Turn
+from inercal.selfcal.before import bounds
+from inercal.selfcal.filters import error_state
+from inercal.selfcal.filters import gimbal
+from inercal.selfcal.filters import multiplicative
+from inercal.selfcal.filters import quaternion
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import Filter
-from inercal.selfcal.simulate import experiment, simulate
+from inercal.selfcal.before.simulate import experiment, simulate
 
 found = {}
 for extended in (False, True):

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, TRUTH, study
 
+from inercal.findings import Finding
 from inercal.geometry.rotations import exp, rotate
-from inercal.records.findings import Finding
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.rig import Base
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.settings import Disturbances
-from inercal.selfcal.simulate import experiment, simulate
 
 PROBLEM = problem(study())
 

@@ -17,13 +17,14 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.selfcal import error_state, linearised, model
-from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.kinematics import attitude, joint_axes
-from inercal.selfcal.rig import Gimbals
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters import error_state
+from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform import linearised, model
+from inercal.selfcal.platform.kinematics import attitude, joint_axes
+from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.settings import Filter
-from inercal.selfcal.simulate import experiment, simulate
 
 EXTENDED = Filter(extended=True)
 

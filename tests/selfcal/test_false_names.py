@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
-from inercal.selfcal.coefficients import NAMES
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.settings import Disturbances, Noise
-from inercal.selfcal.simulate import experiment, simulate
 
 STUDY = study(path="best")
 COARSE = Noise(0.1 * DEG / 60.0, 5000.0 * MICRO_G, 600.0 * ARCSEC)

@@ -13,14 +13,14 @@ from scipy.stats import chi2
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
 from inercal.records.record import Record
-from inercal.selfcal.bounds import recorded_bounds
-from inercal.selfcal.coefficients import product_slope, to_product
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.gaps import broken, held_rate, taken_anew, with_held
-from inercal.selfcal.kinematics import attitude
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.gaps import broken, held_rate, taken_anew, with_held
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import product_slope, to_product
+from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.simulate import experiment, simulate, to_record
 
 BEST = study("best")
 SEEDS = range(6)

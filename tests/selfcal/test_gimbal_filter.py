@@ -9,15 +9,15 @@ from paper_study import DEG, study
 from unscented_twins import RIGS, angle_rates, gimbal, joints
 
 from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
-from inercal.selfcal import gimbal as model
-from inercal.selfcal.coefficients import NAMES, to_linear
-from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import LOCK, estimate
-from inercal.selfcal.kinematics import angles, parity
-from inercal.selfcal.plan import Plan, Rest, Turn, path
-from inercal.selfcal.rig import Gimbals, World
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters import gimbal as model
+from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.run import LOCK, estimate
+from inercal.selfcal.platform.coefficients import NAMES, to_linear
+from inercal.selfcal.platform.kinematics import angles, parity
+from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.selfcal.platform.rig import Gimbals, World
 from inercal.selfcal.settings import Filter
-from inercal.selfcal.simulate import experiment, simulate
 
 EVERY_RIG = tuple(product(permutations("xyz"), product((1, -1), repeat=3)))
 EULER = Filter(integration="euler")

@@ -8,15 +8,15 @@ from paper_study import DEG, study
 from unscented_twins import RIGS, multiplicative
 
 from inercal.geometry.rotations import boxminus, boxplus, normalize
-from inercal.selfcal import multiplicative as mukf
-from inercal.selfcal.coefficients import to_linear
-from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.kinematics import attitude
-from inercal.selfcal.plan import Plan, Turn, path
-from inercal.selfcal.rig import Gimbals
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters import multiplicative as mukf
+from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import to_linear
+from inercal.selfcal.platform.kinematics import attitude
+from inercal.selfcal.platform.plan import Plan, Turn, path
+from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.settings import Filter, Gating
-from inercal.selfcal.simulate import experiment, simulate
 
 COARSE = path("best", step=3.0)
 

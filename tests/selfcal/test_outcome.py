@@ -8,18 +8,17 @@ import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
 from inercal.estimate.files import to_json
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.geometry.site import GravityInput, Site
-from inercal.records.findings import Finding
-from inercal.selfcal.bounds import recorded_bounds
-from inercal.selfcal.coefficients import NAMES, to_product, units
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.outcome import assemble, verdict
-from inercal.selfcal.plausibility import implausible
-from inercal.selfcal.rig import Base
-from inercal.selfcal.simulate import experiment, simulate
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.diagnosis.plausibility import implausible
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import NAMES, to_product, units
+from inercal.selfcal.platform.rig import Base
+from inercal.selfcal.result.outcome import assemble, verdict
 
 LATITUDE_U = 0.02 * DEG
 GRAVITY_U = 1e-4

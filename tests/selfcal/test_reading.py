@@ -11,13 +11,15 @@ from paper_study import DEG, study
 
 from inercal.errors import RecordError
 from inercal.geometry.earth import EARTH_RATE
+from inercal.inputs import Source
+from inercal.records.column import Column
 from inercal.records.read import read
-from inercal.records.record import Column, Record, Source
+from inercal.records.record import Record
 from inercal.records.write import SUFFIXES, write_record
-from inercal.selfcal.plan import Plan, Rest, Turn, path
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.rig import Gimbals
-from inercal.selfcal.simulate import experiment, simulate, to_record
 from inercal.units import parse_unit
 
 # All three joints turn; 108 s.

@@ -14,11 +14,11 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.kernels import exp, multiply, rotate
 from inercal.geometry.rotations import attitude_difference, elementary, from_matrix, to_matrix
 from inercal.geometry.site import Site
-from inercal.selfcal.kinematics import all_angles, angles, attitude, joint_axes
-from inercal.selfcal.model import propagate
-from inercal.selfcal.plan import PATHS, Plan, Rest, Turn, motion, path
-from inercal.selfcal.residuals import gimbals as all_gimbals
-from inercal.selfcal.rig import JOINTS, Base, Gimbals, World, world
+from inercal.selfcal.filters.residuals import gimbals as all_gimbals
+from inercal.selfcal.platform.kinematics import all_angles, angles, attitude, joint_axes
+from inercal.selfcal.platform.model import propagate
+from inercal.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
+from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 
 LATITUDE = 40.0 * DEG
 SITE = Site(9.8, (), LATITUDE)

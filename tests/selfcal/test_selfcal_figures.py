@@ -14,24 +14,25 @@ from paper_study import ARCSEC, MICRO_G, PER_HOUR, PRIOR, TRUTH, study
 import inercal.selfcal.figures as drawn_by
 from inercal.estimate.budget import TypeA, combine
 from inercal.estimate.result import Estimate, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.rotations import exp, multiply, normalize
 from inercal.report import filtering
 from inercal.report.cells import Cell
 from inercal.report.figures import dots
 from inercal.report.histories import turning
 from inercal.report.selfcal import attitude_errors
-from inercal.selfcal.bounds import Bounds
+from inercal.selfcal.before.bounds import Bounds
+from inercal.selfcal.before.observability import seen
+from inercal.selfcal.before.path_design import Designed, Judged
 from inercal.selfcal.campaign import Campaign
-from inercal.selfcal.coefficients import names, product_slope, to_linear, to_product, units
-from inercal.selfcal.display import displayed, of_field, side_by_side
-from inercal.selfcal.filtered import Filtered, History, Problem
-from inercal.selfcal.observability import seen
-from inercal.selfcal.pathdesign import Designed, Judged
-from inercal.selfcal.plan import Plan, Rest, Turn, path
-from inercal.selfcal.recording import Recording
-from inercal.selfcal.residuals import gimbals
-from inercal.selfcal.tables import bounds_by_path, turns, weak_combinations
+from inercal.selfcal.display import displayed, of_field
+from inercal.selfcal.filters.filter_result import Filtered, History, Problem
+from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.platform.coefficients import names, product_slope, to_linear, to_product, units
+from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.result.comparison import side_by_side
+from inercal.selfcal.result.tables import bounds_by_path, turns, weak_combinations
 from inercal.selfcal.task import Calibration
 from inercal.units import parse_unit
 

@@ -12,13 +12,19 @@ from scipy.stats import chi2, kstest
 
 from inercal.errors import StudyError
 from inercal.geometry.rotations import attitude_difference, conjugate, exp, multiply, normalize, rotate
-from inercal.selfcal.coefficients import BETA, DO, DS, ETA, KA0, KA1, KG0, KG1, to_linear
-from inercal.selfcal.model import accelerometers, on_the_base, platform_rate, simulate_truth, specific_force
-from inercal.selfcal.plan import Plan, Rest, Turn, motion
-from inercal.selfcal.residuals import gimbals
-from inercal.selfcal.rig import Base, Gimbals
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.platform.coefficients import BETA, DO, DS, ETA, KA0, KA1, KG0, KG1, to_linear
+from inercal.selfcal.platform.model import (
+    accelerometers,
+    on_the_base,
+    platform_rate,
+    simulate_truth,
+    specific_force,
+)
+from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion
+from inercal.selfcal.platform.rig import Base, Gimbals
 from inercal.selfcal.settings import Disturbances, Noise
-from inercal.selfcal.simulate import experiment, simulate, to_record
 
 PLAN = Plan(
     (Turn("z", 60 * DEG), Turn("x", 90 * DEG), Turn("y", 40 * DEG), Rest(4.0)),

@@ -8,14 +8,14 @@ from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, PRIOR, TRUTH, study
 
 from inercal.geometry.rotations import attitude_difference, boxminus, boxplus, normalize
-from inercal.selfcal.batch import estimate_map
-from inercal.selfcal.coefficients import to_linear
-from inercal.selfcal.filtered import Start, problem
-from inercal.selfcal.plan import path
-from inercal.selfcal.residuals import readings
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.filters.batch import estimate_map
+from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.residuals import readings
+from inercal.selfcal.filters.start import _along, estimate_lm, wahba
+from inercal.selfcal.platform.coefficients import to_linear
+from inercal.selfcal.platform.plan import path
 from inercal.selfcal.settings import Filter, Noise
-from inercal.selfcal.simulate import experiment, simulate
-from inercal.selfcal.start import _along, estimate_lm, wahba
 
 
 def simulated(seed=1, name="paper", step=0.2, **changes):

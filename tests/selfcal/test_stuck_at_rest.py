@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from paper_study import ARCSEC, study
 
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.simulate import experiment, simulate
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
 
 
 def named(th_of):

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput
-from inercal.selfcal.bounds import recorded_bounds
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.outcome import assemble, verdict
-from inercal.selfcal.rig import Base
-from inercal.selfcal.simulate import experiment, simulate
-from inercal.selfcal.stated import stated_errors, statements
-from inercal.selfcal.unmodelled import filtered, likely, search
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.diagnosis.small import filtered, likely, search
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.rig import Base
+from inercal.selfcal.result.outcome import assemble, verdict
+from inercal.selfcal.result.systematic import stated_errors, statements
 
 PLAIN = study(path="best")
 PLAIN_LIMIT = 6.0 + 5.0 * np.sqrt(12.0 / 2700.0)

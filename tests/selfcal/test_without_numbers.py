@@ -9,23 +9,23 @@ from hypothesis import strategies as st
 from paper_study import ARCSEC, DEG, study
 
 from inercal.estimate.budget import combine
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.site import GravityInput
-from inercal.selfcal import sources
-from inercal.selfcal.bounds import recorded_bounds
-from inercal.selfcal.coefficients import ETA, KA1, divisor, names, product_slope, to_product
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.history import history_record
-from inercal.selfcal.observability import singular
-from inercal.selfcal.outcome import assemble
-from inercal.selfcal.plan import Plan, Turn
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.observability import singular
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.diagnosis.small import Cause, Found, _least_squares
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
+from inercal.selfcal.platform.plan import Plan, Turn
+from inercal.selfcal.result import budget as sources
+from inercal.selfcal.result.columns import history_record
+from inercal.selfcal.result.outcome import assemble
+from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import Filter, Noise
-from inercal.selfcal.simulate import experiment, simulate, to_record
-from inercal.selfcal.stated import stated_errors
 from inercal.selfcal.task import calibrate
-from inercal.selfcal.unmodelled import Cause, Found, _least_squares
 
 SHORT = study(plan=Plan((Turn("x", np.pi), Turn("y", np.pi), Turn("z", np.pi)), rate=6.0 * DEG, step=1.0))
 

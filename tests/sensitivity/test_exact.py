@@ -14,8 +14,8 @@ from inercal.rigs.distribution import normal, two_point, uniform
 from inercal.rigs.outputs import Output, table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import averages
-from inercal.sensitivity.exact import analyse, closed_variance
+from inercal.sensitivities import averages
+from inercal.sensitivities.exact import analyse, closed_variance
 
 ARCSEC = np.pi / 180.0 / 3600.0
 LATITUDE = np.radians(40.0)

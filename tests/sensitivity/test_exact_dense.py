@@ -9,7 +9,7 @@ from inercal.rigs.chain import Chain, Error, Fixed, Joint, Scope
 from inercal.rigs.distribution import density, normal, two_point, uniform
 from inercal.rigs.outputs import Output, gravity_reference, rate_reference
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import dense
+from inercal.sensitivities import dense
 
 ANGLES = np.array([[0.3, 1.1], [np.pi / 2, 0.0], [2.0, -0.4]])
 

@@ -14,8 +14,8 @@ from inercal.rigs.distribution import density, normal, uniform
 from inercal.rigs.outputs import Output, table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import dense
-from inercal.sensitivity.exact import analyse, closed_variance
+from inercal.sensitivities import dense
+from inercal.sensitivities.exact import analyse, closed_variance
 
 PACKAGE = Path(inercal.__file__).parent
 PARTS = ("variance", "bias", "first_variance", "interaction_variance", "shapley", "second_variance")
@@ -40,7 +40,7 @@ def rigs():
 
 @pytest.mark.parametrize("chain", list(rigs()), ids=["two axes", "three axes"])
 def test_compiled_and_plain_agree_to_rounding(chain):
-    """`inercal.sensitivity.dense` is written apart, with matrices in place of components."""
+    """`inercal.sensitivities.dense` is written apart, with matrices in place of components."""
     angles = np.random.default_rng(8).uniform(-np.pi, np.pi, (7, len(chain.joints)))
     found = analyse(chain, OUTPUTS, angles, shapley=True, second=True)
     plain_chain = dense.blocks(chain, angles, (1,))
@@ -79,8 +79,8 @@ import numpy as np
 from inercal.rigs.distribution import density
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import dense, kernels
-from inercal.sensitivity.exact import analyse
+from inercal.sensitivities import dense, kernels
+from inercal.sensitivities.exact import analyse
 chain = turntable("two_axis_turntable", density(lambda x: 1.0 + x, -0.3, 0.6), mounting=np.eye(3)[[1, 2, 0]])
 outputs, angles = table_outputs(("ax", "wy"), 9.8, 0.7), np.array([[0.3, 1.1], [0.3, 1.2], [2.0, 1.2]])
 """

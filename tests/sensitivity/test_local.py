@@ -9,7 +9,7 @@ from inercal.rigs.distribution import density, uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import exact, local
+from inercal.sensitivities import exact, local
 
 LAW = uniform(np.radians(2.0 / 60.0))
 TABLE = turntable("two_axis_turntable", LAW)

@@ -6,7 +6,7 @@ import pytest
 from high_precision import KINDS, relative, wave
 
 from inercal.rigs.distribution import Distribution, uniform
-from inercal.sensitivity.moments import moments
+from inercal.sensitivities.moments import moments
 
 ARCSEC = np.pi / 180.0 / 3600.0
 SIZES = [ARCSEC, 120.0 * ARCSEC, 0.01, np.radians(50.0)]

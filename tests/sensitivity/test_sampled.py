@@ -9,8 +9,8 @@ from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import exact, sampled
-from inercal.sensitivity.estimators import estimate, evaluate
+from inercal.sensitivities import exact, sampled
+from inercal.sensitivities.estimators import estimate, evaluate
 
 LAW = uniform(np.radians(2.0 / 60.0))
 TABLE = turntable("two_axis_turntable", LAW)

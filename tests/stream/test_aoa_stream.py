@@ -9,15 +9,15 @@ import pytest
 from sting_study import BASE, DEG, G, study
 from streams_that_break import lines_out
 
-from inercal.aoa.filtered import estimate
-from inercal.aoa.history import angles_record
-from inercal.aoa.problem import problem
-from inercal.aoa.reading import recording_of
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reading.from_record import recording_of
+from inercal.aoa.reading.wind_off_zero import with_zero
+from inercal.aoa.result.columns import angles_record
+from inercal.aoa.result.systematic import by_fusion
 from inercal.aoa.settings import Attitude, Calibration, Disturbances, Oscillation, Zero
 from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.stated import by_fusion
 from inercal.aoa.task import measure
-from inercal.aoa.zero import with_zero
 from inercal.errors import InputError, RecordError, StudyError
 from inercal.estimate.checkpoint import fingerprint
 from inercal.estimate.files import save
@@ -136,7 +136,7 @@ def test_gyros_for_roll_and_yaw_are_used(tmp_path):
 @pytest.mark.parametrize("block", [37, 10_000])
 def test_with_them_alpha_and_beta_are_those_of_the_tracked_roll(block, tmp_path, monkeypatch):
     """To the digit, and off by degrees from those of the stated roll: the model rolls by 2 deg while it is measured."""
-    monkeypatch.setattr("inercal.aoa.filtered._BLOCK", block)
+    monkeypatch.setattr("inercal.aoa.fusion.filter_result._BLOCK", block)
     rolling = Disturbances(roll=Oscillation(2.0 * DEG, 6.0), yaw=Oscillation(1.0 * DEG, 8.0))
     settings = study(motion=SHORT, disturbances=rolling, attitude=ROLLED)
     text = recorded(tmp_path, settings, 4, flawed)

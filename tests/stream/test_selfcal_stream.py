@@ -13,14 +13,14 @@ from inercal.errors import InputError, RecordError, StudyError
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.write import write_record
-from inercal.selfcal.coefficients import KA1, names
-from inercal.selfcal.filtered import problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.history import history_record
-from inercal.selfcal.plan import Plan, Rest, Turn
+from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import KA1, names
+from inercal.selfcal.platform.plan import Plan, Rest, Turn
 from inercal.selfcal.reading import recording_of
+from inercal.selfcal.result.columns import history_record
 from inercal.selfcal.settings import Disturbances, Filter, Gating
-from inercal.selfcal.simulate import experiment, simulate, to_record
 from inercal.stream.lines import Lines
 from inercal.stream.run import Saving, run
 from inercal.stream.selfcal import Selfcal

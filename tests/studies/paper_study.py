@@ -7,8 +7,8 @@ import numpy as np
 
 from inercal.geometry.earth import gravity
 from inercal.geometry.site import Site
-from inercal.selfcal.bounds import bounds
-from inercal.selfcal.plan import path as named_path
+from inercal.selfcal.before.bounds import bounds
+from inercal.selfcal.platform.plan import path as named_path
 from inercal.selfcal.settings import Gating, Noise, SelfcalSettings
 
 DEG = np.pi / 180.0

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from sting_study import DEG, clipped, scenario, study
 
-from inercal.aoa.filtered import estimate
-from inercal.aoa.methods import low_passed, measure
-from inercal.aoa.problem import problem
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.paper.methods import low_passed, measure
 from inercal.aoa.settings import Methods, MotionPlan
 from inercal.aoa.simulate import simulate
 

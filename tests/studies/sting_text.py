@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from inercal.estimate.files import save
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
-from inercal.study.aoa import aoa_study
+from inercal.findings import Status
+from inercal.studies.aoa import aoa_study
 
 # The study of the interface description, to the letter.
 CONTRACT = """

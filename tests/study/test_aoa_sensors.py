@@ -13,8 +13,8 @@ from sting_text import calibrated, same, study, with_sensor
 
 from inercal.aoa.settings import Calibration
 from inercal.errors import InputError, StudyError
-from inercal.study.schema import json_schema
-from inercal.study.sensors import MOST
+from inercal.studies.schema import json_schema
+from inercal.studies.sensors import MOST
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)

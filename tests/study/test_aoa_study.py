@@ -22,14 +22,14 @@ from inercal.aoa.settings import (
     Zero,
 )
 from inercal.errors import StudyError
-from inercal.study.load import (
+from inercal.studies.load import (
     files_of,
     load_aoa_study,
     load_imu_study,
     load_selfcal_study,
     load_turntable_study,
 )
-from inercal.study.schema import json_schema
+from inercal.studies.schema import json_schema
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)

@@ -16,10 +16,10 @@ from inercal.aoa.settings import (
     Zero,
 )
 from inercal.errors import StudyError
-from inercal.study.aoa import aoa_study
-from inercal.study.schema import json_schema
-from inercal.study.sensors import MOST
-from inercal.study.template import aoa_template
+from inercal.studies.aoa import aoa_study
+from inercal.studies.schema import json_schema
+from inercal.studies.sensors import MOST
+from inercal.studies.template import aoa_template
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
-from inercal.study.imu import imu_study
-from inercal.study.load import load_imu_study
-from inercal.study.template import imu_template
+from inercal.studies.imu import imu_study
+from inercal.studies.load import load_imu_study
+from inercal.studies.template import imu_template
 
 RELAXED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 TEMPLATE = re.sub(r"(?m)^# (\w+ = )", r"\1", imu_template()).encode()

@@ -7,9 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import StudyError
-from inercal.study.load import load_turntable_study
-from inercal.study.template import turntable_template
-from inercal.study.turntable import turntable_study
+from inercal.studies.load import load_turntable_study
+from inercal.studies.template import turntable_template
+from inercal.studies.turntable import turntable_study
 from inercal.turntable.settings import TurntableSettings
 
 RELAXED = settings(

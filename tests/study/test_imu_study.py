@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 from inercal.errors import StudyError
 from inercal.geometry.earth import gravity
-from inercal.study.common import GRAVITY_ANOMALY, UNSTATED_HEIGHT
-from inercal.study.imu import imu_study
-from inercal.study.load import load_imu_study
+from inercal.studies.common import GRAVITY_ANOMALY, UNSTATED_HEIGHT
+from inercal.studies.imu import imu_study
+from inercal.studies.load import load_imu_study
 
 FULL = """
 schema = 1

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from inercal.errors import StudyError
-from inercal.study.imu import imu_study
-from inercal.study.schema import json_schema
-from inercal.study.ways import DISTRIBUTIONS
+from inercal.studies.imu import imu_study
+from inercal.studies.schema import json_schema
+from inercal.studies.ways import DISTRIBUTIONS
 from inercal.units import _TABLE, parse_unit
 
 SCHEMA = json_schema()

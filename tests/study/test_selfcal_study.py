@@ -16,13 +16,13 @@ from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
 from inercal.errors import StudyError
 from inercal.instruments.terms import TERMS
-from inercal.selfcal.coefficients import BETA, EXTENDED, NAMES, units
-from inercal.selfcal.plan import PATHS, Rest, Turn, path
+from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
+from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
 from inercal.selfcal.settings import KINDS, Gating, SelfcalSettings
-from inercal.study.load import load_imu_study, load_selfcal_study, load_turntable_study
-from inercal.study.schema import json_schema
-from inercal.study.selfcal import selfcal_study
-from inercal.study.template import selfcal_template
+from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
+from inercal.studies.schema import json_schema
+from inercal.studies.selfcal import selfcal_study
+from inercal.studies.template import selfcal_template
 
 # The study of the interface description, to the letter.
 CONTRACT = """

@@ -9,10 +9,10 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from inercal.rigs.tables import slots
-from inercal.study.load import load_imu_study
-from inercal.study.schema import json_schema
-from inercal.study.template import imu_template, turntable_template
-from inercal.study.turntable import turntable_study
+from inercal.studies.load import load_imu_study
+from inercal.studies.schema import json_schema
+from inercal.studies.template import imu_template, turntable_template
+from inercal.studies.turntable import turntable_study
 from inercal.units import parse_unit
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")

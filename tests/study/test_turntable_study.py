@@ -15,8 +15,8 @@ from inercal.geometry.earth import gravity
 from inercal.rigs.chain import Scope
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import slots
-from inercal.study.load import files_of, load_imu_study, load_turntable_study
-from inercal.study.turntable import turntable_study
+from inercal.studies.load import files_of, load_imu_study, load_turntable_study
+from inercal.studies.turntable import turntable_study
 from inercal.units import STANDARD_GRAVITY
 
 ARCMIN = math.radians(1.0 / 60.0)

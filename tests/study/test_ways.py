@@ -1,7 +1,7 @@
 """Keys of which a table of a study holds one: what `--set` makes room for."""
 
-from inercal.study.rig import _MAKE
-from inercal.study.ways import DISTRIBUTIONS
+from inercal.studies.rig import _MAKE
+from inercal.studies.ways import DISTRIBUTIONS
 
 
 def test_setting_a_distribution_takes_the_place_of_every_other():

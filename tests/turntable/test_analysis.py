@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from inercal.errors import StudyError
 from inercal.estimate.files import plain_objects
-from inercal.study.turntable import turntable_study
+from inercal.studies.turntable import turntable_study
 from inercal.turntable.analysis import analyse, result, table
 from inercal.turntable.maps import write_maps
 

@@ -20,9 +20,9 @@ from turntable_studies import (
 
 from inercal.errors import CalibrationError, StudyError
 from inercal.estimate.files import from_json, to_json
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
-from inercal.records.record import Column
+from inercal.records.column import Column
 from inercal.rigs.chain import Scope
 from inercal.rigs.plans import grid, listed, named
 from inercal.turntable.simulate import simulate

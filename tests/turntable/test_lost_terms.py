@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from turntable_studies import ARCMIN, DEG_H, study, table
 
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.instruments.by_angle import channel_model
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, listed

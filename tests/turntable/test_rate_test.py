@@ -9,10 +9,12 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from inercal.errors import RecordError, StudyError
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
-from inercal.records.record import Column, Record, Source
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.rigs.chain import Scope
 from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.outputs import rate_reference

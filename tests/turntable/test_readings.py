@@ -8,7 +8,9 @@ from numpy.testing import assert_allclose
 from turntable_studies import DEG_H, TUMBLE, WHEEL_X, study, table
 
 from inercal.errors import RecordError
-from inercal.records.record import Column, Record, Source
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.turntable.readings import readings
 from inercal.turntable.simulate import simulate
 from inercal.units import parse_unit

@@ -7,9 +7,9 @@ import pytest
 
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.instruments.by_angle import CHANNELS, channel_model
-from inercal.study.turntable import turntable_study
+from inercal.studies.turntable import turntable_study
 from inercal.turntable.display import displayed, tolerances
 from inercal.turntable.outcome import unit_of_term
 from inercal.units import parse_unit

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from inercal.estimate.result import rounded, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.report.html import render
 from inercal.report.positions import hemispheres

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inercal.aoa import lever
+from inercal.aoa.paper import lever
 from inercal.convert import other_tools
 from inercal.estimate.runs import Serial
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.geometry import earth, rotations
 from inercal.noise import deviation
-from inercal.selfcal import rig
+from inercal.selfcal.platform import rig
 from inercal.validate import aoa, foundation, imu, noise, selfcal, turntable
 from inercal.validate.case import Case, Found, find, judge
 from inercal.validate.run import SYSTEMS, cases_of, validate

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.aoa.filtered import Filtered
 from inercal.aoa.flow import theta_u
 from inercal.aoa.settings import Attitude
-
-Array = NDArray[np.float64]
+from inercal.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +41,6 @@ def continuous(theta: Array) -> Array:
     found, known = theta.copy(), np.isfinite(theta)
     found[known] = np.unwrap(theta[known])
     return found
-
-
-def of_fusion(filtered: Filtered, states: int) -> Angles:
-    """The angles of the fusion with so many ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
-    way = "smoothed" if filtered.smoothed else "fusion"
-    return Angles(f"{way} {states}", filtered.theta, filtered.u, filtered.rate, filtered.rate_u)
 
 
 def stated_roll(angles: Angles, attitude: Attitude) -> Angles:

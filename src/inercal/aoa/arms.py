@@ -1,7 +1,7 @@
 """Lever arms of the accelerometers of a model, and which of them together show its angular acceleration.
 
 At a fixed roll of cosine c an accelerometer at angle lambda and position (r, 0, z) reads, with w the rate of pitch and
-al its acceleration (`inercal.aoa.model`),
+al its acceleration (`inercal.aoa.fusion.model`),
 
     A = g (sin theta cos lambda - c cos theta sin lambda) - q w^2 + p al
     q = r cos lambda - c^2 z sin lambda,    p = -c (z cos lambda + r sin lambda)
@@ -12,13 +12,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.layout import Layout
 from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
 from inercal.errors import StudyError
-
-Array = NDArray[np.float64]
 
 _NO_ARM = 1e-3
 """Lever arm [m] below which accelerometers do not show angular acceleration."""

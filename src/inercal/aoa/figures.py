@@ -8,16 +8,16 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
-from inercal.aoa.display import delays, displayed, shown_unit
 from inercal.aoa.flow import alpha_beta, stated
-from inercal.aoa.outcome import unit_of
-from inercal.aoa.pauses import at_rest
-from inercal.aoa.tables import answer, on_page
+from inercal.aoa.reading.pauses import at_rest
+from inercal.aoa.result.display import delays, displayed, shown_unit
+from inercal.aoa.result.outcome import unit_of
+from inercal.aoa.result.tables import answer, on_page
+from inercal.aoa.result.verification import REFERENCE_U
 from inercal.aoa.task import in_order
-from inercal.aoa.verification import REFERENCE_U
+from inercal.arrays import Array
 from inercal.report import sting
 from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches
 from inercal.report.aoa_innovations import innovations
@@ -29,11 +29,10 @@ from inercal.report.spectra import of_angle
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from inercal.aoa.filtered import Filtered
+    from inercal.aoa.fusion.filter_result import Filtered
     from inercal.aoa.settings import AoaSettings
     from inercal.aoa.task import Measurement
 
-Array = NDArray[np.float64]
 
 _MG = 1e-3 * STANDARD_GRAVITY
 

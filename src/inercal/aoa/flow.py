@@ -26,12 +26,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.settings import Attitude
+from inercal.arrays import Array
 from inercal.units import Quantity
-
-Array = NDArray[np.float64]
 
 _UNKNOWN = math.pi / math.sqrt(3.0)
 """Standard deviation [rad] of an angle of which nothing is known."""
@@ -111,8 +109,8 @@ def theta_u(theta: Array, u: Array, attitude: Attitude, by_roll: Array | None = 
 def theta_by_roll(theta: Array, roll: float) -> Array:
     """Change of theta, found by accelerometers along and across the body at rest, per change of the stated roll.
 
-    It is what a stream, which knows no better, goes by; `inercal.aoa.stated` does know better. The best fit of
-    g sin theta and g cos phi cos theta, each as well known, to what is read moves by
+    It is what a stream, which knows no better, goes by; `inercal.aoa.result.systematic` does know better. The best fit
+    of g sin theta and g cos phi cos theta, each as well known, to what is read moves by
     -cos phi sin phi sin theta cos theta / (cos^2 theta + cos^2 phi sin^2 theta).
     """
     s, c, level = np.sin(theta), np.cos(theta), math.cos(roll)

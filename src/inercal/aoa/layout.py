@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.rotations import principal
-
-Array = NDArray[np.float64]
 
 #: text of an axis -> lambda [rad], counted from +x (forward) towards -z (down)
 AXES = {"+x": 0.0, "-z": 0.5 * math.pi, "-x": math.pi, "+z": -0.5 * math.pi}

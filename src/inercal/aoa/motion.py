@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.settings import MotionPlan, Oscillation, Shaking
+from inercal.arrays import Array
 from inercal.errors import InputError, StudyError
-
-Array = NDArray[np.float64]
 
 Course: TypeAlias = Callable[[Array], tuple[Array, Array, Array]]
 """A value, its rate and its acceleration at times (n,) [s]."""

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.layout import Layout
+from inercal.arrays import Array
 from inercal.geometry.site import Site
 from inercal.units import STANDARD_GRAVITY, Quantity
-
-Array = NDArray[np.float64]
 
 States = Literal[8, 11, 15, 19]
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
@@ -251,7 +249,7 @@ class AoaSettings:
 
     ``sensors`` holds the calibrations by name: those of the layout, and ``gyro``, ``gyro_roll``, ``gyro_yaw``.
     ``traceability``, ``temperature``, ``given`` as in `inercal.imu.settings.ImuSettings`. ``corrections`` are scale and
-    axis angle [rad] by which an earlier run changed accelerometers, by name (`inercal.aoa.corrections`).
+    axis angle [rad] by which an earlier run changed accelerometers, by name (`inercal.aoa.reference.corrections`).
     """
 
     site: Site

@@ -7,17 +7,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.motion import course, duration, oscillation, point_numbers, shaking
-from inercal.aoa.recording import Recording
+from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Disturbances, Noise
+from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
-
-Array = NDArray[np.float64]
 
 _MARGIN = 1.0
 """Time [s] before the first sample from which sensors of limited bandwidth follow."""
@@ -26,7 +24,7 @@ _MARGIN = 1.0
 @dataclass(frozen=True, eq=False)
 class Simulated:
     """A ``recording`` and its truth: the angle ``theta`` (n,) [rad], its ``rate`` [rad/s] and ``acceleration``
-    [rad/s^2] at the stamps, and the ``errors`` of the sensors by name, as `inercal.aoa.problem` names them."""
+    [rad/s^2] at the stamps, and the ``errors`` of the sensors by name, as `inercal.aoa.fusion.problem` names them."""
 
     recording: Recording
     theta: Array

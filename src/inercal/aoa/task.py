@@ -8,34 +8,31 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.aoa import filtered, live, smoother
 from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
-from inercal.aoa.clock import later
-from inercal.aoa.delay import Delay, relative_delay
-from inercal.aoa.diagnosis import diagnose
-from inercal.aoa.filtered import Filtered
-from inercal.aoa.methods import MEASURED, label, low_passed
-from inercal.aoa.outcome import assemble, assemble_paper
-from inercal.aoa.plausibility import implausible
-from inercal.aoa.points import Point, points
-from inercal.aoa.posterior import corrected
-from inercal.aoa.posterior import load as load_posterior
-from inercal.aoa.problem import Problem, problem
-from inercal.aoa.reading import recording_of
-from inercal.aoa.recording import Recording
-from inercal.aoa.sensor_fit import Verified, fit
+from inercal.aoa.diagnosis.causes import diagnose
+from inercal.aoa.diagnosis.plausibility import implausible
+from inercal.aoa.fusion import filter_result, live, smoother
+from inercal.aoa.fusion.filter_result import Filtered
+from inercal.aoa.fusion.problem import Problem, problem
+from inercal.aoa.paper.delay import Delay, relative_delay
+from inercal.aoa.paper.methods import MEASURED, label, low_passed
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.from_record import recording_of
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.reading.wind_off_zero import with_zero
+from inercal.aoa.reference.sensor_fit import Verified, fit
+from inercal.aoa.result.carry_over import corrected
+from inercal.aoa.result.carry_over import load as load_posterior
+from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.points import Point, points
+from inercal.aoa.result.systematic import by_fusion, by_methods
+from inercal.aoa.result.verification import Errors, errors
 from inercal.aoa.settings import AoaSettings, Methods
-from inercal.aoa.stated import by_fusion, by_methods
-from inercal.aoa.verification import Errors, errors
-from inercal.aoa.zero import with_zero
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +146,7 @@ def measure(
     found: Filtered | None = None
     if methods is None:
         progress("smoothing" if settings.estimator.smooth else "filtering")
-        found = filtered.estimate(zeroed, of, settings.estimator.smooth)
+        found = filter_result.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, found)
         progress("looking for faults")
         findings = [*findings, *diagnose(zeroed, settings, findings)]
@@ -197,7 +194,9 @@ def _compared(
             if name != done.method:
                 progress(name)
                 of = problem(chosen, recording.spatial)
-                others[name] = by_fusion(recording, chosen, of, filtered.estimate(recording, of, smoothed))
+                others[name] = by_fusion(
+                    recording, chosen, of, filter_result.estimate(recording, of, smoothed)
+                )
     for methods in MEASURED:
         if label(methods) == done.method:
             continue

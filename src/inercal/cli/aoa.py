@@ -119,7 +119,7 @@ def aoa(
     from inercal.aoa.task import load_kernels, measure
     from inercal.records.read import source_of
     from inercal.records.write import SUFFIXES
-    from inercal.study.load import files_of, load_aoa_study
+    from inercal.studies.load import files_of, load_aoa_study
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     settings = load_aoa_study(study, keys)
@@ -153,8 +153,8 @@ def _one_run(records: Sequence[Record]) -> Record:
 
 def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -> int:
     """Write what was asked for, say what was found, and give the exit code."""
-    from inercal.aoa.display import delays, rest_of_fit, use_of_fit
-    from inercal.aoa.tables import answer, on_terminal
+    from inercal.aoa.result.display import delays, rest_of_fit, use_of_fit
+    from inercal.aoa.result.tables import answer, on_terminal
 
     def page() -> str:
         from inercal.aoa.figures import angle_page
@@ -162,7 +162,7 @@ def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -
         return angle_page(found, found.settings)
 
     def rows(path: Path) -> None:
-        from inercal.aoa.history import angles_record, points_record
+        from inercal.aoa.result.columns import angles_record, points_record
         from inercal.records.write import write_record
 
         record = (
@@ -190,10 +190,10 @@ def _live(
 ) -> None:
     """Measure row by row."""
     from inercal._jit import compiling
-    from inercal.aoa.live import load_kernels
-    from inercal.aoa.problem import problem
+    from inercal.aoa.fusion.live import load_kernels
+    from inercal.aoa.fusion.problem import problem
     from inercal.stream.aoa import Aoa
-    from inercal.study.load import load_aoa_study
+    from inercal.studies.load import load_aoa_study
 
     streaming.check(output, (file, map_file, study))
     settings = load_aoa_study(study, keys)

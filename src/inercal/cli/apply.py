@@ -11,7 +11,7 @@ from inercal.cli.options import FileOutput, MapFile, read_record, reading
 from inercal.cli.outcome import emit, told
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.errors import InputError
-from inercal.records.findings import Finding
+from inercal.findings import Finding
 
 if TYPE_CHECKING:
     from inercal.convert.correct import Model
@@ -80,7 +80,7 @@ def _model(calibration: Path) -> tuple[Model, tuple[Finding, ...]]:
     """The instrument of a calibration, and what to say of that: a bad verdict, terms that are not applied."""
     from inercal.convert import correct, platform
     from inercal.estimate.files import load
-    from inercal.estimate.status import Status
+    from inercal.findings import Status
 
     estimate = load(calibration)
     verdict = f"the calibration ended {estimate.status.value}: {estimate.message}"

@@ -63,7 +63,7 @@ def calibrate_imu(
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
     from inercal.estimate.repeat import combine_runs
     from inercal.imu.task import calibrate
-    from inercal.study.load import load_imu_study
+    from inercal.studies.load import load_imu_study
 
     solved = _solve(
         files,
@@ -118,7 +118,7 @@ def calibrate_turntable(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
-    from inercal.study.load import load_turntable_study
+    from inercal.studies.load import load_turntable_study
     from inercal.turntable.display import tolerances
     from inercal.turntable.task import Calibration, calibrate
 
@@ -154,7 +154,7 @@ def _solve(
 ) -> list[tuple[C, Estimate]]:
     """Read study and records and calibrate with each; the estimates come with their times and inputs."""
     from inercal.records.read import source_of
-    from inercal.study.load import files_of
+    from inercal.studies.load import files_of
 
     output.check(WHOLE, (*files, map_file, study))
     told = settings()

@@ -40,7 +40,7 @@ def convert(
     """Convert a calibration to or from another tool's."""
     from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
     from inercal.estimate.files import load
-    from inercal.estimate.status import Status
+    from inercal.findings import Status
     from inercal.records.read import source_of
 
     if to is None and source is None:

@@ -14,8 +14,8 @@ from inercal.cli.outcome import WHOLE, hand_over, told
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.records.findings import Finding
-    from inercal.selfcal.plan import Plan
+    from inercal.findings import Finding
+    from inercal.selfcal.platform.plan import Plan
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.turntable.settings import TurntableSettings
 
@@ -48,7 +48,7 @@ def design_positions(
 ) -> int:
     """Find the positions of a turntable that calibrate best."""
     from inercal._files import write_text
-    from inercal.study.load import files_of, load_turntable_study
+    from inercal.studies.load import files_of, load_turntable_study
     from inercal.turntable.planning import REFERENCES
     from inercal.turntable.task import design
 
@@ -85,11 +85,11 @@ def design_selfcal(
     """Find the path on which a platform calibrates itself best."""
     from inercal._files import write_text
     from inercal._jit import compiling
-    from inercal.selfcal.bounds import bounds
-    from inercal.selfcal.filtered import problem
-    from inercal.selfcal.pathdesign import REFERENCES, design
-    from inercal.selfcal.plan import Plan, Rest, motion
-    from inercal.study.load import load_selfcal_study
+    from inercal.selfcal.before.bounds import bounds
+    from inercal.selfcal.before.path_design import REFERENCES, design
+    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.platform.plan import Plan, Rest, motion
+    from inercal.studies.load import load_selfcal_study
 
     output.check((".json", ".toml"), (study,))
     clock = time.perf_counter()
@@ -147,7 +147,7 @@ def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings
 
 def _plan(plan: Plan, message: str) -> str:
     """A plan as the table of a study."""
-    from inercal.selfcal.pathdesign import stated_moves
+    from inercal.selfcal.before.path_design import stated_moves
 
     moves = (f"    {json.dumps(move)},\n" for move in stated_moves(plan.moves))
     start = [f"{math.degrees(angle):.10g} deg" for angle in plan.start]

@@ -22,7 +22,7 @@ Recordings = Annotated[list[Path] | None, Parameter(help="Recordings, to guess a
 def new_imu(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen)
     """Write a study, and a map guessed from the recordings."""
     from inercal.records.guess import guess_map
-    from inercal.study.template import imu_template
+    from inercal.studies.template import imu_template
 
     column_map = guess_map(files) if files else None
     channels = [] if column_map is None else _mapped(column_map)
@@ -34,7 +34,7 @@ def new_turntable(files: Recordings = None, /, *, output: FileOutput = FileOutpu
     from inercal.records.channels import of_a_table
     from inercal.records.guess import guess_map
     from inercal.records.read import canonical_units
-    from inercal.study.template import turntable_template
+    from inercal.studies.template import turntable_template
 
     channels: Mapping[str, Unit | None] = (canonical_units(files) if files else None) or {}
     column_map = None
@@ -48,7 +48,7 @@ def new_selfcal(files: Recordings = None, /, *, output: FileOutput = FileOutput(
     """Write a study of a self-calibration, and a map guessed from recordings that do not say what they hold."""
     from inercal.records.guess import guess_map
     from inercal.records.read import canonical_units
-    from inercal.study.template import selfcal_template
+    from inercal.studies.template import selfcal_template
 
     channels = (canonical_units(files) if files else None) or {}
     column_map = guess_map(files) if files and "th_x" not in channels else None
@@ -59,7 +59,7 @@ def new_aoa(files: Recordings = None, /, *, output: FileOutput = FileOutput()) -
     """Write a study of an angle of attack, and a map guessed from recordings that do not say what they hold."""
     from inercal.records.guess import guess_map
     from inercal.records.read import canonical_units
-    from inercal.study.template import aoa_template
+    from inercal.studies.template import aoa_template
 
     channels = (canonical_units(files) if files else None) or {}
     column_map = guess_map(files, of_model=True) if files and "a1" not in channels else None

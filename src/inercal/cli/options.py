@@ -20,7 +20,7 @@ from inercal.errors import InputError, StudyError
 if TYPE_CHECKING:
     from cyclopts import Token
 
-    from inercal.records.findings import Finding
+    from inercal.findings import Finding
     from inercal.records.record import Record
 
 Files = Annotated[

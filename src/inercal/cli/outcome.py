@@ -12,8 +12,8 @@ from inercal.cli.options import FileOutput, ReportOutput
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.records.findings import Finding
-    from inercal.records.record import Source
+    from inercal.findings import Finding
+    from inercal.inputs import Source
 
 WHOLE = (".json", ".toml")
 """Suffixes of a file that holds the whole result."""
@@ -35,7 +35,7 @@ def told(
     ``settings`` are the keys of a study as they were given, for `Estimate.provenance`.
     """
     from inercal.estimate.result import provenance, without_parameters
-    from inercal.estimate.status import Status
+    from inercal.findings import Status
 
     return without_parameters(
         command,
@@ -73,7 +73,7 @@ def hand_over(
     """
     from inercal._files import write_text
     from inercal.estimate.files import save
-    from inercal.estimate.status import Status
+    from inercal.findings import Status
 
     estimate = timed(estimate)
     if output.out is not None:

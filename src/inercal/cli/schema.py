@@ -11,7 +11,7 @@ def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen
     import json
 
     from inercal._files import write_text
-    from inercal.study.schema import json_schema
+    from inercal.studies.schema import json_schema
 
     output.check((".json",))
     found = json_schema()

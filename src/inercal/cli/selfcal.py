@@ -59,7 +59,7 @@ def selfcal(
     from inercal.records.read import source_of
     from inercal.records.write import SUFFIXES
     from inercal.selfcal.task import calibrate, load_kernels
-    from inercal.study.load import load_selfcal_study
+    from inercal.studies.load import load_selfcal_study
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     settings = load_selfcal_study(study, keys)
@@ -86,7 +86,8 @@ def selfcal(
 
 def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) -> int:
     """Hand over the calibration of one run."""
-    from inercal.selfcal.display import compared, displayed
+    from inercal.selfcal.display import displayed
+    from inercal.selfcal.task import compared
 
     def page() -> str:
         from inercal.selfcal.figures import calibration_page
@@ -95,7 +96,7 @@ def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) ->
 
     def histories(path: Path) -> None:
         from inercal.records.write import write_record
-        from inercal.selfcal.history import history_record
+        from inercal.selfcal.result.columns import history_record
 
         write_record(history_record(found.filtered, found.recording, found.problem.world), path)
 
@@ -133,10 +134,10 @@ def _live(
 ) -> None:
     """Calibrate row by row."""
     from inercal._jit import compiling
-    from inercal.selfcal.base_search import stated_well
-    from inercal.selfcal.filtered import problem
+    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.find_base import stated_well
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
-    from inercal.study.load import load_selfcal_study
+    from inercal.studies.load import load_selfcal_study
 
     streaming.check(output, (file, map_file, study))
     settings = load_selfcal_study(study, keys)

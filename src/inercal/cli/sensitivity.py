@@ -18,7 +18,7 @@ def sensitivity(
 ) -> int:
     """Say which error of a turntable matters."""
     from inercal.records.read import source_of
-    from inercal.study.load import files_of, load_turntable_study
+    from inercal.studies.load import files_of, load_turntable_study
     from inercal.turntable.analysis import analyse, result, table
 
     output.check((*WHOLE, ".nc", ".npz"), (study,))

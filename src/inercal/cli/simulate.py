@@ -38,7 +38,7 @@ def simulate_turntable(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Simulate a test of an instrument on a turntable."""
-    from inercal.study.load import files_of, load_turntable_study
+    from inercal.studies.load import files_of, load_turntable_study
     from inercal.turntable.task import simulate
 
     _check(study, seed, output)
@@ -64,9 +64,9 @@ def simulate_selfcal(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Simulate a platform that turns through the plan of a study, once or many times."""
-    from inercal.selfcal.simulate import experiment, to_record
-    from inercal.selfcal.simulate import simulate as simulate_run
-    from inercal.study.load import load_selfcal_study
+    from inercal.selfcal.before.simulate import experiment, to_record
+    from inercal.selfcal.before.simulate import simulate as simulate_run
+    from inercal.studies.load import load_selfcal_study
 
     if runs is not None:
         return _campaign(study, runs, seed, overrides or (), output)
@@ -93,7 +93,7 @@ def simulate_aoa(
     """Simulate a wind-tunnel model that moves as its study plans."""
     from inercal.aoa.simulate import simulate as simulate_run
     from inercal.aoa.simulate import to_record
-    from inercal.study.load import files_of, load_aoa_study
+    from inercal.studies.load import files_of, load_aoa_study
 
     _check(study, seed, output)
     settings = load_aoa_study(study, overrides or ())
@@ -109,12 +109,12 @@ def simulate_aoa(
 def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._jit import compiling
-    from inercal.estimate.status import Status
+    from inercal.findings import Status
     from inercal.records.read import source_of
     from inercal.selfcal.campaign import REFERENCES, campaign
-    from inercal.selfcal.filtered import problem
-    from inercal.selfcal.filtering import load_kernels
-    from inercal.study.load import load_selfcal_study
+    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.run import load_kernels
+    from inercal.studies.load import load_selfcal_study
 
     if not 2 <= runs <= _MOST_RUNS:
         raise InputError("--runs", f"found {runs}, expected 2 to {_MOST_RUNS:,}")

@@ -11,15 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.convert.correct import ImuModel
 from inercal.errors import InputError
+from inercal.findings import Finding
 from inercal.instruments.triad import TriadModel
-from inercal.records.findings import Finding
 from inercal.units import parse_unit
 
-Array = NDArray[np.float64]
 Terms = dict[str, Array]
 Units = dict[str, str]
 

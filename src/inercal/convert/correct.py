@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
+from inercal.findings import Finding
 from inercal.instruments.triad import TriadModel, apart, triad_from_terms
-from inercal.records.findings import Finding
-from inercal.records.record import Column, Record
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.units import Unit, parse_unit
 
-Array = NDArray[np.float64]
 Samples = Mapping[str, Array]
 
 

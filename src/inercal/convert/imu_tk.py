@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.convert.convention import (
     FORCE,
@@ -35,8 +34,6 @@ from inercal.convert.convention import (
 )
 from inercal.convert.correct import ImuModel
 from inercal.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def terms(model: ImuModel) -> Terms:

@@ -16,8 +16,8 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.convert.convention import (
     FORCE,
     Convention,
@@ -31,8 +31,6 @@ from inercal.convert.convention import (
 from inercal.convert.correct import ImuModel
 from inercal.errors import InputError
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 DEG = "deg/s"
 _DEG = parse_unit(DEG).factor

@@ -26,8 +26,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.convert import yaml_subset
 from inercal.convert.convention import (
     FORCE,
@@ -44,9 +44,7 @@ from inercal.convert.convention import (
 )
 from inercal.convert.correct import ImuModel
 from inercal.errors import InputError
-from inercal.records.findings import Finding
-
-Array = NDArray[np.float64]
+from inercal.findings import Finding
 
 _PLACES = {
     "M_a": ("accelerometers", "M"),

@@ -8,22 +8,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._files import read_bytes
+from inercal.arrays import Array
 from inercal.convert import imu_tk, imucal, kalibr, psins
 from inercal.convert.convention import Convention, Units, flat, in_si_outputs, output_unit
 from inercal.convert.correct import ImuModel, imu_model
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate, coverage_factor, provenance
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.instruments.terms import GYRO_G_SENSITIVITY, TERMS
 from inercal.instruments.triad import TriadModel
-from inercal.records.findings import Finding
 from inercal.records.read import source_of
 from inercal.units import STANDARD_GRAVITY
-
-Array = NDArray[np.float64]
 
 CONVENTIONS: dict[str, Convention] = {
     module.CONVENTION.name: module.CONVENTION for module in (imu_tk, imucal, kalibr, psins)

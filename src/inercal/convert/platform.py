@@ -1,7 +1,7 @@
 """The result of a self-calibration in use: corrected commands of the platform, corrected gyros and accelerometers.
 
-The platform turns at ``w_p = (1 + M) w + kg0`` where ``w`` is commanded (`inercal.selfcal.coefficients`). For it to
-turn at a wanted rate the command is
+The platform turns at ``w_p = (1 + M) w + kg0`` where ``w`` is commanded (`inercal.selfcal.platform.coefficients`). For
+it to turn at a wanted rate the command is
 
     w = (1 + M)^-1 (w_p - kg0),
 
@@ -15,17 +15,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.convert.correct import Correction, Samples
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
+from inercal.findings import Finding
 from inercal.instruments.triad import TriadModel
-from inercal.records.findings import Finding
 from inercal.records.record import Record
-from inercal.selfcal.coefficients import NAMES
-
-Array = NDArray[np.float64]
+from inercal.selfcal.platform.coefficients import NAMES
 
 COMMAND = "selfcal"
 """Command whose estimates are of a platform."""

@@ -26,8 +26,8 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.convert.convention import (
     FORCE,
     RATE,
@@ -45,8 +45,6 @@ from inercal.convert.convention import (
 from inercal.convert.correct import ImuModel
 from inercal.errors import InputError
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 _G0 = 9.7803267715
 """The g of PSINS' units ug and deg/h/g [m/s^2] (glvf.m)."""

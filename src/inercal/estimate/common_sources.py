@@ -14,12 +14,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.result import Estimate
-
-Array = NDArray[np.float64]
 
 _OF_THE_SITE = frozenset({"gravity", "gravity anomaly", "latitude", "height"})
 _OF_THE_INSTRUMENT = frozenset({"time base"})

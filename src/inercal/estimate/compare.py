@@ -17,18 +17,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError, QuantityError
 from inercal.estimate.common_sources import Taken, common_sources, other_instrument
 from inercal.estimate.identifiability import in_words
 from inercal.estimate.result import Estimate, Parameter, coverage_factor, provenance
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
+from inercal.findings import Finding, Status
 from inercal.records.places import counted_names
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 COMMAND = "compare"
 

@@ -9,18 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._files import read_bytes, write_text
+from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.result import Estimate
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
-from inercal.records.record import Source
+from inercal.findings import Finding, Status
+from inercal.inputs import Source
 from inercal.units import shown
-
-Array = NDArray[np.float64]
 
 
 def to_json(estimate: Estimate) -> dict[str, Any]:

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -18,18 +18,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import plain_objects
 from inercal.estimate.result import Estimate, coverage_factor, rounded
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
+from inercal.findings import Finding, Status
+from inercal.inputs import Source
 from inercal.records.places import counted
-from inercal.records.record import Source
-
-Array = NDArray[np.float64]
 
 SIGNIFICANCE = 1e-3
 """Probability, over all coefficients, below which chance is ruled out as the cause of differences between runs."""

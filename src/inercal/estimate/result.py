@@ -10,15 +10,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import CalibrationError
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
-from inercal.records.record import Source
-
-Array = NDArray[np.float64]
+from inercal.findings import Finding, Status
+from inercal.inputs import Source
 
 COVERAGE = 0.9545
 """Probability of the expanded uncertainty U = k u, so that k is 2 at many degrees of freedom (GUM G.1)."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from inercal.records.record import Source
+    from inercal.inputs import Source
 
 FOLDER = Path(__file__).resolve().parent
 

@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.nonlinear import NonlinearFit, solve
 from inercal.instruments.terms import ACCELEROMETER_TRIAD
 from inercal.instruments.triad import TriadModel
-
-Array = NDArray[np.float64]
 
 PARAMETERS = len(ACCELEROMETER_TRIAD)
 _UPPER = ((0, 1), (0, 2), (1, 2))

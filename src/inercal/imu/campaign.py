@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.estimate.status import Status
+from inercal.arrays import Array
+from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.multiposition import calibrate_multiposition
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
-
-Array = NDArray[np.float64]
 
 GRAVITY, GRAVITY_U = 9.81, 1e-4
 """Gravity as stated to the calibration [m/s^2], and its standard uncertainty."""

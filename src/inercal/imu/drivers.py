@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.poses import Poses
 from inercal.imu.recording import Recording
 from inercal.imu.settings import ImuSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.turns import Turns, attitudes, increments
 from inercal.instruments.triad import TriadModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.poses import Poses, dwells_at
 from inercal.imu.verdict import WORST_CONDITION, curing_pose, pose_words
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from inercal.imu.gyro import GyroFit
     from inercal.imu.multiposition import Calibration
 
-Array = NDArray[np.float64]
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import NonlinearFit, solve
@@ -24,8 +24,6 @@ from inercal.imu.earth_rate import EarthRate, UnknownRates, unknown_rates, verti
 from inercal.imu.turns import Turns, carried, carried_with_derivatives, thin
 from inercal.instruments.terms import GYRO_TRIAD
 from inercal.instruments.triad import TriadModel
-
-Array = NDArray[np.float64]
 
 COARSE = 8
 """Samples in one step of the coarse rounds."""

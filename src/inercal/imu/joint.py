@@ -12,15 +12,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.gyro import GyroFit
 from inercal.instruments.terms import ACCELEROMETER_TRIAD
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

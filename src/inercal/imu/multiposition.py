@@ -8,9 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import Estimate, timed
+from inercal.findings import Finding
 from inercal.imu.drivers import drivers_of
 from inercal.imu.earth_rate import earth_rate_at
 from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
@@ -29,11 +30,8 @@ from inercal.imu.verdict import (
     scatter_findings,
 )
 from inercal.instruments.triad import TriadModel
-from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-
-Array = NDArray[np.float64]
 
 WORST_START = 0.5
 """Miss [rad] of the first guess beyond which no fit is tried: large misalignments leave 0.3."""

@@ -6,24 +6,22 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import combine, common
 from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
 from inercal.imu.recording import Recording
 from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.imu.verdict import rms_miss, spread_words, verdict
 from inercal.instruments.terms import TERMS
-from inercal.records.findings import Finding
+from inercal.records.column import Triad
 from inercal.records.places import counted
-from inercal.records.record import Record, Triad
+from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-
-Array = NDArray[np.float64]
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "

@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
 from inercal.imu.recording import Recording
 from inercal.records.dwells import Dwell, static_intervals
-
-Array = NDArray[np.float64]
 
 MULTIPLES = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 28.0, 40.0)
 """Thresholds tried, as multiples of the variance of the initial static period."""

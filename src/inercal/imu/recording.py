@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
 from inercal.noise.dwell_means import AllanFit
 from inercal.noise.dwell_means import fit as fit_allan
 from inercal.records.checks.values import saturated
+from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
-from inercal.records.record import Record, Triad
-
-Array = NDArray[np.float64]
+from inercal.records.record import Record
 
 MOVING = 30.0
 """Variance over that at rest from which the instrument certainly moves."""

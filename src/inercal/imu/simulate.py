@@ -6,8 +6,8 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import earth_rate
 from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
@@ -15,8 +15,6 @@ from inercal.instruments.triad import TriadModel, triad_from_terms
 from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from inercal.findings import Finding
 from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
-from inercal.records.findings import Finding
 from inercal.records.record import Record
 
 if TYPE_CHECKING:

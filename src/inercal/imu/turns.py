@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.rotations import skew
 from inercal.instruments.triad import TriadModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

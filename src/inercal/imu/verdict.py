@@ -6,10 +6,10 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import rounded
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.drivers import Drivers
 from inercal.imu.gyro import GyroFit, first_guess, regress_static
@@ -18,11 +18,8 @@ from inercal.imu.poses import Poses
 from inercal.imu.recording import Recording
 from inercal.imu.turns import Turns
 from inercal.instruments.triad import TriadModel
-from inercal.records.findings import Finding
+from inercal.records.column import Triad
 from inercal.records.places import counted
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
 
 WORST_CONDITION = 50.0
 """Condition of the scaled Jacobian beyond which a fit is called ill-conditioned; good sets of poses have 2

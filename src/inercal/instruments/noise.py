@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inercal.arrays import Array
 
 BIAS_FLOOR = 2.0 * np.log(2.0) / np.pi
 """Allan variance of bias instability per B^2, so that B = floor / 0.664."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.instruments.noise import SYMBOLS, NoiseModel
 from inercal.noise.coefficients import noise_coefficients
 from inercal.noise.deviation import allan_deviation
-
-Array = NDArray[np.float64]
 
 SAMPLES, INTERVAL = 20000, 0.01
 """Samples of a recording, and their interval [s]."""

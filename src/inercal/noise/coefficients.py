@@ -12,16 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError
+from inercal.findings import Finding
 from inercal.instruments.noise import SYMBOLS, allan_terms
 from inercal.noise.covariance import sums
 from inercal.noise.curve import Curve, Fit
 from inercal.noise.deviation import AllanDeviation
-from inercal.records.findings import Finding
-
-Array = NDArray[np.float64]
 
 SPACING = 1.7
 """Ratio, at least, of the averaging times that are fitted: those between tell nothing new."""

@@ -25,9 +25,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.noise.kernels import KINDS, covariance_sums
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 ALPHA = (0, -1, -2, 2)

@@ -8,12 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.instruments.noise import SYMBOLS
 from inercal.noise.covariance import Sums
-
-Array = NDArray[np.float64]
 
 RAMP = SYMBOLS.index("R")
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError, RecordError
 from inercal.instruments.noise import SYMBOLS
 from inercal.noise.covariance import ALPHA, degrees_of_freedom, lag_one
 from inercal.noise.kernels import mean_square, mean_square_with_gaps
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 PRESENT = 0.9

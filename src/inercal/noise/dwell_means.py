@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.instruments.noise import allan_terms
-
-Array = NDArray[np.float64]
 
 
 def running_sums(x: Array) -> Array:

@@ -11,20 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate, coverage_factor, provenance
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.instruments.noise import SYMBOLS
 from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
 from inercal.noise.rest import Unrest, unrest
 from inercal.records.clocks import usable_interval
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.places import counted
-from inercal.records.record import Column, Record
-
-Array = NDArray[np.float64]
+from inercal.records.record import Record
 
 COMMAND = "allan"
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.records.dwells import window_samples
-
-Array = NDArray[np.float64]
 
 RESTLESS = 30.0
 """Variance within a piece over that of calm pieces, from which it certainly is not noise alone."""

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 OCTAVES = 40

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inercal.arrays import Array
 
 WINDOW = 1.01
 """Length of the variance window [s]: 101 samples at 100 Hz."""

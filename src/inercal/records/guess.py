@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.records.channels import Origin, of_a_table
 from inercal.records.places import counted_names
 from inercal.records.read import format_of
 from inercal.records.read.canonical import bare
 from inercal.records.read.table import Sample
-from inercal.records.record import Array
 from inercal.records.titles import fits, numbered, titled
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.records.record import Column, Record, Source
+from inercal.arrays import Array
+from inercal.inputs import Source
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.units import Unit
-
-Array = NDArray[np.float64]
 
 SIMULATED = Source("simulated", "")
 

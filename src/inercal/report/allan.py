@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.instruments.terms import NOISE_TERMS, noise_shown
@@ -21,7 +22,6 @@ from inercal.units import parse_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 #: symbol -> averaging time [s] at which it is read off its slope, the slope in words, the slope's colour
 _SLOPES = {

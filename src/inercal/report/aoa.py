@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.report.cells import Cell, band, frame, line
 from inercal.report.histories import grid
 from inercal.report.html import Picture
@@ -19,7 +20,6 @@ from inercal.report.style import ALARM, COLOURS, INK, QUIET, envelope, svg
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _PIECES, _FEWEST, _IN_ALL = 700, 200, 2800

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.report import filtering
 from inercal.report.aoa import Marks, Panel, over_time
 from inercal.report.html import Picture
-
-Array = NDArray[np.float64]
 
 _BLOCKS = 400
 """Pieces of a record whose mean squared innovations are drawn."""

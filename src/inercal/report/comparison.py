@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from inercal.estimate.result import Estimate, rounded
-from inercal.estimate.status import Status
+from inercal.findings import Status
 from inercal.instruments.terms import term
 from inercal.report.html import Picture
 from inercal.report.html import page as template

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import Estimate
 from inercal.report.html import Picture
 from inercal.report.style import (
@@ -21,8 +21,6 @@ from inercal.report.style import (
     plain_unit,
     svg,
 )
-
-Array = NDArray[np.float64]
 
 _SMALL = 0.02
 """Share that a source reaches in no coefficient, to be drawn together with others of the kind."""

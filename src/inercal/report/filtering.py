@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.coverage import Coverage
 from inercal.report.cells import Cell, band, canvas, frame, line
 from inercal.report.html import Picture
 from inercal.report.style import ALARM, COLOURS, INK, QUIET, WIDTH, envelope, few_powers, figure, svg
-
-Array = NDArray[np.float64]
 
 _WINDOW = 50
 """Rows of a running mean."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.report.cells import Cell, band, canvas, frame, line
 from inercal.report.html import Picture
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _PIECES = 150
 """Pieces of a line in a small panel; it has at most twice as many points."""

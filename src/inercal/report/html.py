@@ -11,8 +11,8 @@ from typing import Any
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import plain_objects
 from inercal.estimate.result import Estimate, Parameter, in_degrees, rounded
-from inercal.estimate.status import Status
 from inercal.estimate.table import Table
+from inercal.findings import Status
 from inercal.instruments.terms import term
 from inercal.report.style import plain_unit
 

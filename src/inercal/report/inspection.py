@@ -8,17 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import Estimate
 from inercal.estimate.table import Table
+from inercal.findings import Finding
 from inercal.records.clocks import counted_rows
-from inercal.records.findings import Finding
-from inercal.records.record import Column, Record
+from inercal.records.column import Column
+from inercal.records.record import Record
 from inercal.report.html import Picture, page
 from inercal.report.style import ALARM, COLOURS, WIDTH, envelope, figure, plain_unit, svg
-
-Array = NDArray[np.float64]
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _ROWS = re.compile(r"(?:.*, )?rows? ((?:\d+(?:-\d+)?(?:, )?)+)")

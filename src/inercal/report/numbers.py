@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inercal.arrays import Array
 
 SETTLED = 2.0
 """Time [s] that a filter is given to settle: what comes before does not count where axes are spanned."""

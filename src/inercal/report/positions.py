@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.report.style import ALARM, COLOURS, DIVERGING, INK, QUIET
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 NUMBERED = 60
 """Positions up to which each has its number beside it."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.report.histories import Line, panels_of_lines
 from inercal.report.html import Picture
@@ -21,8 +21,6 @@ from inercal.report.style import (
     power_of_ten,
     svg,
 )
-
-Array = NDArray[np.float64]
 
 _MARKS = "osD^vP"
 

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.report.html import Picture
 from inercal.report.positions import full_circle
 from inercal.report.style import ALARM, COLOURS, INK, WIDTH, few_powers, figure, svg
-from inercal.sensitivity.averages import Averages, Flag
-from inercal.sensitivity.indices import Indices
+from inercal.sensitivities.averages import Averages, Flag
+from inercal.sensitivities.indices import Indices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 MAP = "viridis"
 """Colour map of indices over positions, where white says that there is no index."""

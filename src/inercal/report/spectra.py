@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.report.html import Picture
 from inercal.report.style import COLOURS, INK, QUIET, WIDTH, few_powers, figure, svg
-
-Array = NDArray[np.float64]
 
 LONGEST = 16384
 """Samples of a segment, at most."""

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.report.html import Picture
 from inercal.report.style import ALARM, COLOURS, INK, QUIET, WIDTH, few_powers, figure, plain_unit, svg
-
-Array = NDArray[np.float64]
 
 _USUAL = (5e-3, 5.0)
 """Distances [m] of the outermost sensor from the pivot that models in wind tunnels have."""

@@ -14,13 +14,13 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from inercal.arrays import Array
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 WIDTH = 7.1
 """Width of a figure [inch]: the text width of an A4 page."""

@@ -17,12 +17,11 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from inercal.arrays import Array
 from inercal.geometry.rotations import Axis, elementary, skew
 from inercal.rigs.distribution import Distribution
-
-Array = NDArray[np.float64]
 
 
 class Scope(enum.Enum):

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from inercal.arrays import Array
 
 NODES = 64
 """Gauss nodes of a density: cosines and sines of twice the error are integrated to rounding up to a half

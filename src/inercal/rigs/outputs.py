@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE, earth_rate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from inercal.arrays import Array
 from inercal.geometry.rotations import Axis, elementary
 from inercal.rigs.chain import Chain, Element, Error, Fixed, Joint, Scope
 from inercal.rigs.distribution import Distribution
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

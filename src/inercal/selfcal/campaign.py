@@ -10,24 +10,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
-from inercal.selfcal.base_search import stated_well
-from inercal.selfcal.bounds import BAYESIAN_BOUNDS, bounds
-from inercal.selfcal.coefficients import names, product_slope, to_product
-from inercal.selfcal.filtered import Filtered, Problem, problem
-from inercal.selfcal.filtering import estimate, load_kernels
-from inercal.selfcal.linearised import FLOOR
+from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
+from inercal.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
+from inercal.selfcal.filters.filter_result import Filtered, Problem, problem
+from inercal.selfcal.filters.run import estimate, load_kernels
+from inercal.selfcal.find_base import stated_well
+from inercal.selfcal.platform.coefficients import names, product_slope, to_product
+from inercal.selfcal.platform.linearised import FLOOR
 from inercal.selfcal.settings import FilterKind, SelfcalSettings
-from inercal.selfcal.simulate import Experiment, Simulated, experiment, simulate
 
 if TYPE_CHECKING:
     from inercal.estimate.coverage import Coverage, Nees
 
-Array = NDArray[np.float64]
 
 REFERENCES = (
     BAYESIAN_BOUNDS,

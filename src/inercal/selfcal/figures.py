@@ -6,29 +6,31 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.rotations import boxminus
 from inercal.report import filtering
 from inercal.report.figures import budget, correlation, dots
 from inercal.report.histories import Course, Line, converging, falling, lines_by_group, path
 from inercal.report.html import Picture, page, render
 from inercal.report.selfcal import attitude_correction, attitude_errors, bounds_beside, filters_apart
-from inercal.selfcal.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
-from inercal.selfcal.display import FILTERS, compared, displayed, found, of_field, shown_unit
-from inercal.selfcal.residuals import gimbals
-from inercal.selfcal.rig import JOINTS
-from inercal.selfcal.tables import bounds_by_path, campaign_table, paths, turns, weak_combinations
+from inercal.selfcal.display import displayed, of_field, shown_unit
+from inercal.selfcal.filters.filter_result import found
+from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.platform.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
+from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.result.comparison import FILTERS
+from inercal.selfcal.result.tables import bounds_by_path, campaign_table, paths, turns, weak_combinations
+from inercal.selfcal.task import compared
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
+    from inercal.selfcal.before.path_design import Designed
     from inercal.selfcal.campaign import Campaign
-    from inercal.selfcal.filtered import Filtered, History
-    from inercal.selfcal.pathdesign import Designed
+    from inercal.selfcal.filters.filter_result import Filtered, History
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.selfcal.task import Calibration
 
-Array = NDArray[np.float64]
 
 _AT_ONCE = ("map", "lm")
 """Estimators that know all at once: their coefficients have no course over time."""

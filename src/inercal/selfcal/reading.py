@@ -3,7 +3,7 @@
 In a gap between rows, and where a rate is no number, the platform is taken to turn on over the base as before: a rate
 against inertial space, which follows the earth besides, would not stay the same. That is right within a turn or a
 rest. Where a turn began or ended meanwhile the encoders contradict it, and estimators take the attitude anew
-(`inercal.selfcal.gaps`). Angles and accelerometers that are missing are left out of the updates.
+(`inercal.selfcal.filters.gaps`). Angles and accelerometers that are missing are left out of the updates.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
-from inercal.records.findings import Finding
+from inercal.findings import Finding
+from inercal.records.column import Column
 from inercal.records.places import counted, places
-from inercal.records.record import Column, Record
+from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-from inercal.selfcal.gaps import with_held
-from inercal.selfcal.kinematics import TWO_PI
-from inercal.selfcal.plausibility import implausible, off_the_path
-from inercal.selfcal.recording import Recording
+from inercal.selfcal.diagnosis.plausibility import implausible, off_the_path
+from inercal.selfcal.filters.gaps import with_held
+from inercal.selfcal.platform.kinematics import TWO_PI
+from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.settings import SelfcalSettings
-
-Array = NDArray[np.float64]
 
 FEWEST = 10
 """Rows below which there is nothing to find out."""
@@ -200,6 +200,6 @@ def _continuous(th: Array) -> tuple[Array, list[str]]:
         turns = np.round((th[known, k] - np.unwrap(th[known, k])) / TWO_PI)
         if turns.any():
             turned.append(f"th_{axis}")
-        # to the digits of `inercal.selfcal.kinematics.nearest_turn`, so that a stream gives what a file gives
+        # to the digits of `inercal.selfcal.platform.kinematics.nearest_turn`, so that a stream gives what a file gives
         th[known, k] -= TWO_PI * turns
     return th, turned

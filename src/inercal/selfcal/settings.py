@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.site import Site
-from inercal.selfcal.coefficients import NAMES
-from inercal.selfcal.plan import Plan
-from inercal.selfcal.rig import Base, Gimbals, World, world
+from inercal.selfcal.platform.coefficients import NAMES
+from inercal.selfcal.platform.plan import Plan
+from inercal.selfcal.platform.rig import Base, Gimbals, World, world
 from inercal.units import Quantity
-
-Array = NDArray[np.float64]
 
 FilterKind = Literal["svd-qukf", "gimbal-ukf", "mukf", "error-state", "map", "lm"]
 FactorKind = Literal["cholesky", "eigen", "svd"]
@@ -121,7 +119,7 @@ class SelfcalSettings:
         The path; None where the study has none (a record is enough to calibrate).
     noise : Noise
     prior : (24,)
-        Standard deviations of all coefficients about 0, in the order of `inercal.selfcal.coefficients`.
+        Standard deviations of all coefficients about 0, in the order of `inercal.selfcal.platform.coefficients`.
     truth : (24,) or None
         Product form, for simulations; its last six are the true gyro scale errors and base tilt.
     goal : mapping

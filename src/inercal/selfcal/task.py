@@ -9,26 +9,26 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import Estimate, rounded
-from inercal.estimate.status import Status
+from inercal.estimate.table import Table
+from inercal.findings import Status
 from inercal.records.record import Record
-from inercal.selfcal import filtering
-from inercal.selfcal.base_search import heading, is_rough, relative, with_base
-from inercal.selfcal.bounds import Bounds, recorded_bounds
-from inercal.selfcal.coefficients import BETA, names
-from inercal.selfcal.diagnosis import diagnose
-from inercal.selfcal.display import found as found_by
-from inercal.selfcal.filtered import Filtered, Problem, problem
-from inercal.selfcal.gaps import taken_anew
-from inercal.selfcal.outcome import assemble, verdict
+from inercal.selfcal.before.bounds import Bounds, recorded_bounds
+from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.filters import run as filtering
+from inercal.selfcal.filters.filter_result import Filtered, Problem, problem
+from inercal.selfcal.filters.filter_result import found as found_by
+from inercal.selfcal.filters.gaps import taken_anew
+from inercal.selfcal.find_base import heading, is_rough, relative, with_base
+from inercal.selfcal.platform.coefficients import BETA, names
+from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.recording import Recording
+from inercal.selfcal.result.comparison import side_by_side
+from inercal.selfcal.result.outcome import assemble, verdict
+from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import KINDS, SelfcalSettings
-from inercal.selfcal.stated import stated_errors
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,3 +151,14 @@ def _base(settings: SelfcalSettings, estimate: Estimate) -> tuple[dict[str, Any]
         told["heading"] = {"value": value, "u": u}
         words = "; heading {} deg, u {} deg".format(*rounded(math.degrees(value), math.degrees(u))) + words
     return told, words
+
+
+def compared(calibration: Calibration) -> list[Table]:
+    """`side_by_side` of a calibration, the estimator that counts first; nothing where no other was run."""
+    if not calibration.compared:
+        return []
+    estimate, first = calibration.estimate, calibration.filtered
+    status = {kind: str(each["status"]) for kind, each in estimate.result.get("compare", {}).items()}
+    filters = {first.kind: first} | dict(calibration.compared)
+    interval = float(np.median(calibration.recording.dt))
+    return side_by_side(filters, calibration.truth, interval, status | {first.kind: estimate.status.value})

@@ -2,9 +2,9 @@
 
 The causal fusion of `inercal.aoa` goes on by one row at a time, to the digits that it gives on the whole file, and
 answers each row with one line: the first ones, and those after the angle was lost, are held until the filter can start
-(`inercal.aoa.live`). Sensors are calibrated, and samples at a range left out, as `inercal.aoa.reading` does it. What
-only a whole recording shows is not seen here: sensors that are flat at an extreme below their range, or stuck, and
-whether the model rests in the stretch that the study calls its zero.
+(`inercal.aoa.fusion.live`). Sensors are calibrated, and samples at a range left out, as
+`inercal.aoa.reading.from_record` does it. What only a whole recording shows is not seen here: sensors that are flat at
+an extreme below their range, or stuck, and whether the model rests in the stretch that the study calls its zero.
 """
 
 from __future__ import annotations
@@ -14,28 +14,26 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
-from inercal.aoa.calibrated import at_range, check_axes, check_unit, indication
-from inercal.aoa.filtered import SETTLED
-from inercal.aoa.history import columns, rows
-from inercal.aoa.live import Live, LiveState, Told
-from inercal.aoa.model import GATE
-from inercal.aoa.posterior import corrected
-from inercal.aoa.posterior import load as load_posterior
-from inercal.aoa.problem import problem
-from inercal.aoa.reading import of_sensors
+from inercal.aoa.fusion.filter_result import SETTLED
+from inercal.aoa.fusion.live import Live, LiveState, Told
+from inercal.aoa.fusion.model import GATE
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
+from inercal.aoa.reading.from_record import of_sensors
+from inercal.aoa.reading.wind_off_zero import stated_at
+from inercal.aoa.result.carry_over import corrected
+from inercal.aoa.result.carry_over import load as load_posterior
+from inercal.aoa.result.columns import columns, rows
+from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.settings import GYROS, AoaSettings
-from inercal.aoa.stated import gravity_u, leaning, leans, widened
-from inercal.aoa.zero import stated_at
-from inercal.records.findings import Finding
-from inercal.records.record import Column
+from inercal.arrays import Array
+from inercal.findings import Finding
+from inercal.records.column import Column
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
-
-Array = NDArray[np.float64]
 
 _CONTRADICTED = 2.0
 """Mean of the squared innovations in a window, each over its variance, from which rows contradict the model."""
@@ -83,7 +81,7 @@ class AoaState(NamedTuple):
 
 
 class Aoa:
-    """Measures angles row by row (`inercal.stream.run.Recursive`); columns as `inercal.aoa.history` has them.
+    """Measures angles row by row (`inercal.stream.run.Recursive`); columns as `inercal.aoa.result.columns` has them.
 
     Parameters
     ----------

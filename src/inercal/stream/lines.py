@@ -16,13 +16,15 @@ from typing import IO, TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from inercal.errors import InputError, MapError, RecordError
+from inercal.findings import Finding
+from inercal.inputs import Source
 from inercal.records.channels import Channel, may_be_empty
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.read.join import FileTable, check_present, conversion, row_rate
 from inercal.records.read.layout import Layout, comment_marks, find_layout, is_rounded
 from inercal.records.read.table import Part, Table
 from inercal.records.read.text import contents, locate
-from inercal.records.record import Column, Record, Source
+from inercal.records.record import Record
 
 if TYPE_CHECKING:
     from inercal.records.maps import RecordMap

@@ -13,18 +13,16 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.imu.recording import MOVING, SHORTEST_START
 from inercal.noise.running import Octaves, Window, cascade, empty_octaves, empty_window, slide
 from inercal.records.clocks import usable_interval
+from inercal.records.column import Column
 from inercal.records.dwells import window_samples
-from inercal.records.record import Column
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
-
-Array = NDArray[np.float64]
 
 _MEASURED = re.compile(r"acc_[xyz]|a\d+|gyro\w*|y_[xy]")
 _FIRST_STAMPS = 33

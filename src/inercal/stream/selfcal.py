@@ -2,8 +2,8 @@
 
 A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file
 (`inercal.selfcal.reading` says how rows are taken): the first row with all angles and a rate is the start; where no
-rate is recorded the platform is taken to turn on as before (`inercal.selfcal.gaps`); what else is missing is not
-measured. Only time is treated more kindly: a row that is not later than the one before is left out.
+rate is recorded the platform is taken to turn on as before (`inercal.selfcal.filters.gaps`); what else is missing is
+not measured. Only time is treated more kindly: a row that is not later than the one before is left out.
 """
 
 from __future__ import annotations
@@ -14,20 +14,18 @@ from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
-from inercal.records.findings import Finding
-from inercal.selfcal.coefficients import KA1
-from inercal.selfcal.filtered import History, Problem, State, Trace, known_in
-from inercal.selfcal.filtering import LOCK, recursive
-from inercal.selfcal.filtering import load_kernels as load_filter
-from inercal.selfcal.gaps import LONG, RECENT, advance, held_rate, usual
-from inercal.selfcal.history import columns, rows
+from inercal.findings import Finding
+from inercal.selfcal.filters.filter_result import History, Problem, State, Trace, known_in
+from inercal.selfcal.filters.gaps import LONG, RECENT, advance, held_rate, usual
+from inercal.selfcal.filters.run import LOCK, recursive
+from inercal.selfcal.filters.run import load_kernels as load_filter
+from inercal.selfcal.platform.coefficients import KA1
+from inercal.selfcal.result.columns import columns, rows
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
-
-Array = NDArray[np.float64]
 
 _BAND = 5.0
 """Standard deviations that the running mean of NIS may be above its expectation."""
@@ -72,7 +70,8 @@ class SelfcalState(NamedTuple):
 
 
 class Selfcal:
-    """Calibrates a platform row by row (`inercal.stream.run.Recursive`); columns as `inercal.selfcal.history` has them.
+    """Calibrates a platform row by row (`inercal.stream.run.Recursive`); columns as `inercal.selfcal.result.columns`
+    has them.
 
     Parameters
     ----------

@@ -9,18 +9,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.records.places import counted
 from inercal.rigs.chain import Chain
 from inercal.rigs.outputs import table_outputs
-from inercal.sensitivity import averages
-from inercal.sensitivity.averages import Averages, Flag
-from inercal.sensitivity.indices import Indices
+from inercal.sensitivities import averages
+from inercal.sensitivities.averages import Averages, Flag
+from inercal.sensitivities.indices import Indices
 from inercal.turntable.settings import TurntableSettings
-
-Array = NDArray[np.float64]
 
 _INDICES = (
     "I. M. Sobol, Sensitivity estimates for nonlinear mathematical models, Mathematical Modelling and Computational "
@@ -132,14 +130,14 @@ def analyse(
     angles, note = settings.plan.angles, ""
     if how.method == "exact":
         from inercal._jit import compiling
-        from inercal.sensitivity import exact
+        from inercal.sensitivities import exact
 
         with compiling("sensitivity", say):
             exact.analyse(chain, outputs[:1], angles[:1], second=maps)
         clock = time.perf_counter()
         indices = exact.analyse(chain, outputs, angles, shapley=maps, second=maps)
     elif how.method == "sampled":
-        from inercal.sensitivity import sampled
+        from inercal.sensitivities import sampled
 
         clock = time.perf_counter()
         rng = np.random.default_rng(how.seed)
@@ -149,7 +147,7 @@ def analyse(
         if taken != how.samples:
             note = f"{how.samples} samples rounded up to {taken}, a power of two, for Sobol points"
     else:
-        from inercal.sensitivity import local
+        from inercal.sensitivities import local
 
         clock = time.perf_counter()
         indices = local.analyse(chain, outputs, angles)

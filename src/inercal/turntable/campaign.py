@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.estimate.status import Status
+from inercal.arrays import Array
+from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid
@@ -14,8 +14,6 @@ from inercal.turntable.settings import Design, Instrument, TurntableSettings
 from inercal.turntable.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 TABLE = "two_axis_turntable"
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.records.places import counted
 from inercal.report import sensitivity
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from inercal.turntable.settings import TurntableSettings
     from inercal.turntable.task import Calibration
 
-Array = NDArray[np.float64]
 
 _FLAGS = 12
 """Flagged positions that a page lists."""

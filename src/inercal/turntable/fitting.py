@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import StudyError
-from inercal.records.findings import Finding
+from inercal.findings import Finding
 from inercal.turntable.model import TableModel, table_model
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Known, Regression, fit, known
 from inercal.turntable.settings import TurntableSettings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

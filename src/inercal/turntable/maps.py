@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._files import write_bytes
+from inercal.arrays import Array
 from inercal.turntable.analysis import Analysed
-
-Array = NDArray[np.float64]
 
 #: name -> dimensions and what it is
 _MAPS: dict[str, tuple[tuple[str, ...], str]] = {

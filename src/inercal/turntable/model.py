@@ -6,9 +6,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.design.spherical import basis
+from inercal.arrays import Array
+from inercal.designs.spherical import basis
 from inercal.errors import StudyError
 from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
@@ -16,8 +16,6 @@ from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.chain import Chain
 from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.turntable.settings import TurntableSettings
-
-Array = NDArray[np.float64]
 
 FRAME = "b, of the instrument: x, y, z of the table's innermost frame at zero angles and no errors"
 """Axes of the results."""
@@ -240,7 +238,7 @@ def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
 def orthonormal(model: TableModel, angles: Array) -> Array:
     """Functions (n, b) of the direction of gravity, orthonormal over the sphere: as many as the terms have orders.
 
-    Nine, up to second order, or four, up to first (`inercal.design.spherical.basis`).
+    Nine, up to second order, or four, up to first (`inercal.designs.spherical.basis`).
     """
     quadratic = any(each.order > 1 for channel in model.channels for each in channel.monomials)
     made = basis(gravity_reference() @ model.chain.attitude(angles))

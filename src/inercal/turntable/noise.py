@@ -16,11 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.turntable.weights import Weights, whitened
-
-Array = NDArray[np.float64]
 
 STEPS = 60
 """Scoring steps at most; a dozen do unless a channel has no noise at all."""

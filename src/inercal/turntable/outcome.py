@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.design.comparison import in_basis
+from inercal.arrays import Array
+from inercal.designs.comparison import in_basis
 from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
 from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
-from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
@@ -26,8 +26,6 @@ from inercal.turntable.regression import Regression, worst_rank
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.weights import weights
-
-Array = NDArray[np.float64]
 
 COMMAND = "calibrate turntable"
 

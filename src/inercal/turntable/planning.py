@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.design.allowed import insensitive, within
-from inercal.design.candidates import Candidates
-from inercal.design.comparison import PlanFigures, judge
-from inercal.design.criteria import Criterion, D, a_criterion, i_criterion
-from inercal.design.exchange import exchange
+from inercal.arrays import Array
+from inercal.designs.allowed import insensitive, within
+from inercal.designs.candidates import Candidates
+from inercal.designs.comparison import PlanFigures, judge
+from inercal.designs.criteria import Criterion, D, a_criterion, i_criterion
+from inercal.designs.exchange import exchange
 from inercal.errors import StudyError
-from inercal.records.findings import Finding
+from inercal.findings import Finding
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
 from inercal.turntable.fitting import choose_terms, earth_rate_of, rate_terms
@@ -27,8 +28,6 @@ from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.tolerance import drift_shares, sphere_rows
 from inercal.turntable.weights import least_noise, weights
 from inercal.units import Unit
-
-Array = NDArray[np.float64]
 
 REFERENCES = (
     "R. D. Cook, C. J. Nachtsheim, A comparison of algorithms for constructing exact D-optimal designs, Technometrics "
@@ -281,7 +280,7 @@ def _criterion(name: str, model: TableModel) -> Criterion:
 
 def _largest_index(settings: TurntableSettings) -> Array:
     """Largest first-order index (m,) of the constrained factors on the constrained outputs."""
-    from inercal.sensitivity import exact
+    from inercal.sensitivities import exact
 
     constraint, site = settings.design.constraint, settings.site
     assert constraint is not None

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.by_angle import CHANNELS
@@ -24,8 +25,6 @@ from inercal.rigs.outputs import rate_reference
 from inercal.turntable.readings import STILL
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import Unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ import numpy as np
 from inercal.errors import StudyError
 from inercal.estimate.identifiability import in_words
 from inercal.estimate.result import Estimate
+from inercal.findings import Finding
 from inercal.geometry.earth import EARTH_RATE
-from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed

@@ -18,13 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.turntable.noise import scatter
 from inercal.turntable.rate import Effect, Input
 from inercal.turntable.regression import FLOOR, Solution, solve
 from inercal.turntable.weights import Weights
-
-Array = NDArray[np.float64]
 
 SAME = 1e-3
 """Rates apart by less than this part of themselves are one rate."""

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.conditions import conditions
 from inercal.estimate.identifiability import Identifiability
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.estimate.status import Status
-from inercal.records.findings import Finding
+from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
@@ -22,8 +20,6 @@ from inercal.turntable.outcome import COMMAND, WORST_CONDITION, of_site, unit_of
 from inercal.turntable.rate import Input, RateDwells
 from inercal.turntable.rate_fit import RateFit, approaches
 from inercal.turntable.settings import RateTest, TurntableSettings
-
-Array = NDArray[np.float64]
 
 SEEN = 5.0
 """Standard uncertainties that a scale factor is above zero, lest the output has nothing to do with the rate."""

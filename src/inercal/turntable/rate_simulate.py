@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
 from inercal.records.made import record_of
@@ -16,8 +16,6 @@ from inercal.turntable.rate_calibration import check_rate_test
 from inercal.turntable.rate_fit import approaches
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 
 def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) -> Record:

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
+from inercal.findings import Finding
 from inercal.instruments.by_angle import CHANNELS
-from inercal.records.findings import Finding
 from inercal.records.places import counted, places
 from inercal.records.record import Record
 from inercal.units import Unit
-
-Array = NDArray[np.float64]
 
 STILL = np.radians(3.0 / 60.0)
 """Angle [rad] within which rows are one position: above the noise of an encoder, below any step of a plan."""

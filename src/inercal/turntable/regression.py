@@ -19,13 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, few_terms, identify, in_words
 from inercal.instruments.polynomial import ChannelModel
 from inercal.turntable.model import TableModel
 from inercal.turntable.noise import scatter
 from inercal.turntable.weights import Samples, Weights, beside_inputs, least_noise, weights, whitened
-
-Array = NDArray[np.float64]
 
 ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
 from inercal.records.made import record_of
@@ -15,8 +15,6 @@ from inercal.rigs.chain import Scope
 from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import parse_unit
-
-Array = NDArray[np.float64]
 
 MOST_ROWS = 10_000_000
 """Samples that fit into memory with all errors of the table."""

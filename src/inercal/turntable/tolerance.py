@@ -12,15 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
 from inercal.turntable.regression import Regression, solve
 from inercal.turntable.weights import averaged, least_noise, weights_of
-
-Array = NDArray[np.float64]
 
 
 def shifts(fit: Regression) -> tuple[Array, ...]:

@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.rigs.chain import Chain, Scope
 from inercal.turntable.model import TableModel
 
-Array = NDArray[np.float64]
 Samples: TypeAlias = NDArray[np.int64]
 """Rows behind each reading (n,)."""
 

@@ -6,12 +6,11 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.aoa import lever, residuals, static
 from inercal.aoa.flow import alpha_beta
 from inercal.aoa.layout import Layout
-from inercal.aoa.methods import measure as measure_by
+from inercal.aoa.paper import lever, residuals, static
+from inercal.aoa.paper.methods import measure as measure_by
 from inercal.aoa.settings import (
     AoaSettings,
     Attitude,
@@ -23,13 +22,12 @@ from inercal.aoa.settings import (
 )
 from inercal.aoa.simulate import simulate
 from inercal.aoa.task import Measurement, measure
+from inercal.arrays import Array
 from inercal.geometry.site import Site
-from inercal.study.load import load_aoa_study
+from inercal.studies.load import load_aoa_study
 from inercal.units import parse_quantity
 from inercal.validate.case import Case
 from inercal.validate.shipped import record_of, study_of
-
-Array = NDArray[np.float64]
 
 _G = 9.80665
 _DEG = math.pi / 180.0

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import solve
 from inercal.estimate.result import coverage_factor
 from inercal.geometry import earth, rotations
 from inercal.units import parse_quantity, parse_unit
 from inercal.validate.case import Case
-
-Array = NDArray[np.float64]
 
 _PI = 3.14159265358979324
 _DEG_PER_H = 648000.0 / _PI

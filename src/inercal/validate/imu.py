@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.convert.correct import ImuModel, imu_model
 from inercal.convert.other_tools import from_tool, to_tool
 from inercal.estimate.result import Estimate
@@ -20,11 +20,9 @@ from inercal.imu.ferraris.simulate import Session, draw_full_truth, quiet, simul
 from inercal.imu.settings import ImuSettings
 from inercal.imu.task import calibrate
 from inercal.imu.temperature.sweep import fit_recording
-from inercal.study.load import load_imu_study
+from inercal.studies.load import load_imu_study
 from inercal.validate.case import Case
 from inercal.validate.shipped import record_of, study_of
-
-Array = NDArray[np.float64]
 
 _AXES = "xyz"
 

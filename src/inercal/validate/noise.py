@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.instruments.noise import NoiseModel
 from inercal.noise.coefficients import noise_coefficients
 from inercal.noise.covariance import degrees_of_freedom
@@ -12,8 +12,6 @@ from inercal.noise.deviation import allan_deviation
 from inercal.units import parse_unit
 from inercal.validate.case import Case
 from inercal.validate.shipped import record_of
-
-Array = NDArray[np.float64]
 
 _STABLE32 = (2.9223e-1, 2.0102e-1, 1.4479e-1, 1.0570e-1, 6.1915e-2, 4.8082e-2, 3.6237e-2, 2.7674e-2)
 """Overlapping deviations at 1, 2, 4, .. 128 samples."""

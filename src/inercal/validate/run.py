@@ -19,9 +19,8 @@ from inercal import __version__
 from inercal._jit import source_hash
 from inercal.estimate.result import Estimate, without_parameters
 from inercal.estimate.runs import Executor, Processes, Serial
-from inercal.estimate.status import Status
 from inercal.examples import EXAMPLES, shipped
-from inercal.records.findings import Finding
+from inercal.findings import Finding, Status
 from inercal.validate.case import Case, Found, Outcome, find, judge
 from inercal.validate.shipped import USED
 from inercal.validate.sources import SOURCES

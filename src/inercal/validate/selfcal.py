@@ -6,21 +6,19 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.consistency import nis
-from inercal.selfcal.bounds import Bounds, bounds
-from inercal.selfcal.coefficients import KA0, KG0, NAMES, to_linear
-from inercal.selfcal.filtered import Filtered, problem
-from inercal.selfcal.filtering import estimate
-from inercal.selfcal.plan import Plan, Rest, motion, path
+from inercal.selfcal.before.bounds import Bounds, bounds
+from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import KA0, KG0, NAMES, to_linear
+from inercal.selfcal.platform.plan import Plan, Rest, motion, path
 from inercal.selfcal.reading import recording_of
 from inercal.selfcal.settings import FilterKind, Noise, SelfcalSettings
-from inercal.study.load import load_selfcal_study
+from inercal.studies.load import load_selfcal_study
 from inercal.validate.case import Case
 from inercal.validate.shipped import record_of, study_of
-
-Array = NDArray[np.float64]
 
 _MICRO_G = 9.80665e-6
 _ARCSEC = np.pi / 648000.0

@@ -6,23 +6,22 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from inercal.design.comparison import in_basis
-from inercal.design.spherical import basis
+from inercal.arrays import Array
+from inercal.designs.comparison import in_basis
+from inercal.designs.spherical import basis
 from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import gravity_reference, table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivity import averages, exact
-from inercal.sensitivity.indices import Indices
+from inercal.sensitivities import averages, exact
+from inercal.sensitivities.indices import Indices
 from inercal.turntable.campaign import TABLE, one_turntable_calibration, settings_of
 from inercal.turntable.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 from inercal.validate.case import Case
-
-Array = NDArray[np.float64]
 
 _ARCMIN = np.radians(1.0 / 60.0)
 _CHAIN = turntable(TABLE, uniform(2.0 * _ARCMIN))

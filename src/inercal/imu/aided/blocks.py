@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.geometry.rotations import skew
 from inercal.imu.aided.stamps import forward
 from inercal.imu.aided.table import Motion
 from inercal.records.checks.values import saturated
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
+from inercal.records.column import Triad
 
 LENGTH = 0.25
 """Length of a block [s]: far shorter than turns and the wander of a bias, longer than the memory of filters."""

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import Estimate, timed
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.aided.blocks import Blocks, cut
 from inercal.imu.aided.coefficients import gain_names
 from inercal.imu.aided.fit import Fit, fit
@@ -22,12 +23,8 @@ from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, 
 from inercal.imu.aided.table import Motion, motion_of, shifted, times
 from inercal.imu.aided.walk import whiten
 from inercal.imu.settings import ImuSettings
-from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.record import Record
-
-Array = NDArray[np.float64]
-
 
 LEAST_TRAVEL = np.radians(10.0)
 """Travel of a table's axes [rad] below which nothing is to be calibrated."""

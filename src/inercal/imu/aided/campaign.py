@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.estimate.status import Status
+from inercal.arrays import Array
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.aided.calibration import calibrate_aided
@@ -15,8 +15,6 @@ from inercal.imu.settings import ImuSettings
 from inercal.instruments.triad import TriadModel
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
-
-Array = NDArray[np.float64]
 
 GRAVITY, GRAVITY_U = 9.81, 2e-4
 """Gravity as stated to the calibration [m/s^2], and its standard uncertainty."""

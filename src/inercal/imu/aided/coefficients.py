@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
-
-Array = NDArray[np.float64]
 
 NOTHING = 1e-6
 """Share of a variance below which a prior that is only there for order is left out of the budget."""

@@ -12,16 +12,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import Axis, elementary
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.aided.suspects import expected
 from inercal.imu.aided.table import Motion
 from inercal.rigs.chain import Chain, Fixed, Joint
-
-Array = NDArray[np.float64]
 
 STEP = 1e-6
 """Step of the derivatives by an angle or the clock."""

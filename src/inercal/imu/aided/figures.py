@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.aided.coefficients import of_triad
 from inercal.report.figures import budget, correlation
 from inercal.report.html import Picture
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.aided.fit import Fit
 
-Array = NDArray[np.float64]
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 

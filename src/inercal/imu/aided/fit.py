@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.imu.aided.blocks import Reference, reference
 from inercal.imu.aided.levels import Levels, chosen, levels
 from inercal.imu.aided.model import Equation, Side, Unknowns, equations
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided.walk import Whitened, whiten
-
-Array = NDArray[np.float64]
 
 STEPS = 12
 """Gauss-Newton steps at most, with first and with last levels of noise; two to four do."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.aided.walk import whiten
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 EXCESS = 10.0

@@ -16,12 +16,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.aided.blocks import FEWEST
 from inercal.imu.aided.faults import Fault
 from inercal.imu.aided.fit import Fit, noise_of
 from inercal.imu.aided.walk import whiten
-
-Array = NDArray[np.float64]
 
 SIGNIFICANCE = 1e-6
 """Probability of a fall of the sum of squares by chance, below which a fault is named."""

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.aided.blocks import Blocks, Reference
 from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.aided.table import Motion, error_nodes
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SHIFT_U = 1.0

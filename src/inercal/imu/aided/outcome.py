@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import TypeB, combine, common
 from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import (
     coefficients,
     names_of,
@@ -27,11 +27,8 @@ from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
 from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
-from inercal.records.findings import Finding
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-
-Array = NDArray[np.float64]
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along frame "

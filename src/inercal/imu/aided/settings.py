@@ -6,11 +6,9 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.rigs.chain import Chain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

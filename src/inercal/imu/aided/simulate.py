@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import skew
 from inercal.imu.aided.blocks import small_turn
@@ -17,7 +17,6 @@ from inercal.records.record import Record
 from inercal.rigs.chain import Chain
 from inercal.units import parse_unit
 
-Array = NDArray[np.float64]
 Program = Sequence[tuple[str, float, float]]
 """What the table does: ``("rest", 0, duration)`` or (joint, angle [rad], duration), durations in seconds."""
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
-
-Array = NDArray[np.float64]
 
 LONGEST = 5
 """Rows in a row that run backward and are left out; more are a clock that was set back."""

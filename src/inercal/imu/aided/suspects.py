@@ -7,13 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.aided.blocks import Blocks, small_turn
 from inercal.imu.aided.settings import mountings
 from inercal.imu.aided.table import Motion
-
-Array = NDArray[np.float64]
 
 MISFIT = 0.35
 """Part of the output's variation that a sound table leaves unexplained at most; misalignments leave some 0.05."""

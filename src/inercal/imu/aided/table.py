@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
+from inercal.findings import Finding
 from inercal.imu.aided.stamps import forward
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.places import counted
-from inercal.records.record import Column, Record
+from inercal.records.record import Record
 from inercal.rigs.chain import Chain, Error, Scope
-
-Array = NDArray[np.float64]
 
 STILL = np.radians(0.1)
 """Speed of an axis [rad/s] below which the table rests."""

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.estimate.result import rounded
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.aided.misfit import Misfit, variation
-from inercal.records.findings import Finding
 from inercal.records.places import counted, counted_names
-
-Array = NDArray[np.float64]
 
 WORST_CONDITION = 50.0
 """Condition of what the data tell of a triad's gains, beyond which it is called ill-conditioned; good tests have 1

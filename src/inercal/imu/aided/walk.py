@@ -18,11 +18,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._jit import kernel
-
-Array = NDArray[np.float64]
+from inercal.arrays import Array
 
 
 @kernel

@@ -26,7 +26,8 @@ from inercal.imu.ferraris.verdict import (
     wrong_axes,
 )
 from inercal.imu.settings import ImuSettings
-from inercal.records.record import Record, Triad
+from inercal.records.column import Triad
+from inercal.records.record import Record
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.estimate.status import Status
+from inercal.arrays import Array
+from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.simulate import Session, draw_full_truth, simulate_session, true_values
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import ImuTruth, Noise
-
-Array = NDArray[np.float64]
 
 ALIGNMENT = math.radians(0.5)
 """Standard deviation of each direction of a position and of the axis of a turn, in either direction across it [rad]."""

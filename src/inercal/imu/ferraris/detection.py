@@ -2,7 +2,7 @@
 
 A hold is where the windowed variance of both sensors stays near that of the calmest part of the record. Which axis
 is upright shows without any calibration: of many holds, each axis lies level in most, so that the median of its means
-is its bias. Which of the motions are the turns is chosen in `inercal.imu.ferraris.choice`.
+is its bias. Which of the motions are the turns is chosen in `inercal.imu.ferraris.which_turn`.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.ferraris.motions import UPRIGHT, Level, Motion, motions, part
 from inercal.imu.ferraris.names import POSITIONS, UP
 from inercal.imu.recording import on_other_clock
+from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, static_intervals, window_samples, windowed_variance
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
 
 STILL = 8.0
 """Variance over that of the calm parts below which the instrument is held still."""

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.imu.ferraris.names import NAMES, TURNS
+from inercal.records.column import Triad
 from inercal.records.dwells import breaks
-from inercal.records.record import Triad
 from inercal.report.figures import budget, correlation
 from inercal.report.html import Picture
 from inercal.report.style import COLOURS, INK, QUIET, WIDTH, envelope, figure, plain_unit, svg
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from inercal.imu.ferraris.calibration import FerrarisCalibration
     from inercal.imu.ferraris.scatter import Scatter
 
-Array = NDArray[np.float64]
 
 _GAP = 0.5
 """Longest step of time [s] across which a line is drawn."""

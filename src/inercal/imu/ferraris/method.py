@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel
 
-Array = NDArray[np.float64]
 Values = NDArray[Any]
 
 NAMES = (*ACCELEROMETERS_IN_A_FRAME, *GYRO_TRIAD, *GYRO_G_SENSITIVITY)

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
+from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, static_intervals
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
 
 UPRIGHT = 0.9
 """Cosine of the largest angle (26 deg) from upright."""

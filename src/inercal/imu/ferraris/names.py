@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
 POSITIONS = ("x_p", "x_a", "y_p", "y_a", "z_p", "z_a")
 """Axis parallel (p, reads +g) and antiparallel (a, reads -g) to the specific force of rest, which is upward."""
 

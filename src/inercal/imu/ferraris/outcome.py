@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import combine, common
 from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.ferraris.method import NAMES, coefficients
 from inercal.imu.ferraris.names import NAMES as SECTIONS
 from inercal.imu.ferraris.names import POSITIONS, TURNS, in_words
@@ -22,11 +22,9 @@ from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_
 from inercal.imu.ferraris.verdict import too_few, verdict
 from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
-from inercal.records.findings import Finding
-from inercal.records.record import Record, Triad
+from inercal.records.column import Triad
+from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-
-Array = NDArray[np.float64]
 
 MODEL = (
     "y = S M f + b, S = diag(K1), M = 1 + misalignment (full; M_ij: response of accelerometer i to specific force "

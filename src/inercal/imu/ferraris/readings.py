@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
+from inercal.findings import Finding
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Inputs
 from inercal.imu.ferraris.names import POSITIONS, TURNS
@@ -16,10 +17,7 @@ from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.recording import LOST, clipped_rows, coarse_steps
 from inercal.noise.dwell_means import AllanFit, fit_pooled
-from inercal.records.findings import Finding
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
+from inercal.records.column import Triad
 
 RESTLESS = 30.0
 """Variance in a position over the median of all from which the instrument certainly moves."""

@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.linear import LinearFit, least_squares
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.settings import FerrarisSettings
-
-Array = NDArray[np.float64]
 
 EXCESS = 0.05
 """Probability below which the scatter of the positions is not put down to what is stated."""

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import RecordError, StudyError
-from inercal.imu.ferraris.choice import Choice, choose
 from inercal.imu.ferraris.detection import detect
 from inercal.imu.ferraris.names import NAMES, TURNS
 from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.ferraris.which_turn import Choice, choose
+from inercal.records.column import Triad
 from inercal.records.places import counted, counted_names, places
-from inercal.records.record import Record, Triad
+from inercal.records.record import Record
 from inercal.units import shown
 
 Integers = NDArray[np.int64]

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.earth import earth_rate
 from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
 from inercal.imu.ferraris.method import NAMES
@@ -15,8 +15,6 @@ from inercal.imu.ferraris.names import POSITIONS, TURNS, UP
 from inercal.imu.simulate import ImuTruth, Noise, draw_truth, record_of_counts, wandering_noise
 from inercal.instruments.triad import TriadModel
 from inercal.records.record import Record
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

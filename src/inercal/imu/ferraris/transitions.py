@@ -9,18 +9,16 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.geometry.rotations import angle_between
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import POSITIONS
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.ways import followed
+from inercal.imu.ferraris.segments import followed
 from inercal.imu.recording import clipped_rows
 from inercal.imu.turns import carried, cut_turns
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
+from inercal.records.column import Triad
 
 FEWEST = 2
 """Ways between positions without which nothing is said."""

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Matrices, derivatives
@@ -20,8 +20,6 @@ from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.scatter import Scatter
 from inercal.imu.ferraris.settings import FerrarisSettings
-
-Array = NDArray[np.float64]
 
 _AXIS = np.repeat(np.arange(3), 2)
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.estimate.status import Status
+from inercal.arrays import Array
+from inercal.findings import Finding, Status
 from inercal.imu.ferraris.method import Inputs, Matrices
 from inercal.imu.ferraris.names import NAMES, POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.readings import Readings
@@ -17,11 +17,8 @@ from inercal.imu.ferraris.scatter import Scatter
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.verdict import WORST_MISS, unit_words
-from inercal.records.findings import Finding
+from inercal.records.column import Triad
 from inercal.records.places import counted_names
-from inercal.records.record import Triad
-
-Array = NDArray[np.float64]
 
 FAINT = 0.3
 """Least part of the largest response of an output that a position or turn has to show."""

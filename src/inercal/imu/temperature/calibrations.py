@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate, coverage_factor
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.temperature.cubic import Cubic, fit_points
 from inercal.imu.temperature.model import (
     LEAST_SPAN,
@@ -20,11 +20,8 @@ from inercal.imu.temperature.model import (
     assemble,
     no_span,
 )
-from inercal.records.findings import Finding
-from inercal.records.record import Source
+from inercal.inputs import Source
 from inercal.units import parse_quantity
-
-Array = NDArray[np.float64]
 
 FEWEST = 3
 """Calibrations without which no curve is fitted."""

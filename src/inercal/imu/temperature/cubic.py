@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.linear import least_squares
-
-Array = NDArray[np.float64]
 
 PARTS = 64
 """Equal parts of a sweep whose means are taken."""

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.imu.temperature.model import Curve, TemperatureModel
 from inercal.report.html import Picture
 from inercal.report.style import COLOURS, INK, QUIET, WIDTH, figure, plain_unit, svg
-
-Array = NDArray[np.float64]
 
 _POINTS = 1500
 

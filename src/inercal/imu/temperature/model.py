@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.estimate.status import Status
+from inercal.findings import Finding, Status
 from inercal.imu.temperature.cubic import Cubic
-from inercal.records.findings import Finding
-from inercal.records.record import Source
-
-Array = NDArray[np.float64]
+from inercal.inputs import Source
 
 COMMAND = "temperature"
 

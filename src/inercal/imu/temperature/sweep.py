@@ -12,16 +12,15 @@ import re
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.imu.temperature.cubic import PARTS, fit_sweep
 from inercal.imu.temperature.model import LEAST_SPAN, REFERENCE, Curve, TemperatureModel, assemble, no_span
 from inercal.records.checks.values import is_dead
+from inercal.records.column import Column
 from inercal.records.places import counted
-from inercal.records.record import Column, Record
-
-Array = NDArray[np.float64]
+from inercal.records.record import Record
 
 _MEASURED = re.compile(r"acc_[xyz]|gyro_[xyz]|a[1-9]\d*|gyro(_roll|_yaw)?")
 _NEITHER = 0.05

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inercal.arrays import Array
+from inercal.findings import Finding
 from inercal.records.channels import may_be_empty, of_a_table
 from inercal.records.checks.angles import angles
 from inercal.records.checks.time import time_axis, time_unit
@@ -24,9 +26,8 @@ from inercal.records.checks.values import (
     saturation,
     temperature_unit,
 )
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.places import counted, places
-from inercal.records.record import Array, Column
 
 _SENSOR = re.compile(r"acc_[xyz]|a\d+|gyro\w*")
 _MEASURED = re.compile(r"acc_[xyz]|a\d+|gyro\w*|y_[xy]|temperature")

@@ -13,12 +13,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
+from inercal.findings import Finding
 from inercal.records.channels import of_a_table
 from inercal.records.checks.samples import known, plateaus
 from inercal.records.clocks import counted_rows
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.places import counted, places
-from inercal.records.record import Array, Column
 
 _ANGLE = re.compile(r"phi[123]|th_[xyz]|theta_ref")
 _TURN = 2.0 * np.pi

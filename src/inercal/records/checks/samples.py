@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.records.record import Array
+from inercal.arrays import Array
 
 SAMPLE = 100_000
 

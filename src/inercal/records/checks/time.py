@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
+from inercal.findings import Finding
 from inercal.records.checks.samples import known
-from inercal.records.findings import Finding
 from inercal.records.places import counted, places
-from inercal.records.record import Array
 
 _JITTER = 8.0
 """Median deviations of intervals from the median by which one is longer at least where samples are missing."""

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
+from inercal.findings import Finding
 from inercal.records.checks.samples import SAMPLE, known, plateaus, thinned
-from inercal.records.findings import Finding
+from inercal.records.column import Column
 from inercal.records.places import counted, places
-from inercal.records.record import Array, Column
 from inercal.units import STANDARD_GRAVITY, parse_unit
 
 _AROUND = 42

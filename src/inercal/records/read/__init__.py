@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, cast
 
 from inercal._files import is_pipe
 from inercal.errors import InputError, MapError, RecordError
+from inercal.findings import Finding
+from inercal.inputs import Source
 from inercal.records.checks import check
-from inercal.records.findings import Finding
 from inercal.records.read.join import FileTable, join
 from inercal.records.read.table import Format, Part
-from inercal.records.record import Record, Source
+from inercal.records.record import Record
 from inercal.units import Unit
 
 if TYPE_CHECKING:

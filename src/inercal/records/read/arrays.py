@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import InercalError, RecordError
+from inercal.findings import Finding
 from inercal.records.channels import Channel
 from inercal.records.checks import missing, too_long
-from inercal.records.findings import Finding
 from inercal.records.read.canonical import bare, canonical
 from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
-from inercal.records.record import Array
 from inercal.units import parse_unit
 
 _LISTED = 20

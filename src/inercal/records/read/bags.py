@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import MissingExtraError, RecordError
+from inercal.findings import Finding
 from inercal.records.channels import Channel
-from inercal.records.findings import Finding
 from inercal.records.places import counted
 from inercal.records.read.arrays import Contents, guarded, held, reason, samples, tables
 from inercal.records.read.table import FileOptions, Sample, Table

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inercal.arrays import Array
 from inercal.errors import MapError, RecordError
+from inercal.inputs import Source
 from inercal.records.channels import Channel, of_a_table
+from inercal.records.column import Column
 from inercal.records.read.table import Part, Table
-from inercal.records.record import Array, Column, Source
 from inercal.units import Unit, parse_unit, shown
 
 if TYPE_CHECKING:

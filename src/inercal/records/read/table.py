@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from inercal.arrays import Array
+from inercal.findings import Finding
 from inercal.records.channels import Channel
-from inercal.records.findings import Finding
-from inercal.records.record import Array
 
 LARGEST = 1e30
 """What no sensor reads, in any unit: it counts as missing, as infinity does, and its powers overflow nowhere."""

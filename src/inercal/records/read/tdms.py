@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.errors import MissingExtraError
-from inercal.records.findings import Finding
+from inercal.findings import Finding
 from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray
 
 

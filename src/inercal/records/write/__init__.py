@@ -11,7 +11,8 @@ from typing import IO, Protocol, cast
 from inercal._files import replacing
 from inercal.errors import InputError
 from inercal.records.clocks import Clocks, clocks
-from inercal.records.record import Column, Record
+from inercal.records.column import Column
+from inercal.records.record import Record
 
 #: suffix -> module of this package that writes it
 _FORMATS = {".csv": "text", ".npz": "npz", ".h5": "hdf5", ".parquet": "parquet", ".nc": "netcdf"}
@@ -62,7 +63,7 @@ def write_record(
     if not record.columns:
         raise InputError(path, "the record has no columns to write")
     form = cast(_Format, importlib.import_module(f"{__name__}.{_FORMATS[suffix]}"))
-    axes = clocks(record, "t")
+    axes = clocks(record.columns, "t", len(record.labels))
     if form.TABLE and len(axes.axes) > 1:
         first, *others = axes.of_column
         other = next(name for name in others if axes.of_column[name] != axes.of_column[first])

@@ -1,0 +1,165 @@
+"""How well a recording fits a study: what the fusion with all its nuisances makes of the liveliest stretch of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.fusion.loop import OUTPUTS
+from inercal.aoa.fusion.problem import Problem, problem
+from inercal.aoa.fusion.run import State, advance, initial
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings, States
+from inercal.arrays import Array
+from inercal.records.checks.values import outlying
+
+STRETCH = 6000
+"""Rows that are judged."""
+
+WIDE = 3.0
+"""Standard deviations of its prior by which a coefficient may be off and still be as expected."""
+
+WIDE_SCALE = 10.0
+"""The same of the gyro's scale, which a filter that linearises also moves where a buffet is fast and small."""
+
+WHITE = 0.53
+"""Mean of log(1 + v^2) of white innovations of variance 1."""
+
+_BLOCK, _STARTS = 50, 10
+"""Rows at a time, and starts beside every tenth row from which a filter is given up."""
+
+_LARGE = 0.75
+_FAR = 1.5
+
+_BY_MOTION = ("dr_", "zo_", "k_g", "tau_g")
+"""Coefficients that only motion shows; at rest they follow noise, and where they end says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What the fusion found in a stretch.
+
+    ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` how far
+    each coefficient ended from its prior, in standard deviations of it, by name, without those that only motion shows
+    where there is none; ``misfit`` of all in one number.
+    """
+
+    innovations: Array
+    theta: Array
+    rate: Array
+    off: dict[str, float]
+    problem: Problem
+
+    @property
+    def by_sensor(self) -> Array:
+        """(N + 1,) mean of log(1 + v^2) of each sensor: 0.53 for white innovations, and little moved by single wild
+        ones; 0 of one that is not there."""
+        return np.array([_logarithm(v[np.isfinite(v)]) for v in self.innovations.T])
+
+    @property
+    def misfit(self) -> float:
+        """Sum over the sensors, and over the coefficients of log(1 + (off / 3)^2); a gyro without noise misfits too."""
+        of_gyro = float(self.by_sensor[-1])
+        silent = max(0.0, WHITE - of_gyro) if np.isfinite(self.innovations[:, -1]).any() else 0.0
+        return float(self.by_sensor.sum() + silent + np.log1p(self._far**2).sum())
+
+    @property
+    def white(self) -> bool:
+        """True where the innovations of no sensor are larger than its noise."""
+        return bool(self.by_sensor.max() < _LARGE)
+
+    @property
+    def fits(self) -> bool:
+        """True where no sensor and no coefficient is beyond what its noise and its prior explain."""
+        return bool(self.white and np.abs(self._far).max() < _FAR)
+
+    @property
+    def _far(self) -> Array:
+        """How far the coefficients are off, over what is expected at most."""
+        return np.array([0.0, *(v / (WIDE_SCALE if k == "k_g" else WIDE) for k, v in self.off.items())])
+
+
+def _logarithm(v: Array) -> float:
+    """Mean of log(1 + v^2), 0 without any."""
+    with np.errstate(over="ignore"):
+        return float(np.minimum(np.log1p(v**2), 700.0).mean()) if v.size else 0.0
+
+
+def stretch(recording: Recording) -> Recording:
+    """Up to `STRETCH` rows that go on in time, those in which the sensors vary most, without single wild samples."""
+    taken = later(recording.t)
+    if len(taken) > STRETCH:
+        read = np.column_stack([recording.acc, recording.gyro])[taken]
+        scale = _scatter(read)
+        starts = np.arange(0, len(taken) - STRETCH + 1, STRETCH // 2)
+        lively = [float((_scatter(read[k : k + STRETCH]) / scale).sum()) for k in starts]
+        first = int(starts[int(np.argmax(lively))])
+        taken = taken[first : first + STRETCH]
+    part = of_rows(recording, taken)
+    for column in (*part.acc.T, part.gyro, *part.turns.T):
+        # mirrored at the ends, where a sample has one neighbour
+        wild = outlying(np.concatenate([column[1:2], column, column[-2:-1]])) - 1
+        column[wild[(wild >= 0) & (wild < len(column))]] = np.nan
+    return part
+
+
+def _scatter(read: Array) -> Array:
+    """Standard deviation of each column, 1 of one that is not there."""
+    known = np.isfinite(read)
+    each = [float(c[k].std()) if k.any() else 0.0 for c, k in zip(read.T, known.T, strict=True)]
+    return np.array([one or 1.0 for one in each])
+
+
+def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
+    """The sensors' part of some rows."""
+    return Recording(
+        recording.t[rows],
+        recording.acc[rows],
+        recording.gyro[rows],
+        recording.turns[rows],
+        recording.stated[rows],
+    )
+
+
+def judge(recording: Recording, settings: AoaSettings, states: States = 19) -> Judged:
+    """Filter a stretch whose time goes on."""
+    asked = replace(settings, estimator=replace(settings.estimator, states=states))
+    posed = problem(asked, recording.spatial)
+    with np.errstate(all="ignore"):
+        state, told = _followed(posed, recording.t, recording.rows)
+        at = [*posed.nuisances.values()]
+        off = (state.x[at] - posed.mean[at]) / np.sqrt(np.diag(posed.covariance)[at])
+        off = np.nan_to_num(off, nan=1e6)
+    still = rms(told[:, 2]) < settings.noise.gyro
+    named = {
+        name: each
+        for name, each in zip(posed.nuisances, off.tolist(), strict=True)
+        if not (still and name.startswith(_BY_MOTION))
+    }
+    return Judged(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)
+
+
+def _followed(posed: Problem, t: Array, rows: Array) -> tuple[State, Array]:
+    """The state after rows, and what the fusion says of each (m, OUTPUTS + N + 1); NaN from where on it is given up, as
+    it loses the angle every few rows and starting anew takes the time of a hundred steps."""
+    state, done, starts = initial(posed), 0, 0
+    out = np.full((len(t), OUTPUTS + posed.count + 1), np.nan)
+    for a in range(0, len(t), _BLOCK):
+        b = min(a + _BLOCK, len(t))
+        state, trace = advance(state, posed, t[a:b], rows[a:b], last=b == len(t))
+        out[done : done + len(trace.out)] = trace.out
+        done, starts = done + len(trace.out), starts + len(trace.starts)
+        if starts > 0.1 * b + _STARTS:
+            break
+    return state, out
+
+
+def rms(rate: Array) -> float:
+    """Root mean square of a rate (m,) [rad/s] once a filter has settled; infinite where it is not known."""
+    settled = rate[len(rate) // 10 :]
+    settled = settled[np.isfinite(settled)]
+    return math.sqrt(float(np.mean(np.square(settled)))) if settled.size else math.inf

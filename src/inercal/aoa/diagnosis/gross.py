@@ -1,0 +1,275 @@
+"""Gross faults of a recording or of its study: what may be wrong, and both as they would be without it.
+
+The commonest slips at the edge: a sensor reversed, columns exchanged, a unit taken for another, positions in mm taken
+for m or counted backwards. Each is judged by what the fusion makes of the recording without it
+(`inercal.aoa.diagnosis.plausibility`); none is believed here.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inercal.aoa.diagnosis.fit_quality import judge, rms
+from inercal.aoa.diagnosis.noise_check import scatter
+from inercal.aoa.layout import AXES
+from inercal.aoa.paper.delay import aligned, relative_delay
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+from inercal.findings import Finding
+from inercal.units import STANDARD_GRAVITY
+
+Change = Callable[[Recording, AoaSettings], tuple[Recording, AoaSettings]]
+
+_MOST_ORDERS = 24
+"""Orders of accelerometers up to which all are tried; of more accelerometers pairs alone are exchanged."""
+
+#: what values [SI] are to be multiplied by -> the unit they look to be in, and that they were taken for
+_ACCELEROMETER_UNITS = {
+    STANDARD_GRAVITY: ("g", "m/s^2"),
+    1.0 / STANDARD_GRAVITY: ("m/s^2", "g"),
+    1e-3: ("mg", "g"),
+    1e3: ("g", "mg"),
+    1e-3 * STANDARD_GRAVITY: ("mg", "m/s^2"),
+    1e3 / STANDARD_GRAVITY: ("m/s^2", "mg"),
+}
+_GYRO_UNITS = {
+    math.pi / 180.0: ("deg/s", "rad/s"),
+    180.0 / math.pi: ("rad/s", "deg/s"),
+    1e-3: ("mdeg/s", "deg/s"),
+    1e3: ("deg/s", "mdeg/s"),
+    1.0 / 3600.0: ("deg/h", "deg/s"),
+    3600.0: ("deg/s", "deg/h"),
+}
+_LENGTHS = {
+    1e-3: ("mm", "m"),
+    1e3: ("m", "mm"),
+    1e-2: ("cm", "m"),
+    1e2: ("m", "cm"),
+    1e-1: ("mm", "cm"),
+    1e1: ("cm", "mm"),
+}
+
+_STILL = 5.0
+"""Times its noise by which a gyro may wander where the model does not move."""
+
+_FEWEST = 100
+"""Rows by which a gyro is held to accelerometers."""
+
+_ARM, _PLAIN = 0.1, 0.02 * STANDARD_GRAVITY
+"""The lever arm [m] of a model at least, and accelerations [m/s^2] from which it shows plainly."""
+
+_LONGEST, _SHORTEST = 3.0, 0.01
+"""Lever arms [m] between which the largest of a model is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """A ``finding`` and the ``change`` that takes the fault out of a recording and its study; ``last`` where any other
+    is likelier."""
+
+    finding: Finding
+    change: Change
+    last: bool = False
+
+
+def faults(recording: Recording, settings: AoaSettings) -> Iterator[Fault]:
+    """All faults that the sensors of a recording may have."""
+    there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
+    shown = _shown(recording, settings)
+    if np.isfinite(recording.gyro).any():
+        # at rest a gyro tells of noise alone, which is of no sign and unit
+        if rms(shown) > settings.noise.gyro:
+            yield from _of_gyro()
+        yield from _of_clock(recording, settings, shown)
+    if recording.spatial:
+        yield from _of_turns()
+    yield from _reversed(there, settings)
+    yield from _orders(there, settings)
+    yield from _units(there, settings)
+    # of steady motion positions show no more than small errors of the sensors do
+    arm = max(float(np.abs(settings.layout.r).max()), _ARM)
+    if arm * rms(np.gradient(shown, recording.t)) > _PLAIN:
+        yield from _positions(there, settings)
+
+
+def _shown(recording: Recording, settings: AoaSettings) -> Array:
+    """Rate (n,) [rad/s] that the accelerometers show."""
+    return judge(replace(recording, gyro=np.full_like(recording.gyro, np.nan)), settings).rate
+
+
+def _follows(recording: Recording, shown: Array, stated: float) -> bool:
+    """True where a gyro explains half of the mean square of the rate that accelerometers show, beside its bias and
+    noise, or where there is hardly any rate; ``stated`` noise."""
+    gyro = recording.gyro
+    known = np.isfinite(gyro) & np.isfinite(shown)
+    known[: len(known) // 10] = False
+    if known.sum() < _FEWEST:
+        return False
+    told = scatter(recording.t[known], gyro[known])
+    noise = stated if told is None else told.size
+    left = float(np.var(gyro[known] - shown[known])) - noise**2
+    return left < 0.5 * max(float(np.var(shown[known])), (_STILL * noise) ** 2)
+
+
+def _of_gyro() -> Iterator[Fault]:
+    """Reversed, or of another unit."""
+
+    def times(factor: float) -> Change:
+        return lambda recording, settings: (replace(recording, gyro=factor * recording.gyro), settings)
+
+    text = "gyro looks reversed, it is positive nose-up: write sign = -1 for it in the map"
+    yield Fault(Finding("sign_suspect", text), times(-1.0))
+    for factor, (looks, taken) in _GYRO_UNITS.items():
+        text = f"gyro looks to be in {looks}, taken for {taken}: correct its unit in the header or the map"
+        yield Fault(Finding("unit_suspect", text), times(factor))
+
+
+def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Fault]:
+    """A gyro that is late, or one that tells of something else than pitch."""
+    if settings.timing.gyro_delay is not None:
+        found = relative_delay(recording, settings.layout)
+        shift = 0.0 if found is None else found.value - settings.timing.gyro_delay
+        if found is not None and abs(shift) > 5.0 * found.u:
+            value = f"{1e3 * found.value:.2g} ms"
+            how = "later" if shift > 0.0 else "earlier"
+            text = (
+                f"gyro comes {1e3 * abs(shift):.2g} ms {how} than the accelerometers and the study say: write "
+                f'gyro_delay = "{value}" or "estimate" under [timing]'
+            )
+            yield Fault(Finding("command_shift", text), lambda r, s: (aligned(r, shift), s))
+    if _follows(recording, shown, settings.noise.gyro):
+        return
+    text = (
+        "gyro does not tell of the pitch that the accelerometers show: it may look along another axis, or be another "
+        "channel or on another clock"
+    )
+    none = np.full_like(recording.gyro, np.nan)
+    yield Fault(Finding("channel_swap", text), lambda r, s: (replace(r, gyro=none), s), last=True)
+
+
+def _of_turns() -> Iterator[Fault]:
+    """Gyros for roll and yaw reversed, exchanged, or both of another unit."""
+
+    def times(factors: tuple[float, float], order: tuple[int, int] = (0, 1)) -> Change:
+        return lambda recording, settings: (
+            replace(recording, turns=recording.turns[:, order] * np.array(factors)),
+            settings,
+        )
+
+    for name, signs in (("gyro_roll", (-1.0, 1.0)), ("gyro_yaw", (1.0, -1.0))):
+        text = f"{name} looks reversed, it is right-handed about {'x forward' if signs[0] < 0.0 else 'z up'}: write "
+        yield Fault(Finding("sign_suspect", f"{text}sign = -1 for it in the map"), times(signs))
+    text = "gyro_roll and gyro_yaw look exchanged: exchange their columns in the map"
+    yield Fault(Finding("channel_swap", text), times((1.0, 1.0), (1, 0)))
+    for factor, (looks, taken) in list(_GYRO_UNITS.items())[:2]:
+        text = f"gyro_roll and gyro_yaw look to be in {looks}, taken for {taken}: correct their unit"
+        yield Fault(Finding("unit_suspect", text), times((factor, factor)))
+
+
+def _scaled(columns: list[int], factor: float) -> Change:
+    """Accelerometers times a factor."""
+
+    def change(recording: Recording, settings: AoaSettings) -> tuple[Recording, AoaSettings]:
+        acc = recording.acc.copy()
+        acc[:, columns] *= factor
+        return replace(recording, acc=acc), settings
+
+    return change
+
+
+def _reversed(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+    """Accelerometers that look the other way."""
+    opposite = {"+x": "-x", "-x": "+x", "+z": "-z", "-z": "+z"}
+    for k in there:
+        name, angle = settings.layout.names[k], float(settings.layout.angle[k])
+        axis = next((text for text, of in AXES.items() if abs(of - angle) < 1e-6), None)
+        other = f'angle = "{math.degrees(angle) + 180.0:.4g} deg"' if axis is None else f'"{opposite[axis]}"'
+        what = other if axis is None else f"axis = {other}"
+        text = f"{name} looks reversed: write sign = -1 for it in the map, or {what} in the study"
+        yield Fault(Finding("sign_suspect", text), _scaled([k], -1.0))
+
+
+def _orders(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+    """Accelerometers exchanged."""
+    names = settings.layout.names
+    if math.factorial(len(there)) <= _MOST_ORDERS:
+        orders = list(itertools.permutations(there))
+    else:
+        orders = [
+            tuple(b if k == a else a if k == b else k for k in there)
+            for a, b in itertools.combinations(there, 2)
+        ]
+    for order in orders:
+        moved = [(a, b) for a, b in zip(there, order, strict=True) if a != b]
+        if not moved:
+            continue
+        if len(moved) == 2:
+            what = f"{names[moved[0][0]]} and {names[moved[0][1]]} look exchanged"
+        else:
+            # the column of b holds what belongs to a
+            what = ", ".join(f"{names[b]} looks like {names[a]}" for a, b in moved)
+        text = f"{what}: correct their columns in the map, or their axes and positions in the study"
+        yield Fault(Finding("channel_swap", text), _ordered(there, order))
+
+
+def _ordered(there: list[int], order: tuple[int, ...]) -> Change:
+    """Accelerometers in another order."""
+
+    def change(recording: Recording, settings: AoaSettings) -> tuple[Recording, AoaSettings]:
+        acc = recording.acc.copy()
+        acc[:, there] = recording.acc[:, list(order)]
+        return replace(recording, acc=acc), settings
+
+    return change
+
+
+def _units(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+    """All accelerometers, or one, of another unit."""
+    for columns in (there, *([k] for k in there)) if len(there) > 1 else (there,):
+        names = ", ".join(settings.layout.names[k] for k in columns)
+        look, their = ("looks", "its") if len(columns) == 1 else ("look", "their")
+        for factor, (looks, taken) in _ACCELEROMETER_UNITS.items():
+            text = f"{names} {look} to be in {looks}, taken for {taken}: correct {their} unit in the header or the map"
+            yield Fault(Finding("unit_suspect", text), _scaled(columns, factor))
+
+
+def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+    """Positions of another unit, or counted backwards."""
+    layout = settings.layout
+    if not np.any(layout.r):
+        return
+
+    def times(factor: Array | float, of_height: float = 1.0) -> Change:
+        def change(recording: Recording, settings: AoaSettings) -> tuple[Recording, AoaSettings]:
+            moved = replace(settings.layout, r=settings.layout.r * factor, z=settings.layout.z * of_height)
+            return recording, replace(settings, layout=moved)
+
+        return change
+
+    example = int(np.argmax(np.abs(layout.r)))
+    for factor, (looks, taken) in _LENGTHS.items():
+        likely, then_likely = (
+            _SHORTEST < abs(r) < _LONGEST for r in (layout.r[example], factor * layout.r[example])
+        )
+        # mm and cm are both likely
+        if not then_likely or (likely and factor not in (1e-1, 1e1)):
+            continue
+        now, then = f"{layout.r[example]:g} m", f"{factor * layout.r[example]:g} m"
+        text = (
+            f"the positions r of the accelerometers look to be in {looks}, taken for {taken}: write them with their "
+            f'unit, for {layout.names[example]} "{then}" in the place of "{now}"'
+        )
+        yield Fault(Finding("unit_suspect", text), times(factor, factor))
+    text = "the positions r of all accelerometers look reversed, they are positive ahead of the pivot"
+    yield Fault(Finding("sign_suspect", text), times(-1.0))
+    for k in there:
+        if layout.r[k] != 0.0:
+            text = f'the position r of {layout.names[k]} looks reversed: write r = "{-layout.r[k]:g} m"'
+            signs = np.where(np.arange(len(layout.r)) == k, -1.0, 1.0)
+            yield Fault(Finding("sign_suspect", text), times(signs))

@@ -1,0 +1,104 @@
+"""The noise that sensors show, told from their motion by differences of high order."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+from inercal.findings import Finding
+from inercal.units import STANDARD_GRAVITY
+
+_ORDER = 6
+_STEADY = 0.5
+"""Part of the mean square by the last order that must be noise for it to count."""
+
+_MORE, _LESS, _NONE = 2.0, 0.5, 1e-3
+"""Ratios to what is stated from which it is worth a word, and below which there is none, as in numbers made up."""
+
+_EVEN = 0.02
+"""Part of an interval by which others may differ."""
+
+_FEWEST = 20
+"""Differences from which noise is told."""
+
+_SPARSE = 4
+"""Rows of which one is taken to see whether noise that is small from row to row is so over some rows too."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Noise of a sensor, standard deviation [SI] from row to row: ``size``, and whether it is noise for ``certain`` and
+    not motion; ``sparse`` the same over every fourth row."""
+
+    size: float
+    certain: bool
+    sparse: float
+
+
+def scatter(t: Array, values: Array) -> Scatter | None:
+    """Noise of ``values`` (n,) at ``t`` (n,) [s]; None where hardly any come at even intervals.
+
+    White noise shows alike in all orders, motion below a quarter of the sample rate from one order to the next at most
+    half in the square, so that s6^2 - (s5^2 - s6^2) is noise at least.
+    """
+    sizes = _by_order(t, values)
+    if sizes is None:
+        return None
+    least = 2.0 * sizes[-1] ** 2 - sizes[-2] ** 2
+    certain = least > _STEADY * sizes[-1] ** 2
+    sparse = _by_order(t[::_SPARSE], values[::_SPARSE]) or sizes
+    return Scatter(math.sqrt(least) if certain else min(sizes), certain, min(sparse))
+
+
+def _by_order(t: Array, values: Array) -> list[float] | None:
+    """Noise by the median difference of each order, from the first; of white noise the same for all.
+
+    Differences of the last order are zero for motion alone where the intervals are alike, so others are left out.
+    """
+    there = np.isfinite(values)
+    known, step = values[there], np.diff(t[there])
+    even = (
+        np.abs(step - np.median(step)) < _EVEN * np.median(step) if len(step) else np.zeros(0, dtype=np.bool_)
+    )
+    runs = even
+    found = []
+    for order in range(1, _ORDER + 1):
+        known = np.diff(known)
+        runs = even if order == 1 else runs[:-1] & even[order - 1 :]
+        if runs.sum() < _FEWEST:
+            return None
+        found.append(float(np.median(np.abs(known[runs]))) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
+    return found
+
+
+def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding], AoaSettings]:
+    """``excess_scatter`` and ``low_scatter``: noise unlike the study's; and the study with noise not too small."""
+    noise, names = settings.noise, settings.layout.names
+    columns = {name: recording.acc[:, k] for k, name in enumerate(names)}
+    groups = (("accelerometer", columns, noise.accelerometer), ("gyro", {"gyro": recording.gyro}, noise.gyro))
+    findings = []
+    for key, sensors, stated in groups:
+        told = {name: scatter(recording.t, values) for name, values in sensors.items() if stated > 0.0}
+        seen = {name: each for name, each in told.items() if each is not None}
+        over = {name: each.size / stated for name, each in seen.items() if each.certain}
+        under = {name: max(each.size, each.sparse) / stated for name, each in seen.items() if each.size > 0.0}
+        if loud := [name for name, ratio in over.items() if ratio > _MORE]:
+            most = max(over.values())
+            findings.append(_finding("excess_scatter", key, loud, most, stated))
+            settings = replace(settings, noise=replace(settings.noise, **{key: most * stated}))
+        elif under and _NONE < max(under.values()) < _LESS:
+            findings.append(_finding("low_scatter", key, list(under), max(under.values()), stated))
+    return findings, settings
+
+
+def _finding(code: str, key: str, names: list[str], ratio: float, stated: float) -> Finding:
+    """Noise in words."""
+    unit, size = ("g", STANDARD_GRAVITY) if key == "accelerometer" else ("deg/s", math.pi / 180.0)
+    now, then = f"{stated / size:.3g} {unit}", f"{ratio * stated / size:.2g} {unit}"
+    text = f"{', '.join(names)}: noise is {ratio:.2g} times the {now} that the study states: write {key} = "
+    return Finding(code, f'{text}"{then}" under [noise], unless its unit is wrong')

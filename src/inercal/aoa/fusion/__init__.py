@@ -1,0 +1,1 @@
+"""The filter of all sensors, and its smoother."""

@@ -1,0 +1,228 @@
+"""The fusion while a model is measured: samples or blocks of them in, angles out, to the digits of the whole record.
+
+The first rows are held until the filter can start (`inercal.aoa.reading.clock.HELD`), and where theta is lost rows are
+held again: their angles then come all at once. A row that is not later than those before it has no angle, as in
+`inercal.aoa.reading.clock`; every row is answered, in the order in which it came.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion import run as fusion
+from inercal.aoa.fusion.filter_result import roll_of
+from inercal.aoa.fusion.loop import BESIDE, OUTPUTS
+from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.reading.clock import PATIENCE, later
+from inercal.aoa.reading.recording import Recording
+from inercal.arrays import Array
+from inercal.errors import RecordError
+
+
+class LiveState(NamedTuple):
+    """What is known after a row: a state in the sense of `inercal.estimate.checkpoint`.
+
+    ``fusion`` is the state of the filter, ``waiting`` (j,) [s] the stamps of the rows that are not answered yet, and
+    ``late`` how many of the last rows in a row were not later than those before.
+    """
+
+    fusion: fusion.State
+    waiting: Array
+    late: int
+
+
+class Told(NamedTuple):
+    """What is said of k rows: their stamps ``t`` (k,) [s], and ``out`` (k, `OUTPUTS` + N + 1) as of
+    `inercal.aoa.fusion.loop.advance`, NaN where nothing is known; ``turned`` (k, 2) roll and its standard uncertainty
+    [rad] where it is estimated."""
+
+    t: Array
+    out: Array
+    turned: Array | None = None
+
+    @property
+    def theta(self) -> Array:
+        """(k,) rad."""
+        return self.out[:, 0]
+
+    @property
+    def u(self) -> Array:
+        """(k,) rad, the standard uncertainty of theta."""
+        return self.out[:, 1]
+
+    @property
+    def rate(self) -> Array:
+        """(k,) rad/s."""
+        return self.out[:, 2]
+
+    @property
+    def rate_u(self) -> Array:
+        """(k,) rad/s, the standard uncertainty of the rate."""
+        return self.out[:, 3]
+
+    @property
+    def roll(self) -> Array | None:
+        """(k,) rad."""
+        return None if self.turned is None else self.turned[:, 0]
+
+    @property
+    def roll_u(self) -> Array | None:
+        """(k,) rad, the standard uncertainty of the roll."""
+        return None if self.turned is None else self.turned[:, 1]
+
+    @property
+    def innovations(self) -> Array:
+        """(k, N + 1) of accelerometers and gyro, each over its standard deviation before the gate."""
+        return self.out[:, OUTPUTS:]
+
+
+class Live:
+    """The causal fusion, fed with samples; gives the digits of `inercal.aoa.fusion.filter_result.estimate` on all of
+    them.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : LiveState, optional
+        Where an earlier one was left, of the same problem; from nothing if absent.
+    where : object
+        What to call the samples in errors.
+
+    Examples
+    --------
+    >>> live = Live(problem(settings))
+    >>> for t, acceleration, gyro in samples:
+    ...     told = live.feed(t, acceleration, gyro)
+    """
+
+    def __init__(self, problem: Problem, state: LiveState | None = None, where: object = "t") -> None:
+        self._problem, self._where = problem, where
+        known = LiveState(fusion.initial(problem), np.empty(0), 0) if state is None else state
+        self._fusion, self._waiting, self._late = _apart(known.fusion), known.waiting, known.late
+        self._dt, self._row = np.empty(1), np.empty((1, problem.count + BESIDE))
+        self._out = np.empty((1, OUTPUTS + problem.count + 1))
+        self._kept = np.empty((int(problem.spatial), 2 * problem.size))
+
+    @property
+    def state(self) -> LiveState:
+        """What is known now, apart from what comes."""
+        return LiveState(_apart(self._fusion), self._waiting, self._late)
+
+    def feed(
+        self,
+        t: float,
+        acceleration: Array,
+        gyro: float = math.nan,
+        roll: float = math.nan,
+        yaw: float = math.nan,
+        stated: float = math.nan,
+        stated_u: float = math.nan,
+    ) -> Told:
+        """Go on by one sample; what is said of it, of none while rows are held, and of all that were held after that.
+
+        Parameters
+        ----------
+        t : float
+            Stamp [s].
+        acceleration : (N,) m/s^2
+            Accelerometers in the order of the layout; NaN where missing or saturated.
+        gyro, roll, yaw : float
+            Rates [rad/s]; nose-up, about x, about z.
+        stated, stated_u : float
+            An angle that is known [rad], and its standard uncertainty.
+
+        Raises
+        ------
+        RecordError
+            Time does not go on.
+        """
+        problem, state, row, n = self._problem, self._fusion, self._row, self._problem.count
+        row[0, :n] = acceleration
+        row[0, n], row[0, n + 1], row[0, n + 2], row[0, n + 3], row[0, n + 4] = (
+            gyro, stated, stated_u, roll, yaw,
+        )  # fmt: skip
+        if not (state.started and t > state.t):
+            return self._block(np.array([t]), row.copy())
+        self._dt[0] = t - state.t
+        if steps := fading.due(state.t, t, state.since):
+            fading.fade(state.x, state.P, problem, steps)
+        done = loop.advance(
+            state.x, state.P, state.turns, self._dt, row, problem.geometry, problem.places, problem.constants,
+            self._out, self._kept, 1, 0,
+        )  # fmt: skip
+        stamp = np.array([t])
+        self._late = 0
+        if not done:  # theta is lost
+            self._fusion = state._replace(started=False, held=np.column_stack([stamp, row]))
+            self._waiting = stamp
+            return Told(stamp[:0], self._out[:0], self._turned(self._kept[:0]))
+        self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held, state.since)
+        return Told(stamp, self._out.copy(), self._turned(self._kept))
+
+    def feed_block(self, recording: Recording) -> Told:
+        """Go on by the rows of a recording, any number of them, as `feed` does."""
+        return self._block(recording.t, recording.rows)
+
+    def finish(self) -> Told:
+        """What is said of the rows that are still held: the record ends here."""
+        return self._block(np.empty(0), np.empty((0, self._problem.count + BESIDE)), last=True)
+
+    def _block(self, t: Array, rows: Array, last: bool = False) -> Told:
+        """Go on by the rows of ``t`` (m,) [s] and ``rows`` (m, N + 5)."""
+        before = self._fusion
+        waiting = np.append(self._waiting, t)
+        taken = later(waiting, before.t, self._where)
+        self._late = self._late_rows(waiting, taken)
+        new = taken[len(before.held) :] - len(self._waiting)
+        spatial = self._problem.spatial
+        kept = np.full((spatial * (len(before.held) + len(new)), 2 * self._problem.size), np.nan)
+        self._fusion, trace = fusion.advance(before, self._problem, t[new], rows[new], kept, last=last)
+        done = len(trace.out)
+        answered = int(taken[done]) if done < len(taken) else len(waiting)
+        out = np.full((answered, trace.out.shape[1]), np.nan)
+        out[taken[:done]] = trace.out
+        states = np.full((answered, kept.shape[1]), np.nan)
+        if spatial:
+            states[taken[:done]] = kept[:done]
+        self._waiting = waiting[answered:]
+        return Told(waiting[:answered], out, self._turned(states))
+
+    def _turned(self, states: Array) -> Array | None:
+        """Roll and its standard uncertainty (k, 2) of states (k, 2 n); None where it is not estimated."""
+        return roll_of(self._problem, states) if self._problem.spatial else None
+
+    def _late_rows(self, waiting: Array, taken: NDArray[np.int64]) -> int:
+        """How many of the last rows were not taken; raises `RecordError` where the clock was set back."""
+        if taken.size:
+            late = self._late + int(taken[0])
+            rest = len(waiting) - 1 - int(taken[-1])
+        else:
+            late = rest = self._late + len(waiting)
+        if late >= PATIENCE:
+            raise RecordError(
+                self._where,
+                f"t: {late} rows in a row are not later than {self._fusion.t:.10g} s, the last at "
+                f"{waiting[-1]:.10g} s, expected time to increase",
+            )
+        return rest
+
+
+def load_kernels(problem: Problem) -> None:
+    """Load, or compile, the kernels of the causal fusion."""
+    none = np.empty(0)
+    rows = np.empty((0, problem.count + BESIDE))
+    loop.advance(
+        problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3), none, rows,
+        problem.geometry, problem.places, problem.constants, np.empty((0, OUTPUTS + problem.count + 1)),
+        np.empty((0, 2 * problem.size)), 1, 0,
+    )  # fmt: skip
+
+
+def _apart(state: fusion.State) -> fusion.State:
+    """The same state in arrays of its own."""
+    return state._replace(x=state.x.copy(), P=state.P.copy(), turns=state.turns.copy())

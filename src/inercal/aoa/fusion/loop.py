@@ -1,0 +1,345 @@
+"""The loop of the causal filter, compiled and free of allocation.
+
+A row is predicted, then updated by one scalar after the other: accelerometers in their order, the gyro, and an angle
+that is stated, all linearised at the prediction. (Relinearised at the state that the scalars before have made of it, a
+row multiplies their noise by its own, and the filter is surer than it may be: with axes at odd angles by a factor of
+six.) An innovation v that is larger than five standard deviations enlarges its own variance, S = v^2 / 25: it pulls the
+less the larger it is, while a gate that shuts would lock the filter out for good once it is off. Where some of the
+sensors agree with what is wrong, as after a shock, that pull can be too little all the same. So where one sensor has
+surprised by twice as much in each of a long row of rows, theta is found anew.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal._jit import kernel
+from inercal.aoa.fusion.model import (
+    COMMON_DELAY,
+    COMMON_DELAY_U,
+    COUNT,
+    GATE,
+    HEIGHTS,
+    LEVERS,
+    MOVING,
+    ROLL,
+    ROWS,
+    SCALE,
+    STATES,
+    WIDEST,
+    accelerometer,
+    gyro,
+    transition,
+    turning,
+)
+
+Array: TypeAlias = NDArray[np.float64]
+Indices: TypeAlias = NDArray[np.int64]
+
+LOST = 0.09
+"""Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
+
+_TURNS = 1e3
+"""An angle [rad] that is no model's."""
+
+OUTPUTS = 5
+"""Columns of a row of output before the innovations: theta, its u, rate, its u, acceleration."""
+
+BESIDE = 5
+"""Columns of a row of measurements after the accelerometers: gyro, an angle that is stated and its u, roll and yaw."""
+
+PATIENCE = 500
+"""Rows in a row in which a sensor surprises by twice what the gate lets through, after which theta counts as lost: half
+a second at 1 kHz, longer than what a small wrong model leaves of one sign, as 5 mm of a height at 1 Hz."""
+
+_READING = 1e100
+"""What no sensor reads: from here on it counts as missing, as what is no number does."""
+
+_EVEN = 1e-9
+
+
+class Memory(NamedTuple):
+    """What a filter remembers of the rows of a block (b,) for a smoother; of none for b = 0.
+
+    ``steps`` (b, d, d) the transposed transition of the states that move to each row; ``known`` (b, n + 1, n) the state
+    after the row, and its covariance; ``scalars`` (b, N + 2, 2 n + 2) of each scalar its row h, P h^T, the innovation v
+    and the variance S used, 0 where it was left out.
+    """
+
+    steps: Array
+    known: Array
+    scalars: Array
+
+
+def memory(block: int, states: int, moving: int, count: int) -> Memory:
+    """A memory of ``block`` rows, of so many states, of those that move, and of accelerometers."""
+    return Memory(
+        np.empty((block, moving, moving)),
+        np.empty((block, states + 1, states)),
+        np.empty((block, count + 2, 2 * states + 2)),
+    )
+
+
+NONE = memory(0, 0, 0, 0)
+
+
+@kernel
+def step_of(dt: float) -> float:
+    """An interval [s] to the nanosecond, so that stamps that are even but for their rounding are."""
+    return round(dt / _EVEN) * _EVEN
+
+
+@kernel
+def congruent(P: Array, places: Indices, F: Array, Q: Array, work: Array) -> None:
+    """F P F^T + Q in the place of P (n, n), symmetric to the last digit; ``work`` (d, n) is used up.
+
+    ``F`` and ``Q`` (d, d) are of the states that move alone; the others stay as they are.
+    """
+    n, d = len(P), len(F)
+    for i in range(d):
+        f, a = F[i, i], places[ROWS + i]
+        for k in range(n):
+            work[i, k] = f * P[a, k]
+        for j in range(d):
+            f, a = F[i, j], places[ROWS + j]
+            if f != 0.0 and j != i:
+                for k in range(n):
+                    work[i, k] += f * P[a, k]
+    for i in range(d):
+        a = places[ROWS + i]
+        for k in range(n):
+            P[a, k] = work[i, k]
+            P[k, a] = work[i, k]
+    # the columns of the moving states among themselves
+    for i in range(d):
+        for j in range(i + 1):
+            total = Q[i, j]
+            for k in range(d):
+                total += work[i, places[ROWS + k]] * F[j, k]
+            a, b = places[ROWS + i], places[ROWS + j]
+            P[a, b], P[b, a] = total, total
+
+
+@kernel
+def go_on(
+    x: Array, P: Array, dt: float, p: float, y: float, places: Indices, constants: Array, F: Array, Q: Array,
+    base: float, work: Array,
+) -> None:  # fmt: skip
+    """The state and its covariance after ``dt``."""
+    d, theta, phi = len(F), 0.0, 0.0
+    if places[ROLL] >= 0:
+        theta, phi = turning(x, dt, p, y, places, constants, F, Q, base)
+    congruent(P, places, F, Q, work)
+    for i in range(d):
+        work[0, i] = 0.0
+        for j in range(d):
+            work[0, i] += F[i, j] * x[places[ROWS + j]]
+    for i in range(d):
+        x[places[ROWS + i]] = work[0, i]
+    if places[ROLL] >= 0:
+        x[0], x[places[ROLL]] = theta, phi
+
+
+@kernel
+def update(
+    P: Array, x: Array, v: float, count: int, at: Indices, row: Array, noise: float, gate: float, work: Array
+) -> tuple[float, float]:
+    """Update by one scalar, in place: innovation ``v``, of variance h P h^T + ``noise`` = S.
+
+    ``at[:count]`` and ``row[:count]`` hold h. ``work`` (n,) receives P h^T. Returns v over the root of S, and the S
+    that was used, enlarged to v^2 / ``gate`` where v^2 is larger than ``gate`` S; 0 where S is not above zero.
+    """
+    n = len(x)
+    for i in range(n):
+        work[i] = 0.0
+    for a in range(count):
+        h, k = row[a], at[a]
+        for i in range(n):
+            work[i] += h * P[k, i]
+    variance = noise
+    for a in range(count):
+        variance += row[a] * work[at[a]]
+    if not variance > 0.0:
+        return math.nan, 0.0
+    surprise = v / math.sqrt(variance)
+    if v * v > gate * variance:
+        variance = v * v / gate
+    gain = v / variance
+    for i in range(n):
+        x[i] += gain * work[i]
+    inverse = 1.0 / variance
+    for i in range(n):
+        for j in range(n):
+            # in this order it is symmetric to the last digit
+            P[i, j] -= work[i] * work[j] * inverse
+    return surprise, variance
+
+
+@kernel
+def row_of(
+    i: int, x: Array, s: float, c: float, z: Array, k: int, geometry: Array, places: Indices, constants: Array,
+    p: float, y: float, at: Indices, row: Array,
+) -> tuple[float, int, float]:  # fmt: skip
+    """Scalar ``i`` of row ``k`` of measurements: what it should read, entries of its row, its variance.
+
+    ``s``, ``c`` are sine and cosine of theta in ``x``.
+    """
+    n = places[COUNT]
+    if i < n:
+        return accelerometer(x, s, c, i, geometry, places, constants, p, y, at, row)
+    if i == n:
+        return gyro(x, places, constants, at, row)
+    at[0], row[0] = 0, 1.0
+    return x[0], 1, z[k, n + 2] * z[k, n + 2]
+
+
+@kernel
+def root(variance: float) -> float:
+    """Standard deviation; 0 where rounding has made a variance negative, NaN where there is none."""
+    return 0.0 if variance <= 0.0 else math.sqrt(variance)
+
+
+@kernel
+def told(value: float, variance: float) -> float:
+    """How much of a rate or an acceleration is more than noise, 0 to 1: 1 - 9 P / x^2, none below three deviations."""
+    squared = value * value  # which may be zero where the value is not
+    return max(0.0, 1.0 - 9.0 * variance / squared) if squared > 0.0 else 0.0
+
+
+@kernel
+def believed(
+    at: Indices, row: Array, entries: int, places: Indices, of_rate: float, of_acceleration: float
+) -> None:
+    """Take from a row what it says of positions and of the gyro's scale by a motion that is but noise.
+
+    They multiply rate and acceleration. Of a model at rest the filter would learn them from the noise of these, and be
+    sure of what is not so.
+    """
+    count, moved = places[COUNT], max(of_rate, of_acceleration)
+    for a in range(entries):
+        for b in (LEVERS, HEIGHTS):
+            if places[b] >= 0 and places[b] <= at[a] < places[b] + count:
+                row[a] *= moved
+        if places[SCALE] >= 0 and at[a] == places[SCALE]:
+            row[a] *= of_rate
+
+
+@kernel
+def write(x: Array, P: Array, constants: Array, out: Array, k: int) -> None:
+    """Put theta, u, rate, u, acceleration at the stamp into row ``k``: later by a common delay than the sensors."""
+    tau, u = constants[COMMON_DELAY], constants[COMMON_DELAY_U]
+    out[k, 0] = x[0] + tau * x[1] + 0.5 * tau * tau * x[2]
+    out[k, 2] = x[1] + tau * x[2]
+    out[k, 4] = x[2]
+    theta = P[0, 0] + 2.0 * tau * P[0, 1] + tau * tau * P[1, 1] + out[k, 2] * out[k, 2] * u * u
+    rate = P[1, 1] + 2.0 * tau * P[1, 2] + tau * tau * P[2, 2] + x[2] * x[2] * u * u
+    out[k, 1] = root(theta)
+    out[k, 3] = root(rate)
+
+
+def advance(
+    x: Array, P: Array, turns: Array, dt: Array, z: Array, geometry: Array, places: Indices, constants: Array,
+    out: Array, kept: Array, every: int, first: int, remembered: Memory = NONE,
+) -> int:  # fmt: skip
+    """Go on by the rows of ``dt`` (m,) [s] and ``z`` (m, N + 5); the number of rows done.
+
+    ``x`` (n,), ``P`` (n, n) and ``turns`` (N + 3,) are changed in place; ``turns`` are the last indications of the roll
+    and yaw gyros, and the rows in a row in which each accelerometer and the gyro surprised. A row of ``z`` holds the
+    accelerometers [m/s^2], the gyro [rad/s], an angle stated and its standard uncertainty [rad], roll and yaw gyros
+    [rad/s]; NaN where not measured. ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over
+    their standard deviations. ``kept`` (k, 2 n) receives x and its standard deviations at each ``every``-th row,
+    counted from ``first``; none for 0 rows. ``remembered`` is filled if it has room for m rows.
+
+    Ends before a row in which theta is lost: its variance is over `LOST`, it is no angle any more, or a sensor has
+    surprised `PATIENCE` times.
+    """
+    steps, known, scalars = remembered
+    done: int = _advance(
+        x, P, turns, dt, z, geometry, places, constants, out, kept, every, first, steps, known, scalars
+    )
+    return done
+
+
+@kernel
+def _advance(
+    x: Array, P: Array, turns: Array, dt: Array, z: Array, geometry: Array, places: Indices, constants: Array,
+    out: Array, kept: Array, every: int, first: int, steps: Array, known: Array, scalars: Array,
+) -> int:  # fmt: skip
+    """The loop of `advance`."""
+    n, d, m, count = places[STATES], places[MOVING], len(dt), places[COUNT]
+    work, line = np.empty((d, n)), np.empty(n)
+    F, Q = np.empty((d, d)), np.empty((d, d))
+    at, row, ahead = np.empty(WIDEST, np.int64), np.empty(WIDEST), np.empty(n)
+    last, base, spatial, remember = -1.0, 0.0, places[ROLL] >= 0, len(steps) > 0
+    surprised = False
+    for i in range(count + 1):
+        surprised = surprised or turns[2 + i] >= PATIENCE
+    for k in range(m):
+        step = step_of(dt[k])
+        p, y = 0.0, 0.0
+        if spatial:
+            p, y = turned(turns, z, k, count)
+        if step != last:
+            transition(step, places, constants, F, Q)
+            last, base = step, Q[0, 0]
+        if step > 0.0:
+            go_on(x, P, step, p, y, places, constants, F, Q, base, work)
+        if surprised or not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
+            return k
+        if spatial:
+            p, y = turns[0], turns[1]
+        for i in range(n):
+            ahead[i] = x[i]
+        sine, cosine = math.sin(x[0]), math.cos(x[0])
+        of_rate, of_acceleration = told(x[1], P[1, 1]), told(x[2], P[2, 2])
+        for i in range(count + 2):
+            surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
+            if abs(z[k, i]) < _READING:
+                expected, entries, noise = row_of(
+                    i, ahead, sine, cosine, z, k, geometry, places, constants, p, y, at, row
+                )
+                believed(at, row, entries, places, of_rate, of_acceleration)
+                v = z[k, i] - expected
+                for a in range(entries):
+                    v -= row[a] * (x[at[a]] - ahead[at[a]])
+                surprise, variance = update(P, x, v, entries, at, row, noise, constants[GATE], line)
+                if i <= count:
+                    turns[2 + i] = turns[2 + i] + 1.0 if surprise * surprise > 4.0 * constants[GATE] else 0.0
+                    surprised = surprised or turns[2 + i] >= PATIENCE
+            if i <= count:
+                out[k, OUTPUTS + i] = surprise
+            if remember:
+                for j in range(n):
+                    scalars[k, i, j], scalars[k, i, n + j] = 0.0, line[j]
+                for j in range(entries):
+                    scalars[k, i, at[j]] = row[j]
+                scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
+        write(x, P, constants, out, k)
+        if remember:
+            for i in range(d):
+                for j in range(d):
+                    steps[k, i, j] = F[j, i]
+            for i in range(n):
+                known[k, 0, i] = x[i]
+                for j in range(n):
+                    known[k, i + 1, j] = P[i, j]
+        if len(kept) > 0 and (first + k) % every == 0:
+            for i in range(n):
+                kept[(first + k) // every, i] = x[i]
+                kept[(first + k) // every, n + i] = root(P[i, i])
+    return m
+
+
+@kernel
+def turned(turns: Array, z: Array, k: int, count: int) -> tuple[float, float]:
+    """Rates of roll and yaw over the step to row ``k``: the mean of both ends; ``turns`` goes on to the row."""
+    p, y = turns[0], turns[1]
+    if not math.isnan(z[k, count + 3]):
+        turns[0] = z[k, count + 3]
+    if not math.isnan(z[k, count + 4]):
+        turns[1] = z[k, count + 4]
+    return 0.5 * (p + turns[0]), 0.5 * (y + turns[1])

@@ -1,0 +1,225 @@
+"""The causal fusion, row by row or in blocks: the same digits either way.
+
+The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
+as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors; with
+the prior where it was lost because sensors did not cease to contradict it. Over hours what it learned fades
+(`inercal.aoa.fusion.fading`).
+Rows must be later than those before them: `inercal.aoa.reading.clock` leaves out those that are not.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion.loop import BESIDE, OUTPUTS
+from inercal.aoa.fusion.model import GRAVITY, GYRO_BIAS, RESONATORS, ROLL, ROLL_COSINE
+from inercal.aoa.fusion.problem import START, Problem
+from inercal.aoa.reading.clock import HELD
+from inercal.arrays import Array
+
+_ACROSS = 0.1
+"""Cosine of the roll below which the accelerometers across the body and the gyro do not show pitch."""
+
+_NO_ARM = 1e-3
+"""Lever arm [m] below which accelerometers do not show angular acceleration."""
+
+
+class State(NamedTuple):
+    """What the filter knows between two rows.
+
+    ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (N + 3,) as of
+    `inercal.aoa.fusion.loop.advance`; ``t`` [s] of the last row, -inf before the first; ``started``: the filter runs.
+    Until it does ``held`` (k, N + 6) are the rows that wait, time first. ``since`` [s] is the row from which it has
+    learned, NaN before.
+    """
+
+    x: Array
+    P: Array
+    turns: Array
+    t: float
+    started: bool
+    held: Array
+    since: float
+
+
+class Start(NamedTuple):
+    """Where the filter started: the row, counted in the trace, its state before that row's update, whether all of it is
+    of the prior, as at first and after surprises that did not end, and the stamp [s] from which it has learned."""
+
+    row: int
+    x: Array
+    P: Array
+    turns: Array
+    anew: bool
+    since: float
+
+
+class Trace(NamedTuple):
+    """What the filter says of m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.fusion.loop.advance`, and where
+    it ``starts`` in them."""
+
+    out: Array
+    starts: tuple[Start, ...]
+
+
+def initial(problem: Problem) -> State:
+    """Before the first row."""
+    none = np.empty((0, problem.count + BESIDE + 1))
+    return State(
+        problem.mean.copy(),
+        problem.covariance.copy(),
+        np.zeros(problem.count + 3),
+        -math.inf,
+        False,
+        none,
+        math.nan,
+    )
+
+
+def advance(
+    state: State,
+    problem: Problem,
+    t: Array,
+    rows: Array,
+    kept: Array | None = None,
+    every: int = 1,
+    last: bool = False,
+) -> tuple[State, Trace]:
+    """Go on by rows at the times ``t`` (m,) [s], increasing; ``rows`` (m, N + 5) as of
+    `inercal.aoa.fusion.loop.advance`.
+
+    The state handed in is used up. Rows that are held have no row in the trace yet: it comes with a later block, or at
+    the end, which ``last`` says. ``kept`` receives states and their standard deviations at each ``every``-th row of the
+    trace.
+    """
+    if kept is None:
+        kept = np.empty((0, 2 * problem.size))
+    if len(state.held):
+        t, rows = np.append(state.held[:, 0], t), np.vstack([state.held[:, 1:], rows])
+    rows = np.ascontiguousarray(rows)
+    m, at = len(t), 0
+    out = np.empty((m, OUTPUTS + problem.count + 1))
+    x, P, turns, before, running, _, since = state
+    dt, starts = np.diff(t, prepend=before), []
+    while at < m:
+        if not running:
+            end = min(at + HELD, m)
+            if end - at < HELD and not last:
+                break
+            out[at:end] = np.nan
+            anew = bool((turns[2:] >= loop.PATIENCE).any())
+            if anew:  # neither is to be believed what was learned of the sensors
+                x[:], P[:] = problem.mean, problem.covariance
+            if not start(x, P, turns, problem, t[at:end], rows[at:end]):
+                at = end
+                continue
+            since = float(t[at]) if anew or math.isnan(since) else since
+            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew, since))
+            dt[at] = 0.0
+        elif steps := fading.due(float(t[at - 1]) if at else before, float(t[at]), since):
+            fading.fade(x, P, problem, steps)
+        stop = fading.next_due(t, at, since)
+        done = loop.advance(
+            x,
+            P,
+            turns,
+            dt[at:stop],
+            rows[at:stop],
+            problem.geometry,
+            problem.places,
+            problem.constants,
+            out[at:stop],
+            kept,
+            every,
+            at,
+        )
+        # what is lost in the row in which it started is no angle
+        at, running = (at + done, at + done == stop) if done or running else (end, False)
+    before = float(t[at - 1]) if at else before
+    held = np.column_stack([t[at:], rows[at:]])
+    return State(x, P, turns, before, running, held, since), Trace(out[:at], tuple(starts))
+
+
+def unknown(problem: Problem) -> list[int]:
+    """Places of the states that a start does not know from before: motion, flexure of the sting, and roll, of which a
+    gap tells as little."""
+    flexure, roll = problem.places[RESONATORS], problem.places[ROLL]
+    of_flexure = range(flexure, flexure + 4) if flexure >= 0 else ()
+    return [0, 1, 2, 3, *of_flexure, *((int(roll),) if roll >= 0 else ())]
+
+
+def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array) -> bool:
+    """Put motion into ``x`` and ``P`` as a few rows tell it at the first of them; False where they tell no angle.
+
+    Theta is that which fits the medians of the accelerometers best, the rate the gyro's or, without one, that at which
+    theta changes, and the acceleration what is left over (Tan et al. with three axes: atan2(A2, (A3 - A1)/2) and
+    (A1 + A3)/(r3 - r1)). What else is `unknown` is as in the prior, what is known of the sensors stays.
+    """
+    n, spatial = problem.count, problem.spatial
+    new = unknown(problem)
+    fresh = new[4:]
+    x[fresh] = problem.mean[fresh]
+    together = t - t[0] <= 3.0 * HELD * _medians(np.diff(t, prepend=t[0])[:, None])[0]
+    t, rows = t[together], rows[together]
+    level = math.cos(x[problem.places[ROLL]]) if spatial else problem.constants[ROLL_COSINE]
+    middle = _medians(rows)
+    seen = np.flatnonzero(np.isfinite(middle[:n]))
+    if not problem.layout.of(*seen).spans:
+        return False
+    cosine, sine, r, z = problem.geometry[seen].T
+    axes = np.stack([cosine, -sine], axis=-1)
+    fit = np.linalg.solve(
+        axes.T @ axes, axes.T
+    )  # forward and upward specific force (2,) that fit readings along axes best
+    if math.isfinite(middle[n]) and abs(level) > _ACROSS:
+        rate = (middle[n] - x[GYRO_BIAS]) / level
+    else:
+        forces = (rows[:, seen] - x[5 + seen]) @ fit.T
+        rate = _slope(t, np.array([_angle(force, level, problem) for force in forces]))
+    # A = (g sin theta - r w^2) cos lambda - level (g cos theta - level z w^2) sin lambda + arm al
+    read = middle[seen] - x[5 + seen] + rate**2 * (cosine * r - sine * level**2 * z)
+    arms = -level * (z * cosine + r * sine)
+    arms = arms - axes @ (fit @ arms)
+    power = float(arms @ arms)
+    acceleration = float(arms @ read) / power if power > _NO_ARM**2 else 0.0
+    x[:4] = _angle(fit @ read, level, problem), rate, acceleration, 0.0
+    x[0] -= 0.5 * rate * (t[-1] - t[0])
+    P[new, :] = 0.0
+    P[:, new] = 0.0
+    P[[0, 1, 2, 3], [0, 1, 2, 3]] = START**2
+    P[fresh, fresh] = problem.covariance[fresh, fresh]
+    turns[2:] = 0.0
+    for k in range(2):
+        if math.isfinite(middle[n + 3 + k]):
+            turns[k] = middle[n + 3 + k]
+    return True
+
+
+def _medians(rows: Array) -> Array:
+    """Medians of the columns; NaN of those without a number."""
+    ordered, count = np.sort(rows, axis=0), np.isfinite(rows).sum(axis=0)  # NaN come last
+    column = np.arange(rows.shape[1])
+    middle = ordered[np.maximum(count - 1, 0) // 2, column], ordered[count // 2, column]
+    return np.asarray(0.5 * (middle[0] + middle[1]))
+
+
+def _angle(force: Array, level: float, problem: Problem) -> float:
+    """Theta that forward and upward specific force (2,) show at rest; NaN where they are."""
+    forward, up = force.tolist()
+    if abs(level) > _ACROSS:
+        return math.atan2(forward, up / level)
+    g = problem.constants[GRAVITY]
+    return math.asin(min(1.0, max(-1.0, forward / g))) if math.isfinite(forward) else math.nan
+
+
+def _slope(t: Array, angles: Array) -> float:
+    """Rate [rad/s] of angles, 0 where there are not three."""
+    known = np.isfinite(angles)
+    if known.sum() < 3:
+        return 0.0
+    t, angles = t[known] - t[known].mean(), np.unwrap(angles[known])
+    return float(t @ angles / (t @ t))

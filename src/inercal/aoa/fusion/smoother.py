@@ -1,0 +1,185 @@
+"""The offline smoother: angles from all of a recording, in bounded memory.
+
+Modified Bryson-Frazier form (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapter 10): the
+filter's rows are gone through backward, each scalar with the row, gain and variance by which it was put in,
+
+    lam := (I - K h)^T lam - h^T v / S        Lam := (I - K h)^T Lam (I - K h) + h^T h / S
+    lam := F^T lam                            Lam := F^T Lam F
+
+and between the row's last scalar and the next row x_s = x - P lam, P_s = P - P Lam P, of the filter's x and P after
+the row: those before it are so wide where the filter starts that digits would be lost. No covariance is inverted. The
+filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, to
+have its rows; so memory goes with the block and not with the recording. What is known of constants fades between blocks
+(`inercal.aoa.fusion.fading`), lam := F^T lam there too.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal._jit import kernel
+from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion.loop import OUTPUTS, congruent, root, write
+from inercal.aoa.fusion.model import COUNT, MOVING, ROWS, STATES
+from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.run import Start, unknown
+
+Array: TypeAlias = NDArray[np.float64]
+Indices: TypeAlias = NDArray[np.int64]
+
+BLOCK = 256
+"""Rows from one kept state to the next."""
+
+
+def smooth(
+    problem: Problem,
+    t: Array,
+    rows: Array,
+    starts: tuple[Start, ...],
+    kept: Array | None = None,
+    every: int = 1,
+) -> Array:
+    """Angles from all rows: (m, 5) theta, u [rad], rate, u [rad/s], acceleration [rad/s^2].
+
+    NaN before the first start, and where theta was lost, until the next.
+
+    Parameters
+    ----------
+    problem : Problem
+    t, rows
+        As `inercal.aoa.fusion.run.advance` took them.
+    starts : tuple of Start
+        Where the filter started: between two of them motion is not connected, while what is known of sensors is.
+    kept : (k, 2 n) or None
+        Receives states and standard deviations at each ``every``-th row.
+    """
+    n = problem.size
+    out = np.full((len(t), OUTPUTS), np.nan)
+    kept = np.empty((0, 2 * n)) if kept is None else kept
+    rows = np.ascontiguousarray(rows)
+    lam, Lam, new = np.zeros(n), np.zeros((n, n)), unknown(problem)
+    end = len(t)
+    for begin in reversed(starts):
+        part = slice(begin.row, end)
+        _stretch(problem, begin, t[part], rows[part], lam, Lam, out[part], kept, every)
+        forgotten = slice(None) if begin.anew else new
+        lam[forgotten] = 0.0
+        Lam[forgotten, :] = 0.0
+        Lam[:, forgotten] = 0.0
+        end = begin.row
+    return out
+
+
+def load_kernels(problem: Problem) -> None:
+    """Load, or compile, the kernels."""
+    x, P = problem.mean.copy(), problem.covariance.copy()
+    start = Start(0, x, P, np.zeros(problem.count + 3), True, 0.0)
+    smooth(problem, np.zeros(1), np.full((1, problem.count + loop.BESIDE), np.nan), (start,))
+
+
+def _stretch(
+    problem: Problem, begin: Start, t: Array, rows: Array, lam: Array, Lam: Array, out: Array, kept: Array, every: int
+) -> None:  # fmt: skip
+    """Smooth from one start on; ``lam`` and ``Lam`` go from the end of the stretch to its beginning."""
+    given = (problem.geometry, problem.places, problem.constants)
+    n, dt = problem.size, np.diff(t, prepend=t[0])
+    memory = loop.memory(min(BLOCK, len(dt)), n, int(problem.places[MOVING]), problem.count)
+    causal, none = np.empty((BLOCK, OUTPUTS + problem.count + 1)), np.empty((0, 2 * n))
+    x, P, turns = begin.x.copy(), begin.P.copy(), begin.turns.copy()
+    heads = []
+    a = 0
+    while a < len(dt):
+        steps = fading.due(float(t[a - 1]), float(t[a]), begin.since) if a else 0
+        F = fading.fade(x, P, problem, steps) if steps else None
+        block = slice(a, min(a + BLOCK, fading.next_due(t, a, begin.since)))
+        heads.append((block, x.copy(), P.copy(), turns.copy(), F))
+        done = loop.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0)
+        if done < len(dt[block]):
+            break
+        a = block.stop
+    for block, x, P, turns, F in reversed(heads):
+        done = loop.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0, memory)
+        _backward(lam, Lam, *memory, done, *given[1:], out[block], kept, every, begin.row + block.start)
+        if F is not None:
+            with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
+                lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
+
+
+@kernel
+def _backward(
+    lam: Array, Lam: Array, steps: Array, known: Array, scalars: Array, size: int, places: Indices,
+    constants: Array, out: Array, kept: Array, every: int, first: int,
+) -> None:  # fmt: skip
+    """Go back over ``size`` rows that the filter remembers: ``lam`` and ``Lam`` from their end to their beginning."""
+    n, d = places[STATES], places[MOVING]
+    work, line, none = np.empty((d, n)), np.empty(n), np.zeros((d, d))
+    mean, spread = np.empty(n), np.empty((n, n))
+    for k in range(size - 1, -1, -1):
+        whole = len(kept) > 0 and (first + k) % every == 0
+        for i in range(n if whole else 3):
+            mean[i] = _smoothed(known, k, i, lam, Lam, line)
+            for j in range(i + 1):
+                spread[i, j] = known[k, i + 1, j]
+                for m in range(n):
+                    spread[i, j] -= line[m] * known[k, j + 1, m]
+                spread[j, i] = spread[i, j]
+            if whole:
+                kept[(first + k) // every, i] = mean[i]
+                kept[(first + k) // every, n + i] = root(spread[i, i])
+        write(mean, spread, constants, out, k)
+        for i in range(places[COUNT] + 1, -1, -1):
+            if scalars[k, i, 2 * n + 1] > 0.0:
+                _back(lam, Lam, scalars, k, i, line)
+        for i in range(d):
+            line[i] = 0.0
+            for j in range(d):
+                line[i] += steps[k, i, j] * lam[places[ROWS + j]]
+        for i in range(d):
+            lam[places[ROWS + i]] = line[i]
+        congruent(Lam, places, steps[k], none, work)
+
+
+@kernel
+def _back(lam: Array, Lam: Array, scalars: Array, k: int, i: int, along: Array) -> None:
+    """Go back over scalar ``i`` of row ``k``, in place."""
+    n = len(lam)
+    v, inverse = scalars[k, i, 2 * n], 1.0 / scalars[k, i, 2 * n + 1]
+    total = 0.0
+    for j in range(n):
+        total += scalars[k, i, n + j] * lam[j]
+        along[j] = 0.0
+    for j in range(n):
+        gain = scalars[k, i, n + j] * inverse
+        for m in range(n):
+            along[m] += Lam[j, m] * gain
+    both = inverse
+    for j in range(n):
+        both += along[j] * scalars[k, i, n + j] * inverse
+    # Lam K h and its transpose are taken away, h^T (K^T Lam K + 1 / S) h is put in: half of it in each
+    for j in range(n):
+        along[j] -= 0.5 * both * scalars[k, i, j]
+    for j in range(n):
+        h = scalars[k, i, j]
+        if h != 0.0:
+            lam[j] -= h * inverse * (total + v)
+            for m in range(n):
+                Lam[j, m] -= h * along[m]
+                Lam[m, j] -= h * along[m]
+
+
+@kernel
+def _smoothed(known: Array, k: int, i: int, lam: Array, Lam: Array, line: Array) -> float:
+    """State ``i`` of row ``k``; ``line`` (n,) receives its row of P Lam."""
+    n = len(lam)
+    total: float = known[k, 0, i]
+    for j in range(n):
+        total -= known[k, i + 1, j] * lam[j]
+        line[j] = 0.0
+    for m in range(n):
+        p = known[k, i + 1, m]
+        for j in range(n):
+            line[j] += p * Lam[m, j]
+    return total

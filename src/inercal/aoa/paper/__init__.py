@@ -1,0 +1,1 @@
+"""The paper's methods, which work without a filter."""

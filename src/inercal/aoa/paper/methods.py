@@ -1,0 +1,182 @@
+"""The paper's way to the angle: lever-arm terms taken off sample by sample, then an angle as at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.angles import Angles, continuous
+from inercal.aoa.arms import all_weights, level_of, tangential_arms
+from inercal.aoa.paper import lever, static
+from inercal.aoa.paper.delay import aligned, relative_delay
+from inercal.aoa.paper.error_terms import in_motion
+from inercal.aoa.paper.lowpass import zero_phase
+from inercal.aoa.paper.static import spread
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings, Methods
+from inercal.arrays import Array
+from inercal.errors import RecordError, StudyError
+from inercal.geometry.rotations import principal
+
+LOW_PASS = 30.0
+"""Cutoff [Hz] of the low pass that the fusion is compared with: twice the highest frequency of a usual buffet."""
+
+_ORDER = 4
+
+MEASURED = (
+    Methods(),
+    Methods(static="complementary"),
+    Methods(static="segmented"),
+    Methods(static="difference"),
+    Methods(static="gls"),
+    Methods(centrifugal="low-pass"),
+    Methods(centrifugal="decision"),
+    Methods(tangential="differentiated"),
+    Methods(tangential="none"),
+    Methods(centrifugal="none", tangential="none"),
+)
+"""What is measured side by side where methods are compared: the paper's own choice first."""
+
+
+def label(methods: Methods) -> str:
+    """Such as ``improved, mechanical, dual``."""
+    return f"{methods.static}, {methods.centrifugal}, {methods.tangential}"
+
+
+def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
+    """The angles of a recording by the paper's methods, each row by itself but for filters and differences.
+
+    The gyro is shifted first, by its delay that the study states or that is estimated from the whole recording; the
+    delay common to all sensors is made up for at the end by theta' tau. A roll is that which the study states.
+
+    Where accelerometers are missing in a row, what is left of them is used if the methods can, otherwise there is no
+    angle. Its uncertainty is of first order, by noise, biases and the prior of positions and gyro scale
+    (`inercal.aoa.paper.error_terms`), and terms that the methods leave in count as errors of their own size. Flexure
+    of the sting is not in it.
+
+    Raises
+    ------
+    StudyError
+        The layout lacks the axes that the methods need, or the model lies on its side.
+    RecordError
+        There is no gyro where the methods need one, or time does not go on.
+    """
+    level = level_of(settings)
+    _needs(recording, settings, methods, level)
+    taken = later(recording.t)
+    gyro_delay = settings.timing.gyro_delay
+    if gyro_delay is None:
+        estimated = relative_delay(recording, settings.layout)
+        gyro_delay = 0.0 if estimated is None else estimated.value
+    t, acc, gyro = recording.t[taken], recording.acc[taken], aligned(recording, gyro_delay).gyro[taken]
+    noise = settings.noise
+    acc, compensated = lever.centrifugal(
+        methods.centrifugal, t, acc, gyro, settings.layout, level, noise.gyro
+    )
+    rate, acceleration = gyro / level, np.zeros(len(t))
+    step = float(np.median(np.diff(t))) if len(t) > 1 else math.nan
+    if methods.tangential == "differentiated":
+        acceleration = lever.differentiated(t, gyro, level)
+        p = tangential_arms(settings.layout, level)
+        acc = acc - np.where(p == 0.0, 0.0, p * acceleration[:, None])
+    theta, u = np.full((2, len(t)), np.nan)
+    for rows, seen in _alike(acc):
+        layout, read = settings.layout.of(*seen), acc[rows][:, seen]
+        dual = np.eye(len(seen))
+        try:
+            if methods.tangential == "dual":
+                weights, dual = lever.dual(layout, level)
+                acceleration[rows] = read @ weights
+            elif methods.tangential == "none" and (every := all_weights(layout)) is not None:
+                acceleration[rows] = read @ every / level
+            w, al = np.nan_to_num(rate[rows]), np.nan_to_num(acceleration[rows])
+            errors = [
+                (weight, dual @ matrix @ dual.T)
+                for weight, matrix in in_motion(
+                    settings, methods.tangential, layout, level, w, al, compensated[rows], step
+                )
+            ]
+            still = static.angle(
+                methods.static, read @ dual.T, layout, settings.site.gravity, level, errors[0][1]
+            )
+        except StudyError:  # too few axes are left in these rows
+            acceleration[rows] = np.nan
+            continue
+        theta[rows], u[rows] = still.theta, spread(still.gain, errors)
+    return _at_stamps(recording, settings, methods, taken, theta, u, rate, np.nan_to_num(acceleration))
+
+
+def low_passed(angles: Angles, t: Array, cutoff: float = LOW_PASS) -> Angles:
+    """Angles (n,) at the times ``t`` [s] after a zero-phase low pass (Butterworth, gain 1/2 at ``cutoff`` [Hz]).
+
+    For comparison with the fusion only: it looks ahead, and it takes what is faster than the cutoff out of the angle
+    itself. The uncertainty stays: that of biases, which no filter lowers, and of noise as it was before, an upper
+    bound.
+    """
+    taken = later(t)
+    smooth = zero_phase(t[taken], continuous(angles.theta[taken]), cutoff, _ORDER)
+    found = np.full(len(t), np.nan)
+    found[taken] = principal(smooth)
+    return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=found)
+
+
+def _needs(recording: Recording, settings: AoaSettings, methods: Methods, level: float) -> None:
+    """Raise what is missing for all rows alike."""
+    layout = settings.layout
+    if methods.tangential == "dual":
+        lever.dual(layout, level)
+    static.angle(methods.static, np.zeros((0, len(layout.names))), layout, settings.site.gravity, level)
+    without_gyro = methods.centrifugal in ("none", "low-pass") and methods.tangential != "differentiated"
+    if not without_gyro and len(recording.t) and np.isnan(recording.gyro).all():
+        raise RecordError(
+            "gyro", f"missing, which {label(methods)} needs: without it none, none or none, dual work"
+        )
+
+
+def _alike(acc: Array) -> Iterator[tuple[NDArray[np.intp], list[int]]]:
+    """Rows in which the same accelerometers are there, and which these are; none of rows without any."""
+    known = np.isfinite(acc)
+    kind = np.zeros(len(acc), dtype=np.int64)
+    for k in range(acc.shape[1]):
+        kind = 2 * kind + known[:, k]
+    for each in np.unique(kind[kind > 0]):
+        rows = np.flatnonzero(kind == each)
+        seen = [int(k) for k in np.flatnonzero(known[rows[0]])]
+        yield rows, seen
+
+
+def _at_stamps(
+    recording: Recording,
+    settings: AoaSettings,
+    methods: Methods,
+    taken: NDArray[np.int64],
+    theta: Array,
+    u: Array,
+    rate: Array,
+    acceleration: Array,
+) -> Angles:
+    """The angles of the rows ``taken``, made up for the delay common to all sensors; NaN in other rows.
+
+    Without a gyro the rate that makes up for it is the slope of the angle.
+    """
+    timing, noise = settings.timing, settings.noise
+    rate_u = np.where(
+        np.isfinite(rate), math.hypot(noise.gyro, noise.gyro_bias) / abs(level_of(settings)), np.nan
+    )
+    tau, tau_u = timing.common_delay, timing.common_delay_u
+    if tau or tau_u:
+        slope = np.gradient(continuous(theta), recording.t[taken]) if len(theta) > 1 else np.zeros(len(theta))
+        moving = np.where(np.isfinite(rate), rate, slope)
+        theta = theta + tau * moving + 0.5 * tau**2 * acceleration
+        theta = principal(theta)
+        u = np.sqrt(u**2 + (moving * tau_u) ** 2 + (tau * np.nan_to_num(rate_u)) ** 2)
+        rate_u = np.hypot(rate_u, acceleration * tau_u)
+        rate = rate + tau * acceleration
+    found = np.full((4, len(recording.t)), np.nan)
+    found[:, taken] = theta, u, rate, rate_u
+    return Angles(label(methods), *found)

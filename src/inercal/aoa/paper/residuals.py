@@ -1,0 +1,101 @@
+"""What the paper's ways of freeing readings from lever-arm terms leave, in closed form.
+
+The model oscillates, theta = theta_0 + theta_m sin Om t, with the peak rate X = theta_m Om; dA [m/s^2] and dw [rad/s]
+are the errors of an accelerometer and of the gyro, L = r_3 - r_1 the arm of the dual accelerometer. Source: Tan et al.
+2021, worked out; accelerations in m/s^2, angles in rad.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+DECISION = 2.0 + math.sqrt(6.0)
+"""X/dw at which low pass and mechanical compensation leave as much: X^2/2 = 2 X dw + dw^2."""
+
+_LARGEST = 20.0
+"""Standard deviations that no sample exceeds."""
+
+
+def low_pass(r: float, peak_rate: float) -> float:
+    """r X^2/2: what is left of the centrifugal term where a low pass removes its cosine [m/s^2]."""
+    return 0.5 * r * peak_rate**2
+
+
+def mechanical(r: float, peak_rate: float, gyro_error: float) -> float:
+    """r (2 X dw + dw^2), at the peak of the rate: what is left where the gyro's square is added [m/s^2]."""
+    return r * (2.0 * peak_rate * gyro_error + gyro_error**2)
+
+
+def peak_rate_at(ratio: float, gyro_error: float) -> float:
+    """The peak rate [rad/s] at which the low pass leaves ``ratio`` times what mechanical compensation leaves.
+
+    (X/dw)^2/2 = ratio (2 X/dw + 1), hence X/dw = 2 ratio + sqrt(4 ratio^2 + 2 ratio); 2 + sqrt 6 for 1.
+    """
+    return gyro_error * (2.0 * ratio + math.sqrt(4.0 * ratio**2 + 2.0 * ratio))
+
+
+def decision_frequency(amplitude: float, gyro_error: float) -> float:
+    """f0 [Hz] = (2 + sqrt 6) dw / (2 pi theta_m), above which an oscillation is to be compensated mechanically."""
+    return DECISION * gyro_error / (2.0 * math.pi * amplitude)
+
+
+def untreated(peak_rate: float, frequency: float) -> float:
+    """theta_m Om^2: the angular acceleration [rad/s^2] that is left in the tangential term where it is left alone."""
+    return 2.0 * math.pi * frequency * peak_rate
+
+
+def differentiated(gyro_error: float, sample_rate: float, cutoff: float = math.inf) -> float:
+    """Standard deviation [rad/s^2] of the angular acceleration from a gyro with white noise of dw a sample.
+
+    Of the unfiltered first difference sqrt(2) dw fs; where an ideal low pass goes before, its ``cutoff`` fc [Hz] below
+    fs/2, 2 pi fc sqrt(2 fc / (3 fs)) dw as of the derivative (exactly: 2 fs dw times the root of the mean of
+    sin^2(pi f/fs) over the band, times that of 2 fc/fs).
+    """
+    if math.isinf(cutoff):
+        return math.sqrt(2.0) * gyro_error * sample_rate
+    share = 2.0 * cutoff / sample_rate
+    mean = 0.5 - math.sin(math.pi * share) / (2.0 * math.pi * share)
+    return 2.0 * sample_rate * gyro_error * math.sqrt(share * mean)
+
+
+def dual(error: float, arm: float, alike: bool) -> float:
+    """Error [rad/s^2] of (A1 + A3)/L: sqrt(2) dA/L of independent errors, 2 dA/L of equal ones; so L is to be large."""
+    return (2.0 if alike else math.sqrt(2.0)) * error / abs(arm)
+
+
+def dual_gain(r1: float, r3: float) -> float:
+    """sqrt(r1^2 + r3^2)/|r3 - r1|: noise of A1 + r1 al over that of a reading; 1/sqrt 2 with the pivot midway."""
+    return math.hypot(r1, r3) / abs(r3 - r1)
+
+
+def may_be_left(error: float, arm: float) -> float:
+    """theta_m Om^2 [rad/s^2] below which the tangential term is better left alone: 2 dA/L, a rule of its own."""
+    return dual(error, arm, alike=True)
+
+
+def late(peak_rate: float, delay: float) -> float:
+    """Error of the angle [rad] of an output that is late by a ``delay`` [s]: theta' tau."""
+    return peak_rate * delay
+
+
+def sampled(
+    r2: float, peak_rate: float, gyro_error: float, gravity: float, samples: float, mean: float = 0.0
+) -> float:
+    """Largest error [rad] of the angle over ``samples`` of mechanical compensation by a gyro with white noise, no bias.
+
+    2 r2 |w| dw n cos theta_0 / g about the ``mean`` theta_0, where the rate w of the sine is largest; n is the noise of
+    one sample over its deviation. Given is the level that is exceeded once on average.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    speed = np.abs(np.cos(np.linspace(0.0, 2.0 * math.pi, 4000, endpoint=False)))
+    unit = 2.0 * r2 * peak_rate * gyro_error * math.cos(mean) / gravity
+
+    def exceeding(level: float) -> float:
+        each = 2.0 * ndtr(-level / np.maximum(speed, 1e-12))
+        return float(samples * each.mean()) - 1.0
+
+    return unit * float(brentq(exceeding, 0.0, _LARGEST))

@@ -1,0 +1,250 @@
+"""The angle of a model at rest from the readings of N accelerometers along any axes, in five ways.
+
+At rest axis i reads A_i = g h_i . (sin theta, cos theta), h_i = (cos lambda_i, -c sin lambda_i) with c the cosine of
+the roll; in motion the readings are to be freed of lever-arm terms before (`inercal.aoa.paper.lever`). Each way gives,
+beside the angle, by how much it errs with each reading (`Still.gain`): `spread` makes its uncertainty of that, and
+`bound` what errors of a given size may do.
+
+Sources: Tan et al. 2021 for segmented, complementary and improved; `difference` and `gls` are ours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.arms import axes
+from inercal.aoa.layout import Layout
+from inercal.aoa.settings import Static
+from inercal.arrays import Array
+from inercal.errors import StudyError
+from inercal.geometry.rotations import principal
+
+Indices = NDArray[np.intp]
+
+Errors: TypeAlias = Sequence[tuple[Array | float, Array]]
+"""Error covariance of the readings at n rows: the sum of weights (n,) times matrices (N, N) [(m/s^2)^2]."""
+
+_BACKWARD = 1.0 - 1e-9
+"""What an axis that looks backward counts for, so that of two antiparallel axes that which looks forward is taken."""
+
+_LATER = 1e-9
+"""What a later pair of axes counts as worse by, so that of two that are opposite the first is taken."""
+
+_FLAT = 1e-2
+"""Slope of a reading over g against theta below which it is taken to be that."""
+
+_ROUNDS = 10
+_CONVERGED = 1e-11
+_NO_WEIGHT = 1e-9
+
+
+class Still(NamedTuple):
+    """``theta`` (n,) [rad] within (-pi, pi], and ``gain`` (n, N) [rad s^2/m], by how much it errs with each reading."""
+
+    theta: Array
+    gain: Array
+
+
+def angle(
+    way: Static,
+    acc: Array,
+    layout: Layout,
+    gravity: float,
+    level: float = 1.0,
+    covariance: Array | None = None,
+) -> Still:
+    """The angle by one of the five ways; parameters as of `gls`."""
+    if way == "gls":
+        return gls(acc, layout, gravity, level, covariance)
+    return _WAYS[way](acc, layout, gravity, level)
+
+
+def segmented(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
+    """theta = lambda_i + asin(A_i / g) by the axis nearest to the angle that least squares over all axes gives.
+
+    An axis that looks backward (cos(theta - lambda_i) < 0) is read on the other branch of the arc sine, so that any two
+    axes that are not parallel show all angles. Choosing the smallest reading instead, without the angle, is wrong by
+    180 deg where axes are antiparallel. Error dA / (g cos(theta - lambda_i)) >= dA/g. Parameters and what is raised as
+    of `gls`.
+    """
+    h = _axes(layout, level)
+    coarse = _direction(acc @ np.linalg.pinv(h).T)
+    slope = _slopes(coarse, h)
+    i = np.argmax(np.where(slope < 0.0, -_BACKWARD * slope, slope), axis=1)
+    at = np.arange(len(acc)), i
+    forward = slope[at] >= 0.0
+    size, turn = np.hypot(h[:, 0], h[:, 1])[i], np.arctan2(-h[:, 1], h[:, 0])[i]
+    raised = np.arcsin(np.clip(acc[at] / (gravity * size), -1.0, 1.0))
+    theta = principal(turn + np.where(forward, raised, math.pi - raised))
+    steep = np.maximum(size * np.cos(raised), _FLAT)
+    gain = np.zeros(acc.shape)
+    gain[at] = np.where(forward, 1.0, -1.0) / (gravity * steep)
+    return Still(theta, gain)
+
+
+def complementary(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
+    """theta = atan2(A_2, -A_1) by two axes at a right angle: the first such pair.
+
+    Error sqrt(2) dA sin(theta - lambda_2 + 45 deg) / g where both err by dA. Parameters and what is raised as of `gls`.
+    """
+    pairs = _pairs(layout, level)
+    if not len(pairs):
+        raise StudyError("sensors", "found no two axes at a right angle, which complementary needs")
+    return _by_two(acc, pairs[:1], np.zeros(len(acc), dtype=np.intp), gravity)
+
+
+def improved(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
+    """As `complementary`, by that of several pairs that suffers least where all axes err alike.
+
+    That is |theta - lambda_2 + 45 deg| <= 45 deg modulo 180 deg, for the three axes -z, +x, +z: the first two below
+    theta = 0, the last two above. Error <= dA/g where both err by dA. With one pair it is complementary. Parameters
+    and what is raised as of `gls`.
+    """
+    pairs = _pairs(layout, level)
+    if not len(pairs):
+        raise StudyError("sensors", "found no two axes at a right angle, which improved needs")
+    coarse = acc @ np.linalg.pinv(_axes(layout, level)).T
+    alike = pairs.sum(axis=2)
+    suffering = np.abs(coarse[:, 1:] * alike[:, 0] - coarse[:, :1] * alike[:, 1])
+    rank = _LATER * gravity * np.arange(len(pairs))
+    return _by_two(acc, pairs, np.argmin(suffering + rank, axis=1), gravity)
+
+
+def difference(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
+    """theta = atan2(A_2, (A_3 - A_1)/2) by two antiparallel axes and one square to them, as -z, +z, +x.
+
+    All around without switching; what errs alike in both antiparallel axes cancels. Where the one square to them has an
+    antiparallel one too, their half difference takes its place. Parameters and what is raised as of `gls`.
+    """
+    h, n = _axes(layout, level), len(layout.names)
+    opposite = dict(layout.opposed()) | {j: i for i, j in layout.opposed()}
+    for i, j in layout.square():
+        if i not in opposite and j not in opposite:
+            continue
+        half = np.zeros((2, n))
+        for row, k in zip(half, (i, j), strict=True):
+            row[k] = 1.0
+            if k in opposite:
+                row[k], row[opposite[k]] = 0.5, -0.5
+        chosen = np.linalg.inv(half @ h) @ half
+        return _by_two(acc, chosen[None], np.zeros(len(acc), dtype=np.intp), gravity)
+    raise StudyError(
+        "sensors", "found no antiparallel axes with one at a right angle to them, which difference needs"
+    )
+
+
+def gls(
+    acc: Array, layout: Layout, gravity: float, level: float = 1.0, covariance: Array | None = None
+) -> Still:
+    """Generalised least squares: the theta that fits the readings of all axes best.
+
+    Gauss and Newton's rounds from plain least squares on. Weights are the pseudo-inverse of the covariance: directions
+    without errors, as where the readings of two axes were made equal, tell nothing of the angle.
+
+    Parameters
+    ----------
+    acc : (n, N) m/s^2
+        Readings freed of lever-arm terms, none missing.
+    layout : Layout
+    gravity : float
+        [m/s^2].
+    level : float
+        Cosine of the roll.
+    covariance : (N, N) (m/s^2)^2
+        Of the errors of the readings; equal and independent without one.
+
+    Raises
+    ------
+    StudyError
+        The layout lacks the axes that the way needs.
+    """
+    h = _axes(layout, level)
+    if covariance is None:
+        covariance = np.eye(len(h))
+    weight = np.linalg.pinv(covariance / np.trace(covariance), rcond=_NO_WEIGHT, hermitian=True)
+    read = acc / gravity
+    force = acc @ np.linalg.pinv(h).T
+    theta = np.arctan2(force[:, 0], force[:, 1])
+    for _ in range(_ROUNDS):
+        direction = np.stack([np.sin(theta), np.cos(theta)], axis=-1)
+        slope = _slopes(direction, h)
+        weighted = slope @ weight
+        power = np.einsum("ni,ni->n", weighted, slope)[:, None]
+        # where the readings that count do not change with theta it is not known
+        gain = np.divide(weighted, power, out=np.full_like(weighted, np.nan), where=power > 0.0)
+        step = np.einsum("ni,ni->n", gain, read - direction @ h.T)
+        theta = theta + step
+        if not (np.abs(step) > _CONVERGED).any():
+            break
+    return Still(principal(theta), gain / gravity)
+
+
+_WAYS: Mapping[str, Callable[[Array, Layout, float, float], Still]] = {
+    "segmented": segmented,
+    "complementary": complementary,
+    "improved": improved,
+    "difference": difference,
+}
+
+
+def spread(gain: Array, errors: Errors) -> Array:
+    """(n,) rad: standard uncertainty of the angle, of first order, by errors of the readings."""
+    variance = np.zeros(len(gain))
+    for weight, matrix in errors:
+        variance += weight * np.einsum("ni,ni->n", gain @ matrix, gain)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def bound(gain: Array, size: float, kind: Literal["alike", "independent", "any"]) -> Array:
+    """(n,) rad: what errors of one ``size`` [m/s^2] in each axis do to the angle, to first order.
+
+    ``alike``: equal with their signs; ``independent``: standard deviation of random ones; ``any``: the worst signs.
+    """
+    if kind == "alike":
+        return np.asarray(size * np.abs(gain.sum(axis=1)))
+    if kind == "independent":
+        return np.asarray(size * np.sqrt(np.square(gain).sum(axis=1)))
+    return np.asarray(size * np.abs(gain).sum(axis=1))
+
+
+def _axes(layout: Layout, level: float) -> Array:
+    """(N, 2) h."""
+    if not layout.spans:
+        raise StudyError("sensors", "found parallel axes only, expected two that are not")
+    return axes(layout, level)
+
+
+def _pairs(layout: Layout, level: float) -> Array:
+    """(K, 2, N): for each pair of square axes what makes (sin theta, cos theta) of readings over g."""
+    h, square = axes(layout, level), layout.square()
+    made = np.zeros((len(square), 2, len(h)))
+    for matrix, (i, j) in zip(made, square, strict=True):
+        matrix[:, [i, j]] = np.linalg.inv(h[[i, j]])
+    return made
+
+
+def _by_two(acc: Array, ways: Array, taken: Indices, gravity: float) -> Still:
+    """The angle of (sin theta, cos theta) that one of the ``ways`` (K, 2, N) makes of each row, by ``taken`` (n,)."""
+    theta, gain = np.empty(len(acc)), np.empty(acc.shape)
+    for k, way in enumerate(ways):
+        rows = slice(None) if len(ways) == 1 else taken == k
+        direction = _direction(acc[rows] @ way.T)
+        theta[rows] = np.arctan2(direction[:, 0], direction[:, 1])
+        gain[rows] = _slopes(direction, way.T) / gravity
+    return Still(principal(theta), gain)
+
+
+def _direction(force: Array) -> Array:
+    """(n, 2) sin theta, cos theta of forward and upward specific force."""
+    size = np.hypot(force[:, 0], force[:, 1])
+    return np.asarray(force / np.where(size > 0.0, size, 1.0)[:, None])
+
+
+def _slopes(direction: Array, h: Array) -> Array:
+    """(n, N): how h . (sin theta, cos theta) grows with theta."""
+    return np.asarray(direction[:, ::-1] @ (h * [1.0, -1.0]).T)

@@ -1,0 +1,56 @@
+"""Rows that go on in time, and those that do not; gaps of time, and what is put on an even grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.arrays import Array
+from inercal.errors import RecordError
+
+PATIENCE = 1000
+"""Rows in a row without a later stamp that are left out; more are no accident."""
+
+HELD = 20
+"""Rows from which the filter starts."""
+
+
+_FINEST = 1.0 / 16.0
+"""Step of an even grid over the mean interval, at least."""
+
+
+def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.int64]:
+    """Rows of ``t`` (n,) [s] that are later than all before them and than ``last``.
+
+    Raises
+    ------
+    RecordError
+        So many rows in a row are not that the clock was set back.
+    """
+    before = np.maximum.accumulate(np.append(last, np.where(np.isnan(t), -np.inf, t)))
+    taken = np.flatnonzero(t > before[:-1])
+    left = np.diff(np.concatenate([[-1], taken, [len(t)]])) - 1
+    if left.size and left.max() >= PATIENCE:
+        row = int(np.concatenate([[-1], taken])[int(np.argmax(left))]) + 1
+        raise RecordError(
+            where,
+            f"t: {int(left.max())} rows in a row from row {row + 1} on are not later than {before[row]:.10g} s, the "
+            f"first at {t[row]:.10g} s, expected time to increase",
+        )
+    return taken
+
+
+def shortened(t: Array, longest: float) -> Array:
+    """Times ``t`` (n,) [s], increasing, with gaps above ``longest`` [s] made as long: a clock that jumped, or runs that
+    are hours apart, are not to be filled with hours of nothing.
+    """
+    excess = np.maximum(np.diff(t, prepend=t[:1]) - longest, 0.0)
+    return t - np.cumsum(excess) if excess.any() else t
+
+
+def usual_step(t: Array) -> float:
+    """Median interval [s] of ``t`` (n,); where rows come in bursts it is at least a sixteenth of the mean one, so that
+    an even grid has no more than 16 n points."""
+    return max(float(np.median(np.diff(t))), _FINEST * float(t[-1] - t[0]) / len(t))

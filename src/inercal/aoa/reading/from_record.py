@@ -1,0 +1,282 @@
+"""A record as a recording of a wind-tunnel model: SI, calibrated, one clock, saturated samples left out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.angles import continuous
+from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
+from inercal.aoa.reading.clock import HELD, later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import GYROS, AoaSettings, Calibration
+from inercal.arrays import Array
+from inercal.errors import RecordError
+from inercal.findings import Finding
+from inercal.records.checks.samples import plateaus
+from inercal.records.checks.values import is_dead, saturated
+from inercal.records.clocks import usable_interval
+from inercal.records.column import Column
+from inercal.records.places import counted, places
+from inercal.records.record import Record
+from inercal.records.temperature import recorded_temperature
+
+Flags = NDArray[np.bool_]
+
+_STUCK = 50
+"""Equal samples in a row that noise of the size of the steps makes with a probability below 1e-7."""
+
+_APART = 2.5
+"""Intervals of another clock over which its samples are interpolated."""
+
+
+def recording_of(record: Record, settings: AoaSettings) -> Recording:
+    """The recording in a record, sensors calibrated as the study says, and what is to be said of it.
+
+    Parameters
+    ----------
+    record : Record
+        ``t``, the accelerometers of the study's layout on one clock, and where there are such ``gyro``, ``gyro_roll``
+        and ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; those on clocks of their own are
+        interpolated to that of the accelerometers.
+    settings : AoaSettings
+        Calibrations (indications, counts or volts, times scale less bias) and ranges by sensor.
+
+    Returns
+    -------
+    Recording
+        One row for each row of the accelerometers. Samples that are missing, saturated (at or beyond the range that is
+        stated, or flat at an extreme) or stuck are NaN, and so are sensors that are not there; findings say which.
+
+    Raises
+    ------
+    RecordError
+        No accelerometers, or of axes that do not span the plane; accelerometers on different clocks; raw counts or
+        volts without a scale; fewer than 20 rows that go on in time, or a clock that was set back.
+    """
+    where = record.sources[0].path if record.sources else "record"
+    names = settings.layout.names
+    there = [name for name in names if name in record and _told(record[name], settings)]
+    check_axes(there, record.columns, settings.layout, where)
+    t = record[there[0]].t
+    for name in there[1:]:
+        if record[name].t is not t:
+            raise RecordError(
+                where,
+                f"{name} has another clock than {there[0]}, expected one row for all accelerometers at each time",
+            )
+    taken = later(t, where=where)
+    if len(taken) < HELD:
+        raise RecordError(
+            where, f"found {counted(len(taken), 'row')} that go on in time, expected {HELD} or more"
+        )
+    usable_interval(float(np.median(np.diff(t[taken]))), where)
+    rows = _Rows(record, settings, t, where)
+    gyros = [name for name in GYROS if name in record and _told(record[name], settings)]
+    values = {name: rows.calibrated(name) for name in (*there, *gyros)}
+    measured = [*names, GYROS[0]]
+    lost = {name: _lost(record[name], settings, values) for name in (*there, *gyros)}
+    none = np.full(len(t), np.nan)
+    masked = np.zeros((len(t), len(measured)), dtype=np.bool_)
+    findings = [*_findings_of(record, lost), *_of_time(record, t, taken)]
+    for name, (out, stuck) in lost.items():
+        on_rows = rows.on_rows(name, np.where(out | stuck, np.nan, values[name]))
+        if name in measured and record[name].t is t:
+            masked[:, measured.index(name)] = out
+        values[name] = on_rows
+        findings += _said(name, out, stuck, settings.calibration(name))
+    findings += of_sensors(there, gyros, record, settings)
+    both = all(name in gyros for name in GYROS[1:])
+    turns = np.column_stack([values[name] if both else none for name in GYROS[1:]])
+    return Recording(
+        t=t,
+        acc=np.column_stack([values.get(name, none) for name in names]),
+        gyro=values.get(GYROS[0], none),
+        turns=turns,
+        stated=np.full((len(t), 2), np.nan),
+        point=rows.held("point"),
+        trigger=rows.held("trigger"),
+        # told without jumps of a turn, which would be interpolated over, and spoil means
+        reference=rows.on_rows("theta_ref", continuous(record["theta_ref"].si()))
+        if "theta_ref" in record
+        else None,
+        masked=masked,
+        findings=tuple(findings + rows.findings),
+        sources=record.sources,
+        temperature=recorded_temperature(record),
+    )
+
+
+def _told(column: Column, settings: AoaSettings) -> bool:
+    """True for a column that says something: numbers, and not always the same one where it should be noisy."""
+    noise = settings.noise.gyro if column.name in GYROS else settings.noise.accelerometer
+    return bool(np.isfinite(column.values).any()) and not (noise > 0.0 and is_dead(column.values))
+
+
+class _Rows:
+    """Columns of a record on the rows of its accelerometers, at ``t``; ``findings`` grow with what is said of them."""
+
+    def __init__(self, record: Record, settings: AoaSettings, t: Array, where: str) -> None:
+        self.record, self.settings, self.t, self.where = record, settings, t, where
+        self.findings: list[Finding] = []
+
+    def calibrated(self, name: str) -> Array:
+        """(m,) SI on the column's own clock."""
+        column, how = self.record[name], self.settings.calibration(name)
+        check_unit(column, how, self.where)
+        thermal = how.scale_slope != 0.0 or how.bias_slope != 0.0
+        return how.measured(indication(column, column.values), self._temperature(name) if thermal else None)
+
+    def _temperature(self, name: str) -> Array | None:
+        """Temperature [degC] at the stamps of a sensor; None where none was recorded."""
+        if "temperature" not in self.record or not np.isfinite(self.record["temperature"].values).any():
+            text = f"{name}: its temperature terms are left out, the record has no temperature"
+            self.findings.append(Finding("not_stated", text))
+            return None
+        column = self.record["temperature"]
+        known = later(column.t, where=self.where)
+        known = known[np.isfinite(column.values[known])]
+        return np.interp(self.record[name].t, column.t[known], column.si()[known])
+
+    def on_rows(self, name: str, values: Array) -> Array:
+        """(n,) of ``values`` (m,) on the column's own clock, linear between its samples; NaN where these are far.
+
+        A sensor with fewer than half as many samples speaks at the rows nearest to them alone.
+        """
+        column = self.record[name]
+        if column.t is self.t:
+            return values
+        known = later(column.t, where=self.where)
+        theirs, values = column.t[known], values[known]
+        if len(known) < 2:
+            return np.full(len(self.t), np.nan)
+        interval = float(np.median(np.diff(theirs)))
+        text = f"{name}: on a clock of its own of {1.0 / interval:.5g} Hz, interpolated to that of the accelerometers"
+        self.findings.append(Finding("other_clock", text))
+        there = np.searchsorted(theirs, self.t).clip(1, len(theirs) - 1)
+        out = np.interp(self.t, theirs, values, left=np.nan, right=np.nan)
+        out[(theirs[there] - theirs[there - 1] > _APART * interval) | np.isnan(self.t)] = np.nan
+        if 2 * len(known) < len(self.t):
+            mine = later(self.t, where=self.where)
+            nearest = np.searchsorted(self.t[mine], theirs).clip(1, len(mine) - 1)
+            nearest -= theirs - self.t[mine[nearest - 1]] < self.t[mine[nearest]] - theirs
+            silent = np.ones(len(self.t), dtype=np.bool_)
+            silent[mine[nearest]] = False
+            out[silent] = np.nan
+        return out
+
+    def held(self, name: str) -> Array | None:
+        """(n,) numbers as of the last sample before each row; None where there is no such column."""
+        if name not in self.record:
+            return None
+        column = self.record[name]
+        if column.t is self.t:
+            return column.values
+        known = later(column.t, where=self.where)
+        last = np.searchsorted(column.t[known], self.t, side="right") - 1
+        return np.where(last >= 0, column.values[known[last.clip(0)]], np.nan)
+
+
+def _lost(column: Column, settings: AoaSettings, values: dict[str, Array]) -> tuple[Flags, Flags]:
+    """Samples (m,) that are saturated, and those that are stuck."""
+    name, read = column.name, column.values
+    out = np.zeros(len(read), dtype=np.bool_)
+    out[saturated(read)] = True
+    how = settings.calibration(name)
+    out |= at_range(indication(column, read), values[name], how)
+    noise = settings.noise.gyro if name in GYROS else settings.noise.accelerometer
+    others = [other for key, other in values.items() if key != name and len(other) == len(read)]
+    stuck = _stuck(read, noise / abs(how.scale * column.unit.factor), others)
+    # one that stands still at an extreme has met its range
+    known = read[np.isfinite(read)]
+    out |= stuck & ((read == known.max()) | (read == known.min()))
+    return out, stuck & ~out
+
+
+def _stuck(read: Array, noise: float, others: list[Array]) -> Flags:
+    """Samples (m,) in long runs of one number that ``noise``, as large as the steps between numbers, would end while
+    ``others`` go on."""
+    found = np.zeros(len(read), dtype=np.bool_)
+    step = np.abs(np.diff(read))
+    moving = step > 0.0
+    if not moving.any() or noise < step[moving].min():
+        return found
+    starts, ends = plateaus(step)
+    long = ends - starts + 1 >= _STUCK
+    for start, end in zip(starts[long], ends[long], strict=True):
+        if any(np.any(np.diff(other[start : end + 1]) != 0.0) for other in others):
+            found[start : end + 1] = True
+    return found
+
+
+def _findings_of(record: Record, lost: dict[str, tuple[Flags, Flags]]) -> list[Finding]:
+    """Findings of the record, less those that are said here again, with what becomes of it."""
+    again = {f"{name}:" for name in lost}
+    return [
+        each
+        for each in record.findings
+        if each.code not in ("backward_time", "duplicate_time")
+        and not (each.code == "saturation" and each.message.split(" ")[0] in again)
+    ]
+
+
+def _said(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding]:
+    """What was left out of a sensor."""
+    findings = []
+    if rows := np.flatnonzero(out).tolist():
+        where = "flat at an extreme" if how.range is None else "at or beyond the range, or flat at an extreme"
+        text = f"{name}: {counted(len(rows), 'sample')} {where}, left out"
+        findings.append(Finding("saturation", text, places("row", np.array(rows) + 1)))
+    if rows := np.flatnonzero(stuck).tolist():
+        text = (
+            f"{name}: {counted(len(rows), 'sample')} of one number while the others go on, left out as stuck"
+        )
+        findings.append(Finding("dead_channel", text, places("row", np.array(rows) + 1)))
+    return findings
+
+
+def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding]:
+    """Rows that do not go on in time."""
+    left = np.delete(np.arange(len(t)), taken)
+    if not left.size:
+        return []
+    untimed = left[np.isnan(t[left])]
+    left = left[np.isfinite(t[left])]
+    findings = []
+    if untimed.size:
+        text = f"t: {counted(untimed.size, 'row')} without a time, left out"
+        findings.append(Finding("nan", text, places("row", untimed + 1)))
+    if left.size:
+        backward = bool((np.diff(t[np.isfinite(t)]) < 0.0).any())
+        text = f"t: {counted(left.size, 'row')} not later than those before, left out"
+        code = "backward_time" if backward else "duplicate_time"
+        findings.append(Finding(code, text, places("row", left + 1)))
+    return findings
+
+
+def of_sensors(there: list[str], gyros: list[str], record: Record, settings: AoaSettings) -> list[Finding]:
+    """Sensors that are not there or say nothing, accelerometers that the study does not know, and calibrations that
+    ended badly."""
+    both = all(name in gyros for name in GYROS[1:])
+    used = [*there, *(name for name in gyros if both or name == GYROS[0])]
+    cautions = ((name, settings.calibration(name).caution) for name in used)
+    findings = [Finding("bad_verdict", f"{name}: {caution}") for name, caution in cautions if caution]
+    for name in settings.layout.names:
+        if name not in there:
+            why = "holds no number" if name in record else "is not in the record"
+            if name in record and np.isfinite(record[name].values).any():
+                why = "never changes"
+            code = "dead_channel" if why == "never changes" else "nan"
+            findings.append(Finding(code, f"{name} {why}: angles are found without it"))
+    if GYROS[0] not in gyros:
+        why = "is not in the record" if GYROS[0] not in record else "never changes or holds no number"
+        text = f"gyro {why}: angles are found from accelerometers alone, less well where the model moves fast"
+        findings.append(Finding("gyro_missing", text))
+    if len(alone := [name for name in GYROS[1:] if name in gyros]) == 1:
+        other = next(name for name in GYROS[1:] if name not in gyros)
+        findings.append(Finding("gyro_missing", f"{alone[0]} is of no use without {other}, not used"))
+    unknown = [name for name in record.columns if name not in settings.layout.names and name[1:].isdigit()]
+    if unknown:
+        text = f"{', '.join(unknown)}: not under [sensors] of the study, not used"
+        findings.append(Finding("not_stated", text))
+    return findings

@@ -1,0 +1,105 @@
+"""Pauses of a model: where its angle stands still but for noise and buffet.
+
+In a window of half a second the angle is a line and what scatters about it. The model rests where the line changes,
+over the window, by less than three times that scatter and the angle's own uncertainty together: oscillations slower
+than some 2 Hz are motion, and a creep within the uncertainty counts as rest.
+
+Faster ones are the buffet of a model at rest while they are small beside the moves of the record: as long as it is
+quiet, the scatter may be, root mean square, a twentieth of the range of the angle, but no less than 0.1 deg and no more
+than 0.5 deg, or three times the uncertainty where that is more. So an oscillation that is forced, as of a sine, a chirp
+or a buffet of some tenths of a degree without moves, is no rest, whatever its frequency. Nothing is to be set.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.arrays import Array
+from inercal.records.dwells import Dwell, breaks, static_intervals
+
+WINDOW = 0.5
+"""Length of the window [s]: some periods of a buffet, and short beside a pause."""
+
+SHORTEST = 1.0
+"""Shortest pause [s]."""
+
+_FEWEST = 8
+"""Rows of the shortest window."""
+
+_TIMES = 3.0
+
+_OF_RANGE = 1.0 / 20.0
+"""Scatter of a model at rest, of the range of the angle in the record, at most; and whatever that range,"""
+
+_SWING = (math.radians(0.1), math.radians(0.5))
+"""at least and at most [rad]."""
+
+
+def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
+    """Pauses in angles ``theta`` (n,) [rad] of standard uncertainty ``u``, at times ``t`` (n,) [s], increasing.
+
+    Half a window beside a move is left out, and after a move so much of the pause, as long as the sting rings down, as
+    scatters twice as much as its middle.
+    """
+    if len(t) < 2 * _FEWEST:
+        return ()
+    still, scatter = at_rest(t, theta, u)
+    half = _rows(t) // 2
+    shortest = max(1, round(SHORTEST / _step(t)))
+    cuts = breaks(t, WINDOW)
+    bounds = {0, len(t), *cuts.tolist()}
+    found = []
+    for run in static_intervals(still, cuts, shortest):
+        start = run.start + (0 if run.start in bounds else half)
+        stop = run.stop - (0 if run.stop in bounds else half)
+        calm = scatter[start:stop] <= 2.0 * np.median(scatter[start:stop]) if stop > start else np.zeros(0)
+        if run.start not in bounds:
+            start += int(np.argmax(calm)) if len(calm) else 0
+        if stop - start >= shortest:
+            found.append(Dwell(start, stop))
+    return tuple(found)
+
+
+def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Whether the model rests at each row (n,), and how much the angle scatters about its line there (n,) [rad].
+
+    Near the ends rows are judged by the first and last whole window. A record shorter than that, or of which most
+    rows have the time of the one before, rests.
+    """
+    n = len(t)
+    w = _rows(t) if n > 1 and _step(t) > 0.0 else n + 1
+    if n < w:
+        return np.ones(n, dtype=bool), np.zeros(n)
+    # sums over windows of the angle less its overall line, so that they lose no digits
+    at = np.arange(n) - 0.5 * (n - 1)
+    overall = float(at @ theta / (at @ at)) if n > 1 else 0.0
+    x = theta - theta.mean() - overall * at
+    sums = [np.concatenate([[0.0], np.cumsum(each)]) for each in (x, x * at, x * x)]
+    s0, s1, s2 = (each[w:] - each[:-w] for each in sums)
+    middle = at[: n - w + 1] + 0.5 * (w - 1)
+    spread = w * (w * w - 1.0) / 12.0
+    slope = (s1 - middle * s0) / spread
+    left = s2 - s0**2 / w - slope**2 * spread
+    scatter = np.sqrt(np.maximum(left, 0.0) / (w - 2))
+    centred = np.clip(np.arange(n) - w // 2, 0, n - w)
+    change, scatter = np.abs(slope + overall)[centred] * w, scatter[centred]
+    reach = float(np.ptp(s0 / w + overall * middle))
+    allowed = np.maximum(_TIMES * u, np.clip(_OF_RANGE * reach, *_SWING))
+    still = (change < _TIMES * np.hypot(scatter, u)) & (scatter < 2.0 * allowed)
+    # a buffet comes and goes: how large it is, is seen from all of a quiet stretch
+    starts = np.flatnonzero(np.diff(still, prepend=not still[0]))
+    power, most = (np.add.reduceat(np.square(each), starts) for each in (scatter, allowed))
+    return still & np.repeat(power < most, np.diff(starts, append=n)), scatter
+
+
+def _step(t: Array) -> float:
+    """Usual time [s] between rows."""
+    return float(np.median(np.diff(t)))
+
+
+def _rows(t: Array) -> int:
+    """Rows of a window."""
+    return max(_FEWEST, round(WINDOW / _step(t)))

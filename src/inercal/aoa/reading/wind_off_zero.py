@@ -1,0 +1,159 @@
+"""Wind-off zero and tare: a stretch of the record at rest, at an angle that is known from elsewhere.
+
+The fusion takes the angle as measured in every row of the stretch, each so uncertain that all of them together know it
+as well as it is stated: its error is the same in all rows, while noise and flexure average out. Through it the filter
+learns the biases at that angle. The paper's methods learn nothing; from them the biases seen in the stretch are
+subtracted.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings, Zero
+from inercal.arrays import Array
+from inercal.errors import RecordError
+
+Indices = NDArray[np.int64]
+
+_PARTS = 8
+"""Parts of the stretch whose angles are compared."""
+
+_FEWEST = 10 * _PARTS
+
+
+def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
+    """The recording with the study's zero as an angle that is stated; as it is where there is none.
+
+    Raises
+    ------
+    RecordError
+        The stretch is not in the record, has no accelerometers, or the model moves there.
+    """
+    if settings.zero is None:
+        return recording
+    rows = _stretch(recording, settings, settings.zero)
+    taken = later(recording.t)
+    before = np.full(len(recording.t), -np.inf)
+    before[taken[1:]] = recording.t[taken[:-1]]
+    stated = recording.stated.copy()
+    stated[rows] = [
+        stated_at(settings.zero, t, last)
+        for t, last in zip(recording.t[rows].tolist(), before[rows].tolist(), strict=True)
+    ]
+    return replace(recording, stated=stated)
+
+
+def stated_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
+    """The angle of a row at ``t`` [s] and its standard uncertainty [rad], NaN out of the stretch.
+
+    The row before was at ``before``. Its time is the row's share of the stretch, and of what the stretch tells.
+    """
+    share = min(t - before, t - zero.start) / (zero.end - zero.start)
+    if not (share > 0.0 and t <= zero.end):
+        return math.nan, math.nan
+    return zero.angle, zero.u / math.sqrt(share)
+
+
+def tare(recording: Recording, settings: AoaSettings) -> Recording:
+    """The recording less what its sensors read too much at the study's zero; as it is where there is none.
+
+    Raises
+    ------
+    RecordError
+        As of `with_zero`.
+    """
+    if settings.zero is None:
+        return recording
+    rows = _stretch(recording, settings, settings.zero)
+    return replace(
+        recording,
+        acc=recording.acc - (_means(recording.acc[rows]) - at_rest(settings, settings.zero.angle)),
+        gyro=recording.gyro - np.nan_to_num(_means(recording.gyro[rows, None])[0]),
+        turns=recording.turns - np.nan_to_num(_means(recording.turns[rows])),
+    )
+
+
+def at_rest(settings: AoaSettings, theta: float) -> Array:
+    """(N,) m/s^2 what perfect accelerometers read at rest, at the stated roll."""
+    level = _level(settings)
+    cosine, sine, *_ = settings.layout.geometry.T
+    return np.asarray(settings.site.gravity * (math.sin(theta) * cosine - level * math.cos(theta) * sine))
+
+
+def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices:
+    """Rows of the stretch with all accelerometers, after it has been seen that the model rests."""
+    where = f"zero.start = {zero.start:g} s, zero.end = {zero.end:g} s"
+    taken = later(recording.t)
+    t = recording.t[taken]
+    inside = taken[(t >= zero.start) & (t <= zero.end)]
+    if len(t) == 0 or zero.start > t[-1] or zero.end < t[0]:
+        span = f"from {t[0]:g} s to {t[-1]:g} s" if len(t) else "without rows"
+        raise RecordError(where, f"found a record {span}, expected the stretch at rest within it")
+    rows = inside[np.isfinite(recording.acc[inside]).all(axis=1)]
+    if len(rows) < _FEWEST:
+        raise RecordError(
+            where,
+            f"found {len(rows)} rows with all accelerometers in the stretch at rest, expected {_FEWEST} or more",
+        )
+    moved, allowed = _moved(recording, settings, rows, zero.u)
+    if not moved <= allowed:
+        raise RecordError(
+            where,
+            f"the angle changes by {math.degrees(moved):.2g} deg in the stretch, expected a model at rest within "
+            f"{math.degrees(allowed):.2g} deg",
+        )
+    return rows
+
+
+def _moved(recording: Recording, settings: AoaSettings, rows: Indices, u: float) -> tuple[float, float]:
+    """By how much the angle changes over some rows, and how much may be noise [rad]: the worse of two looks.
+
+    Accelerometers, from part to part of the stretch; the gyro's angle about its line, which also shows what goes to
+    and fro. Beside three times the stated uncertainty their own noise, as it scatters, is allowed.
+    """
+    parts = np.array_split(rows, _PARTS)
+    forward, up = np.array([_force(settings, recording.acc[each].mean(axis=0)) for each in parts]).T
+    angles = np.unwrap(np.arctan2(forward, up))
+    noise = max(float((recording.acc[each].std(axis=0) / math.sqrt(len(each))).max()) for each in parts)
+    g = settings.site.gravity * min(1.0, max(abs(_level(settings)), 0.1))
+    looks = [(float(np.ptp(angles)), 3.0 * u + 6.0 * noise / g)]
+    gyro, t = recording.gyro[rows], recording.t[rows]
+    seen = np.isfinite(gyro)
+    if seen.sum() >= _FEWEST:
+        gyro, dt = gyro[seen], np.diff(t[seen], prepend=t[seen][0])
+        swing = np.cumsum((gyro - gyro.mean()) * dt)
+        # a random walk tied at its ends has the mean variance n/6 of its steps
+        noise = float(np.diff(gyro).std()) / math.sqrt(2.0)
+        walk = noise * math.sqrt(float(dt @ dt) / 6.0)
+        looks.append((float(swing.std()), 3.0 * math.hypot(u, walk)))
+    return max(looks, key=lambda look: look[0] / look[1] if look[1] > 0.0 else math.inf)
+
+
+def _force(settings: AoaSettings, read: Array) -> Array:
+    """(2,) specific force forward, and upward as of a level model, that fits what accelerometers read best."""
+    cosine, sine, *_ = settings.layout.geometry.T
+    axes = np.stack([cosine, -sine], axis=-1)
+    forward, up = np.linalg.lstsq(axes, read, rcond=None)[0]
+    level = _level(settings)
+    return np.array([forward, up / (level if abs(level) > 0.1 else 1.0)])
+
+
+def _level(settings: AoaSettings) -> float:
+    """Cosine of the stated roll."""
+    roll = settings.attitude.roll
+    return 1.0 if roll is None else math.cos(roll.value)
+
+
+def _means(x: Array) -> Array:
+    """Means of the columns over the numbers in them; NaN of those without."""
+    known = np.isfinite(x)
+    count = known.sum(axis=0)
+    total = np.where(known, x, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

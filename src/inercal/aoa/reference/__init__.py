@@ -1,0 +1,1 @@
+"""Sensors calibrated against a reference angle."""

@@ -1,0 +1,1 @@
+"""From the filter to the estimate: budget, verdict, points, tables."""

@@ -1,0 +1,218 @@
+"""What the angle and the coefficients of the sensors are uncertain by: noise, prior, and what is stated.
+
+The covariance P of the best filter is homogeneous in the variances q_s of all its sources, and to first order no change
+of its gains changes it. So the part of a source is its slope, and the parts add up to the whole (Euler's theorem on
+homogeneous functions):
+
+    P_s = q_s dP/dq_s        sum_s P_s = P
+
+The filter is run again with each variance a little larger, over the beginning of a long recording: it costs as many
+runs as there are sources.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.fusion import model
+from inercal.aoa.fusion.filter_result import SETTLED
+from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.problem import problem as stated_problem
+from inercal.aoa.fusion.run import advance, initial
+from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.result.systematic import leaning, leans, uncertain_roll
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+from inercal.estimate.budget import BudgetItem
+
+Mask = NDArray[np.bool_]
+
+ANGLE = "theta"
+"""Name of the angle among the shares of a budget."""
+
+_STEP = 1e-3
+"""Relative change of a variance, for its slope."""
+
+MOST = 20_000
+"""Rows that are looked at, from the first with an angle on; half of them where they are smoothed."""
+
+_NOTHING = 1e-5
+"""Share of a variance below which a source does nothing."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One source, ``u`` in ``unit``, and where a problem holds it: in ``constants`` of the model that are variances, in
+    those that are standard deviations (``levels``), in the prior of ``states``, or in the angle that is stated."""
+
+    name: str
+    type: str
+    u: float
+    unit: str
+    constants: tuple[int, ...] = ()
+    levels: tuple[int, ...] = ()
+    states: tuple[str, ...] = ()
+    stated: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Variances by source.
+
+    Attributes
+    ----------
+    budget : tuple of BudgetItem
+        With the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first 2 s.
+    common : (p, p)
+        Covariance of the coefficients by gravity and roll as they are stated: by what the same site and mounting share.
+    by_gravity : (p,) or None
+        Change of the coefficients per change of gravity [m/s^2]; None where that is known well enough.
+    """
+
+    budget: tuple[BudgetItem, ...]
+    common: Array
+    by_gravity: Array | None = None
+
+
+def parts(
+    recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool, known: Mask
+) -> Parts:
+    """Split what the fusion says of its uncertainty by where it comes from.
+
+    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``known`` (n,): the rows
+    with an angle; before the first, as where sensors are switched on late, there is nothing to split.
+    """
+    taken = later(recording.t)
+    taken = taken[taken >= np.argmax(known)][: MOST // 2 if smoothed else MOST]
+    t, rows = recording.t[taken], recording.rows[taken]
+    settled = known[taken] & (t - t[:1] >= SETTLED)
+    judged = settled if settled.any() else known[taken]
+    at = list(problem.nuisances.values())
+    of = sources(problem, settings)
+    changed = [_enlarged(problem, rows, each) for each in of]
+    # neither gravity nor a stated roll is a state of the filter: their errors move the estimate
+    changes = leans(settings, problem.spatial)
+    moved = [(leaning(problem, each, settings), rows) for each in changes]
+    with ThreadPoolExecutor() as pool:
+        runs = pool.map(
+            lambda run: _run(run[0], t, run[1], smoothed, judged), [(problem, rows), *changed, *moved]
+        )
+        (angle, P, x, theta), *others = runs
+    found: list[tuple[Source, Array]] = []
+    for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
+        slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
+        found.append((source, np.maximum(slope, 0.0)))
+    stated: list[tuple[Source, Array]] = []
+    by_gravity: Array | None = None
+    for lean, (_, _, state, turned) in zip(changes, others[len(of) :], strict=True):
+        apart = (turned - theta)[np.isfinite(turned - theta)]
+        slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (state - x)[at]) / lean.step
+        if lean.name == "gravity":
+            by_gravity = slope[1:]
+            stated += [
+                (Source(each.source, "B", each.u, each.unit), slope * each.sensitivity * each.u)
+                for each in settings.site.inputs
+            ]
+        else:
+            of_roll = uncertain_roll(settings, problem.spatial)
+            stated.append((Source("stated roll", "B", of_roll, "rad"), slope * of_roll))
+    found += [(source, np.square(shift)) for source, shift in stated]
+    common = np.zeros((len(at), len(at)))
+    for _, shift in stated:
+        common += np.outer(shift[1:], shift[1:])
+    return Parts(_items(found, (ANGLE, *problem.nuisances)), common, by_gravity)
+
+
+def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:
+    """All sources that a problem has, but for gravity and a stated roll."""
+    noise, prior, timing = settings.noise, settings.prior, settings.timing
+    before = _known_before(problem, settings)
+    roll, zero = settings.attitude.roll, settings.zero
+    lever = float(np.hypot(prior.lever_common, prior.lever))
+    flexure = max(prior.heave.level, prior.axial.level)
+    accelerometers = tuple(f"b_{k + 1}" for k in range(problem.count))
+
+    def of_prior(name: str, u: float, unit: str, *begin: str) -> Source:
+        states = tuple(each for each in problem.names if each.startswith(begin) and each not in before)
+        levels = (model.Z_LEVEL, model.X_LEVEL) if begin == ("s_", "flexure_") else ()
+        return Source(name, "B", u, unit, levels=levels, states=states)
+
+    of_states = (
+        of_prior("accelerometer bias", noise.accelerometer_bias, "m/s^2", *accelerometers),
+        of_prior("gyro bias", noise.gyro_bias, "rad/s", "b_g", "b_roll", "b_yaw"),
+        of_prior("lever arms", lever, "m", "dr_"),
+        of_prior("heights", prior.height, "m", "zo_"),
+        of_prior("gyro scale", prior.gyro_scale, "1", "k_g"),
+        of_prior("gyro delay", prior.gyro_delay, "s", "tau_g"),
+        of_prior("roll", 0.0 if roll is None else roll.u, "rad", "phi"),
+        of_prior("flexure of the sting", flexure, "m/s^2", "s_", "flexure_"),
+        Source("earlier run", "B", 1.0, "1", states=before),
+    )
+    delay, motion = (model.COMMON_DELAY_U,), (model.SNAP,)
+    return (
+        Source("accelerometer noise", "A", noise.accelerometer, "m/s^2", (model.NOISE,)),
+        Source("gyro noise", "A", noise.gyro, "rad/s", (model.GYRO_NOISE, model.TURN_NOISE)),
+        *(each for each in of_states if each.states),
+        *([Source("common delay", "B", timing.common_delay_u, "s", levels=delay)] if timing.common_delay_u else []),
+        *([Source("stated zero", "B", zero.u, "rad", stated=True)] if zero is not None else []),
+        Source("motion between samples", "B", 1.0, "1", motion),
+    )  # fmt: skip
+
+
+def _known_before(problem: Problem, settings: AoaSettings) -> tuple[str, ...]:
+    """States whose prior is not that of the study."""
+    usual = stated_problem(settings, problem.spatial).covariance
+    return tuple(
+        name
+        for name, own, other in zip(problem.names, problem.covariance, usual, strict=True)
+        if not np.array_equal(own, other)
+    )
+
+
+def _run(
+    problem: Problem, t: Array, rows: Array, smoothed: bool, judged: Mask
+) -> tuple[float, Array, Array, Array]:
+    """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are ``judged`` (n,)."""
+    state, trace = advance(initial(problem), problem, t, rows, last=True)
+    out = smooth(problem, t, rows, trace.starts) if smoothed else trace.out
+    u = out[judged & np.isfinite(out[:, 1]), 1]
+    return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
+
+
+def _enlarged(problem: Problem, rows: Array, source: Source) -> tuple[Problem, Array]:
+    """The problem and its rows with the variance of a source larger by `_STEP`."""
+    by = 1.0 + _STEP
+    constants, covariance = problem.constants.copy(), problem.covariance.copy()
+    constants[list(source.constants)] *= by
+    constants[list(source.levels)] *= by**0.5
+    at = [problem.names.index(name) for name in source.states]
+    covariance[np.ix_(at, at)] *= by
+    if source.stated:
+        rows = rows.copy()
+        rows[:, problem.count + 2] *= by**0.5
+    return replace(problem, constants=constants, covariance=covariance), rows
+
+
+def _items(found: list[tuple[Source, Array]], names: tuple[str, ...]) -> tuple[BudgetItem, ...]:
+    """Lines of a budget from parts (1 + p,) of variances."""
+    whole = np.sum([part for _, part in found], axis=0)
+    return tuple(
+        BudgetItem(
+            source.name,
+            source.type,
+            source.u,
+            source.unit,
+            {
+                name: float(own / total)
+                for name, own, total in zip(names, part, whole, strict=True)
+                if own > _NOTHING * total
+            },
+        )
+        for source, part in found
+    )

@@ -1,0 +1,147 @@
+"""What an earlier run learned of the sensors, as the prior of the next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inercal.aoa.reference.corrections import corrected as put_right
+from inercal.aoa.reference.corrections import is_verified, prior_of
+from inercal.aoa.result.outcome import COMMAND, geometry
+from inercal.aoa.result.systematic import carried, gravity_u
+from inercal.aoa.result.verdict import is_covariance
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+from inercal.errors import StudyError
+from inercal.estimate.files import load as load_estimate
+from inercal.estimate.result import Estimate
+from inercal.findings import Status
+
+WHERE = "estimator.prior"
+
+_SAME = 1e-6
+"""Change [m, rad, parts] below which a sensor is where it was."""
+
+_USUAL = {"scale": 1.0, "bias_si": 0.0}
+"""Calibration of a sensor for which none is stated."""
+
+_IN_WORDS = {
+    "angle_rad": "lambda = {:.6g} rad",
+    "r_m": "r = {:.6g} m",
+    "z_m": "z = {:.6g} m",
+    "scale": "scale = {:.8g}",
+    "bias_si": "bias = {:.6g} (SI)",
+}
+
+
+def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
+    """Coefficients by name, and their covariances by pairs of names, for `inercal.aoa.fusion.problem.problem`.
+
+    They are errors of the sensors as the earlier study stated them, so that this study must state them alike: a
+    position that was measured anew, or a sensor that was moved, makes them meaningless. Those of a result with a
+    reference angle are those fitted to it, and belong to the study as `corrected` gives it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no result (`inercal.estimate.files.load`).
+    StudyError
+        It is of another command, holds no coefficients, ended with a bad verdict, or is of other sensors.
+    """
+    with _in_form(path):
+        earlier = _usable(path, settings)
+        names, x, P = (
+            prior_of(earlier, settings)
+            if is_verified(earlier)
+            else (earlier.names, earlier.values, _own(earlier, settings))
+        )
+    if not (np.isfinite(x).all() and np.isfinite(P).all()):
+        raise StudyError(WHERE, f"{path} holds coefficients without numbers, expected all of them")
+    if not is_covariance(P):
+        raise StudyError(WHERE, f"{path} holds a covariance with negative variances, expected none")
+    values = dict(zip(names, x.tolist(), strict=True))
+    covariances = {(a, b): float(P[i, j]) for i, a in enumerate(names) for j, b in enumerate(names)}
+    return values, covariances
+
+
+def _own(earlier: Estimate, settings: AoaSettings) -> Array:
+    """Covariance (p, p) without the part of gravity, which `inercal.aoa.result.systematic` carries on from run to run:
+    the error of all of them is one."""
+    slopes = carried(earlier, settings)
+    shift = gravity_u(settings) * np.array([slopes.get(name, 0.0) for name in earlier.names])
+    return np.asarray(earlier.covariance - np.outer(shift, shift))
+
+
+def corrected(path: str | Path, settings: AoaSettings) -> AoaSettings:
+    """The study with scales and axes put right as the earlier run, or those before it, found them on a turntable.
+
+    Raises
+    ------
+    InputError
+        As of `load`.
+    """
+    with _in_form(path):
+        return put_right(_usable(path, settings), settings)
+
+
+@contextmanager
+def _in_form(path: str | Path) -> Iterator[None]:
+    """Refuse a file whose parts are not what this command writes: it was changed by hand, or by another program."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        text = f"{path} does not have the form of a result of {COMMAND}, expected one as inercal wrote it"
+        raise StudyError(WHERE, text) from error
+
+
+def _usable(path: str | Path, settings: AoaSettings) -> Estimate:
+    """The earlier result, after it has been seen that it can be used."""
+    earlier = load_estimate(path)
+    if earlier.command != COMMAND:
+        raise StudyError(WHERE, f"{path} is a result of {earlier.command}, expected one of {COMMAND}")
+    if not is_verified(earlier):
+        if earlier.status is not Status.OK:
+            raise StudyError(
+                WHERE,
+                f"{path} ended {earlier.status.value} ({earlier.message}), expected a run that ended ok",
+            )
+        if not earlier.names:
+            method = earlier.result.get("method", "its method")
+            raise StudyError(
+                WHERE, f"{path} holds no coefficients ({method}), expected a result of the fusion"
+            )
+    _same_sensors(earlier, settings, path)
+    return earlier
+
+
+def _same_sensors(earlier: Estimate, settings: AoaSettings, path: str | Path) -> None:
+    """Refuse a result of sensors that were stated in another way, or of another instrument."""
+    known: Any = earlier.conditions.get("sensors")
+    if not isinstance(known, Mapping) or not all(isinstance(of, Mapping) for of in known.values()):
+        raise StudyError(WHERE, f"{path} does not say where its sensors were, expected conditions.sensors")
+    now = geometry(settings)
+    found, wanted = (", ".join(name for name, of in all.items() if "angle_rad" in of) for all in (known, now))
+    if found != wanted:
+        raise StudyError(WHERE, f"{path} is of the sensors {found}, expected those of the study, {wanted}")
+    for name in dict.fromkeys((*now, *known)):
+        before, stated = (_USUAL | dict(all.get(name, {})) for all in (known, now))
+        for key, value in stated.items():
+            tolerance = 0.0 if key == "scale" else _SAME
+            if not math.isclose(value, before[key], rel_tol=_SAME, abs_tol=tolerance):
+                words = _IN_WORDS[key]
+                raise StudyError(
+                    WHERE,
+                    f"{path} was found with {words.format(before[key])} of {name}, expected {words.format(value)} as "
+                    "in the study: its coefficients are errors of what was stated then",
+                )
+    instruments = [of.get("instrument", "") for of in (earlier.traceability, settings.traceability)]
+    if all(instruments) and instruments[0] != instruments[1]:
+        raise StudyError(
+            WHERE,
+            f"{path} is of the instrument {instruments[0]}, expected that of the study, {instruments[1]}",
+        )

@@ -1,0 +1,344 @@
+"""The estimate of an angle of attack: what was learned of the sensors, how well the angle is known, and the verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.angles import Angles
+from inercal.aoa.fusion.filter_result import SETTLED, Filtered
+from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.reference.corrections import as_stated, told
+from inercal.aoa.result import verdict
+from inercal.aoa.result.budget import parts
+from inercal.aoa.result.systematic import by_fusion, gravity_u
+from inercal.aoa.settings import GYROS, AoaSettings
+from inercal.arrays import Array
+from inercal.estimate.conditions import conditions
+from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.findings import Finding, Status
+
+if TYPE_CHECKING:
+    from inercal.aoa.paper.delay import Delay
+    from inercal.aoa.reference.sensor_fit import Verified
+    from inercal.aoa.result.points import Point
+    from inercal.aoa.result.verification import Error, Errors
+
+
+COMMAND = "aoa"
+
+#: beginnings of names -> unit
+_UNITS = {
+    "b_g": "rad/s",
+    "b_roll": "rad/s",
+    "b_yaw": "rad/s",
+    "b_": "m/s^2",
+    "dr_": "m",
+    "zo_": "m",
+    "k_g": "1",
+    "tau_g": "s",
+}
+
+FLAT = (
+    "; theta is the angle of attack only without roll, yaw and flow angularity; gyros for roll and yaw are not used: "
+    "1 deg of yaw at 8 Hz then costs 0.14 to 0.75 deg of theta, by whatever method"
+)
+
+MODEL = (
+    "A_i = f_x cos lambda_i - f_z sin lambda_i + b_i, f_x = g sin theta - (r_i + dr_i) w^2 - c (z_i + zo_i) al + s_x', "
+    "f_z = c (g cos theta + (r_i + dr_i) al) - c^2 (z_i + zo_i) w^2 + s_z', G = c (1 + k_g) w(t - tau_g) + b_g; w = "
+    "theta', al = w', c the cosine of the roll, s_x', s_z' flexure of the sting"
+)
+
+SPATIAL = (
+    "A_i = f_x cos lambda_i - f_z sin lambda_i + b_i, f_x = g sin theta - (r_i + dr_i) (w^2 + y^2) - (z_i + zo_i) "
+    "(al - p y) + s_x', f_z = g cos theta cos phi + (r_i + dr_i) (al + p y) - (z_i + zo_i) (w^2 + p^2) + s_z', G = "
+    "(1 + k_g) w(t - tau_g) + b_g; theta' = w cos phi + y sin phi, phi' = p + (w sin phi - y cos phi) tan theta; p, y "
+    "rates of roll and yaw less b_roll, b_yaw"
+)
+
+REFERENCES = (
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+    "Tan et al., Large angle-of-attack measurement architecture for wind-tunnel models based on inertial technology "
+    "(2021)",
+)
+
+_OF_FUSION = (
+    "G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, Academic Press (1977), chapter 10",
+)
+
+
+def assemble(
+    recording: Recording,
+    settings: AoaSettings,
+    problem: Problem,
+    filtered: Filtered,
+    findings: Sequence[Finding],
+    delay: Delay | None,
+    points: Iterable[Point] = (),
+    errors: Mapping[str, Errors] | None = None,
+    compared: Mapping[str, Angles] | None = None,
+    verified: Verified | None = None,
+    angles: Angles | None = None,
+) -> Estimate:
+    """Put together what the fusion found.
+
+    Parameters
+    ----------
+    recording : Recording
+        As it was filtered.
+    settings : AoaSettings
+    problem : Problem
+    filtered : Filtered
+    findings : sequence of Finding
+        Of plausibility and diagnosis, beside those of the recording.
+    delay : Delay or None
+        Of the gyro against the accelerometers, as the spectra have it.
+    points : iterable of Point
+    errors : mapping
+        Against the reference angle, by method.
+    compared : mapping
+        Angles of other methods, by name.
+    verified : Verified or None
+        The sensors as fitted to the reference angle.
+    angles : Angles or None
+        Of the fusion, where they are known already (`inercal.aoa.result.systematic.by_fusion`).
+
+    Returns
+    -------
+    Estimate
+        Its parameters are the coefficients of the sensors, at the end of the recording.
+    """
+    angles = by_fusion(recording, settings, problem, filtered) if angles is None else angles
+    names, at = tuple(problem.nuisances), list(problem.nuisances.values())
+    values, P = filtered.state.x[at], filtered.state.P[np.ix_(at, at)]
+    before = np.sqrt(np.diag(problem.covariance)[at])
+    of_sting = verdict.shaken(problem, filtered, settings)
+    said = _said(recording, [*findings, *([] if of_sting is None else [of_sting])])
+    result = _result(recording, settings, angles, delay, points, errors, compared)
+    result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
+    fields = _fields(recording, settings, angles, SPATIAL if problem.spatial else MODEL + FLAT)
+    fields["references"] = REFERENCES + _OF_FUSION
+    dof = float(max(int(np.isfinite(filtered.innovations).sum()) - len(names), 1))
+    fields["statistics"] |= {
+        "dof": dof,
+        "residual_rms": _rms(filtered.innovations),
+        "nis_mean": filtered.nis_mean,
+        "starts": float(len(filtered.starts)),
+    }
+    status, message = verdict.of_fusion(recording, filtered, angles, said)
+    if status is Status.NOT_CONVERGED:
+        return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
+    split = parts(recording, problem, settings, filtered.smoothed, np.isfinite(filtered.theta))
+    covariance = P + split.common
+    u = np.sqrt(np.diag(covariance))
+    rows = zip(names, values.tolist(), u.tolist(), before.tolist(), strict=True)
+    result["posterior"] = {
+        name: {"value": value, "u": own, "prior": prior} for name, value, own, prior in rows
+    }
+    if split.by_gravity is not None:
+        slopes = dict(zip(names, split.by_gravity.tolist(), strict=True))
+        result["gravity"] = {"value": settings.site.gravity, "u": gravity_u(settings), "slopes": slopes}
+    # of numbers that are not to be used, more would be noise
+    at_prior = verdict.left_at_prior(names, np.sqrt(np.diag(P)) / before) if status is Status.OK else None
+    return Estimate(
+        command=COMMAND,
+        names=names,
+        units=tuple(unit_of(name) for name in names),
+        values=values,
+        covariance=covariance,
+        dof=np.full(len(names), dof),
+        k=np.full(len(names), coverage_factor(dof)),
+        status=status,
+        message=message,
+        findings=said if at_prior is None else (*said, at_prior),
+        budget=split.budget,
+        result=result,
+        common=split.common,
+        **fields,
+    )
+
+
+def assemble_paper(
+    recording: Recording,
+    settings: AoaSettings,
+    angles: Angles,
+    findings: Sequence[Finding],
+    delay: Delay | None,
+    points: Iterable[Point] = (),
+    errors: Mapping[str, Errors] | None = None,
+    compared: Mapping[str, Angles] | None = None,
+    verified: Verified | None = None,
+) -> Estimate:
+    """Put together what one of the paper's methods found: angles, and no coefficients. Parameters as of `assemble`."""
+    said = _said(recording, findings)
+    result = _result(recording, settings, angles, delay, points, errors, compared)
+    result |= _of_sensors(settings, verified) | {"nis_mean": None, "posterior": {}}
+    status, message = verdict.of_method(angles, said)
+    fields = _fields(recording, settings, angles, FLAT.removeprefix("; "))
+    fields["model"] = f"{angles.method}; {fields['model']}"
+    return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
+
+
+def _said(recording: Recording, findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """All findings, each once."""
+    return tuple(dict.fromkeys([*recording.findings, *findings]))
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a coefficient by its name: ``b_1``, ``dr_2``, ``tau_g``."""
+    return next(unit for begun, unit in _UNITS.items() if name.startswith(begun))
+
+
+def geometry(settings: AoaSettings) -> dict[str, dict[str, float]]:
+    """Sensors as the study states them, by name: to what the errors that were found of them are relative [SI]."""
+    settings = as_stated(settings)
+    layout = settings.layout
+    each = zip(layout.names, layout.angle.tolist(), layout.r.tolist(), layout.z.tolist(), strict=True)
+    stated = {name: {"angle_rad": angle, "r_m": r, "z_m": z} for name, angle, r, z in each}
+    for name in (*layout.names, *GYROS):
+        calibration = settings.calibration(name)
+        if (calibration.scale, calibration.bias) != (1.0, 0.0):
+            of = {"scale": calibration.scale, "bias_si": calibration.bias}
+            stated[name] = stated.get(name, {}) | of
+    return stated
+
+
+def _of_sensors(settings: AoaSettings, verified: Verified | None) -> dict[str, Any]:
+    """What was put right of the sensors, and what their reference angle says of them, where there is any of it."""
+    changed = {name: {"scale": s, "angle_rad": by} for name, (s, by) in settings.corrections.items()}
+    return {
+        **({"corrections": changed} if changed else {}),
+        **({} if verified is None else {"verified": told(verified)}),
+    }
+
+
+def _fields(recording: Recording, settings: AoaSettings, angles: Angles, model: str) -> dict[str, Any]:
+    """What estimates of all methods hold."""
+    t = recording.t[later(recording.t)]
+    step = float(np.median(np.diff(t))) if len(t) > 1 else math.nan
+    known = angles.theta[np.isfinite(angles.theta)]
+    rate = angles.rate[np.isfinite(angles.rate)]
+    return {
+        "model": model,
+        "statistics": {
+            "samples": float(len(recording.t)),
+            "rate_hz": 1.0 / step,
+            "angles": float(len(known)),
+        },
+        "conditions": conditions(
+            settings,
+            recording.temperature,
+            {
+                "duration_s": float(t[-1] - t[0]) if len(t) else 0.0,
+                "theta_rad": _span(known),
+                "rate_rad_s": float(np.abs(rate).max()) if len(rate) else None,
+            },
+            sensors=geometry(settings),
+        ),
+        "traceability": settings.traceability,
+        "inputs": recording.sources,
+        "provenance": provenance(settings.given),
+        "references": REFERENCES,
+    }
+
+
+def _result(
+    recording: Recording,
+    settings: AoaSettings,
+    angles: Angles,
+    delay: Delay | None,
+    points: Iterable[Point],
+    errors: Mapping[str, Errors] | None,
+    compared: Mapping[str, Angles] | None,
+) -> dict[str, Any]:
+    """The command's own part of a result, of any method."""
+    judged = errors or {}
+    u = angles.u[np.isfinite(angles.u) & _settled(recording)]
+    return {
+        "method": angles.method,
+        "angle": {
+            "range": _span(angles.theta[np.isfinite(angles.theta)]),
+            "u": {"median": _of(np.median, u), "max": _of(np.max, u)},
+        },
+        **({"reference": _reference(judged[angles.method])} if angles.method in judged else {}),
+        "timing": _timing(settings, angles, delay),
+        "points": [asdict(each) for each in points],
+        "compare": {name: _beside(each, angles, judged.get(name)) for name, each in (compared or {}).items()},
+    }
+
+
+def _timing(settings: AoaSettings, angles: Angles, delay: Delay | None) -> dict[str, Any]:
+    """Delays [s], and what a common one does to the angle [rad]: its rate times the delay."""
+    rate = np.abs(angles.rate[np.isfinite(angles.rate)])
+    largest, rms = _of(np.max, rate), _of(lambda w: np.sqrt(np.mean(np.square(w))), rate)
+    timing = settings.timing
+    found: dict[str, Any] = {
+        "gyro_delay": {"stated": timing.gyro_delay, "spectra": None if delay is None else asdict(delay)},
+        "common_delay": {"value": timing.common_delay, "u": timing.common_delay_u},
+    }
+    for name, by in (("cost", timing.common_delay), ("cost_u", timing.common_delay_u), ("cost_per_ms", 1e-3)):
+        found[name] = {
+            "max": None if largest is None else abs(by) * largest,
+            "rms": None if rms is None else abs(by) * rms,
+        }
+    return found
+
+
+def _beside(other: Angles, angles: Angles, judged: Errors | None) -> dict[str, Any]:
+    """What a comparison tells of a method: its difference from the one that counts, and its error."""
+    apart = np.remainder(other.theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
+    apart = apart[np.isfinite(apart)]
+    return {
+        "difference": {
+            "max_abs_deg": _of(lambda x: np.degrees(np.abs(x).max()), apart),
+            "rms_deg": _of(lambda x: np.degrees(np.sqrt(np.mean(np.square(x)))), apart),
+        },
+        "u_median_deg": _of(lambda x: np.degrees(np.median(x)), other.u[np.isfinite(other.u)]),
+        **({} if judged is None else {"reference": _reference(judged)}),
+    }
+
+
+def _reference(errors: Errors) -> dict[str, Any]:
+    """Errors against the reference angle, in degrees."""
+    return _error(errors.all) | {"static": _error(errors.static), "moving": _error(errors.moving)}
+
+
+def _error(error: Error) -> dict[str, Any]:
+    """Errors of some rows."""
+    return {
+        "max_abs_deg": math.degrees(error.max_abs),
+        "rms_deg": math.degrees(error.rms),
+        "mean_deg": math.degrees(error.mean),
+        "rms_over_u": error.ratio,
+        "rows": error.rows,
+    }
+
+
+def _settled(recording: Recording) -> NDArray[np.bool_]:
+    """Rows after the first 2 s; all of a recording that is shorter."""
+    later_rows = recording.t - recording.t[:1] >= SETTLED
+    return later_rows if later_rows.any() else np.ones(len(recording.t), dtype=np.bool_)
+
+
+def _span(values: Array) -> list[float] | None:
+    """Smallest and largest; None without any."""
+    return [float(values.min()), float(values.max())] if len(values) else None
+
+
+def _of(of: Any, values: Array) -> float | None:
+    """A statistic of values; None without any."""
+    return float(of(values)) if len(values) else None
+
+
+def _rms(innovations: Array) -> float:
+    """Root mean square of normalised innovations; NaN without any."""
+    known = innovations[np.isfinite(innovations)]
+    return math.sqrt(float(np.mean(np.square(known)))) if known.size else math.nan

@@ -1,0 +1,163 @@
+"""Test points: one angle for each pause, with the uncertainty of the mean.
+
+What is wrong with an angle through a pause (biases, positions, axes) is wrong with it in each row: the mean of n rows
+is no better known than one of them, and the mean of their standard uncertainties is its own. To it comes what noise
+and buffet leave in the mean of rows that are correlated, often negatively. It is found from the spectrum near zero:
+with the lowest K cosines of the pause,
+
+    L_k = sqrt(2/n) sum_i x_i cos(pi k (i + 1/2) / n),   var(mean) = (1/n) (1/K) sum_k L_k^2,
+
+K = 8 degrees of freedom. For white noise that is s^2/n, for noise of correlation time c well below the pause's length
+T (c < T / pi K) s^2 2c/T, and for an oscillation, whose mean is all but zero over whole periods, twice the variance
+that its cut periods leave. A drift of the angle counts as scatter. Source: Lazarus, Lewis, Stock and Watson 2018, "HAR
+inference: recommendations for practice", J. Business and Economic Statistics 36(4) (equally weighted cosines).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.angles import Angles
+from inercal.aoa.flow import alpha_beta
+from inercal.aoa.reading.pauses import pauses
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+
+Indices = NDArray[np.int64]
+
+COSINES = 8
+
+
+@dataclass(frozen=True)
+class Point:
+    """One test point.
+
+    Attributes
+    ----------
+    number : float
+        Of the record's ``point`` column; counted from 1 where there is none.
+    trigger, last_trigger : float
+        First and last number of the record's ``trigger`` column in the point; NaN without any.
+    begin, end : float
+        s, of the first and last row with an angle, ``start`` the first row of the recording and ``stop`` the one after
+        the last; ``rows`` of them have an angle.
+    theta, u : float
+        rad, mean and its standard uncertainty: ``u_angle`` common to all rows and ``u_scatter`` of noise and buffet,
+        which is not to be counted where something else is averaged over the same rows.
+    scatter, rate : float
+        rad, standard deviation about the mean; rad/s, slope of the line through the point.
+    alpha, u_alpha, beta, u_beta : float
+        rad, at the mean angle, and the mean roll where it is tracked.
+    """
+
+    number: float
+    trigger: float
+    last_trigger: float
+    begin: float
+    end: float
+    start: int
+    stop: int
+    rows: int
+    theta: float
+    u: float
+    u_angle: float
+    u_scatter: float
+    scatter: float
+    rate: float
+    alpha: float
+    u_alpha: float
+    beta: float
+    u_beta: float
+
+
+def points(recording: Recording, angles: Angles, settings: AoaSettings) -> tuple[Point, ...]:
+    """The test points of a recording.
+
+    A point is a stretch with one number in the record's ``point`` column, a number that comes again later another one;
+    without that column it is a pause of the angle itself (`inercal.aoa.reading.pauses`). Rows without an angle are
+    left out, and end no point.
+    """
+    known = np.flatnonzero(np.isfinite(angles.theta) & np.isfinite(recording.t))
+    theta = np.unwrap(angles.theta[known])
+    if recording.point is None:
+        found = pauses(recording.t[known], theta, angles.known_u[known])
+        stretches = [(float(k), each.start, each.stop) for k, each in enumerate(found, start=1)]
+    else:
+        stretches = _numbered(recording.point[known])
+    return tuple(
+        _point(number, known[a:b], theta[a:b], recording, angles, settings) for number, a, b in stretches
+    )
+
+
+def _numbered(number: Array) -> list[tuple[float, int, int]]:
+    """Stretches of one number: it, the first row and the one after the last."""
+    last, now = number[:-1], number[1:]
+    changes = np.flatnonzero((last != now) & ~(np.isnan(last) & np.isnan(now))) + 1
+    bounds = [0, *changes.tolist(), len(number)]
+    return [
+        (float(number[a]), a, b) for a, b in itertools.pairwise(bounds) if b > a and not np.isnan(number[a])
+    ]
+
+
+def _point(
+    number: float,
+    rows: Indices,
+    theta: Array,
+    recording: Recording,
+    angles: Angles,
+    settings: AoaSettings,
+) -> Point:
+    """The point of some ``rows``, at which the angle is ``theta``, without jumps."""
+    t = recording.t[rows]
+    mean = float(theta.mean())
+    common, left = float(angles.u[rows].mean()), mean_u(theta)
+    u = math.hypot(common, left)
+    own = math.hypot(float(angles.known_u[rows].mean()), left)
+    mean = math.remainder(mean, 2.0 * math.pi)
+    roll, roll_u, by_roll = (
+        None if each is None else each[rows].mean(keepdims=True)
+        for each in (angles.roll, angles.roll_u, angles.by_roll)
+    )
+    flow = alpha_beta(np.array([mean]), np.array([own]), settings.attitude, roll, roll_u, by_roll)
+    triggers = np.full(1, np.nan) if recording.trigger is None else recording.trigger[rows]
+    triggers = triggers[np.isfinite(triggers)] if np.isfinite(triggers).any() else np.full(1, np.nan)
+    since = t - t.mean()
+    power = float(since @ since)
+    return Point(
+        number=number,
+        trigger=float(triggers[0]),
+        last_trigger=float(triggers[-1]),
+        begin=float(t[0]),
+        end=float(t[-1]),
+        start=int(rows[0]),
+        stop=int(rows[-1]) + 1,
+        rows=len(rows),
+        theta=mean,
+        u=u,
+        u_angle=common,
+        u_scatter=left,
+        scatter=float(theta.std()),
+        rate=float(since @ theta) / power if power > 0.0 else 0.0,
+        alpha=float(flow.alpha[0]),
+        u_alpha=float(flow.u_alpha[0]),
+        beta=float(flow.beta[0]),
+        u_beta=float(flow.u_beta[0]),
+    )
+
+
+def mean_u(x: Array) -> float:
+    """Standard uncertainty that noise and oscillations leave in the mean of ``x`` (n,), evenly sampled; 0 for one."""
+    n = len(x)
+    count = min(COSINES, n - 1)
+    if count < 1:
+        return 0.0
+    k = np.arange(1, count + 1)
+    cosines = np.cos(math.pi / n * k[:, None] * (np.arange(n) + 0.5))
+    found = math.sqrt(2.0 / n) * (cosines @ (x - x.mean()))
+    return math.sqrt(float(found @ found) / (count * n))

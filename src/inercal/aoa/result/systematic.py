@@ -1,0 +1,147 @@
+"""Gravity and roll, which a study states with uncertainties: what their errors do to the angle.
+
+No estimator learns them here. How a wrong one moves theta depends on how the method settles the contradiction between
+sensors that follows, for the fusion on all that it may learn: so the method is run again with each a little off, and
+the change of theta, row by row, is the slope.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.aoa.angles import Angles, stated_roll
+from inercal.aoa.fusion import model
+from inercal.aoa.fusion.filter_result import Filtered, estimate, of_fusion
+from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.roll import tracked
+from inercal.aoa.paper.methods import measure
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.reading.wind_off_zero import tare
+from inercal.aoa.reference.corrections import is_verified
+from inercal.aoa.settings import AoaSettings, Methods
+from inercal.arrays import Array
+from inercal.estimate.files import load as load_estimate
+from inercal.estimate.result import Estimate
+
+ROLL_STEP = 1e-4
+"""Change of the roll [rad] for a slope."""
+
+GRAVITY_STEP = 1e-5
+"""Relative change of gravity."""
+
+_KNOWN = 1e-6
+"""Relative uncertainty of gravity, 0.00006 deg at most, from which it counts."""
+
+
+class Lean(NamedTuple):
+    """What is changed, ``gravity`` or ``roll``, by a ``step`` [m/s^2 or rad]; ``gravity`` and ``roll`` are then so."""
+
+    name: str
+    step: float
+    gravity: float
+    roll: float
+
+
+def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
+    """A change of each of what is stated with an uncertainty; a roll that gyros track is a state, and has none."""
+    g, roll = settings.site.gravity, settings.attitude.roll
+    level, found = 0.0 if roll is None else roll.value, []
+    if gravity_u(settings) > _KNOWN * g:
+        found.append(Lean("gravity", g * GRAVITY_STEP, g * (1.0 + GRAVITY_STEP), level))
+    if uncertain_roll(settings, tracked):
+        found.append(Lean("roll", ROLL_STEP, g, level + ROLL_STEP))
+    return tuple(found)
+
+
+def leaning(problem: Problem, lean: Lean, settings: AoaSettings) -> Problem:
+    """The problem of the fusion under a change, which moves also what an earlier run found."""
+    constants, mean = problem.constants.copy(), problem.mean.copy()
+    constants[[model.GRAVITY, model.ROLL_COSINE]] = lean.gravity, math.cos(lean.roll)
+    prior = settings.estimator.prior
+    if lean.name == "gravity" and prior is not None:
+        for name, slope in carried(load_estimate(prior), settings).items():
+            if name in problem.names:
+                mean[problem.names.index(name)] += slope * lean.step
+    return replace(problem, constants=constants, mean=mean)
+
+
+def carried(earlier: Estimate, settings: AoaSettings) -> dict[str, float]:
+    """By how much gravity [m/s^2] moved the coefficients [SI] of an earlier run of the fusion, by their names.
+
+    Empty where they were found with another gravity than that of the study, whose error is another, or without its
+    uncertainty, or from a reference angle.
+    """
+    known = earlier.result.get("gravity")
+    if known is None or is_verified(earlier):
+        return {}
+    same = zip((known["value"], known["u"]), (settings.site.gravity, gravity_u(settings)), strict=True)
+    return dict(known["slopes"]) if all(math.isclose(a, b, rel_tol=1e-9) for a, b in same) else {}
+
+
+def by_fusion(recording: Recording, settings: AoaSettings, problem: Problem, filtered: Filtered) -> Angles:
+    """The angles of the fusion, with the roll where gyros track it, and with what is stated in their uncertainty."""
+    angles, turned = of_fusion(filtered, settings.estimator.states), tracked(recording, problem, filtered)
+    if turned is not None:
+        angles = replace(angles, roll=turned[0], roll_u=turned[1])
+    return _with_stated(
+        angles,
+        settings,
+        lambda lean: estimate(recording, leaning(problem, lean, settings), filtered.smoothed).theta,
+    )
+
+
+def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
+    """The angles of the paper's methods (`inercal.aoa.paper.methods.measure`) less the biases that the study's zero
+    shows, with what is stated in their uncertainty."""
+
+    def found(chosen: AoaSettings) -> Angles:
+        return measure(tare(recording, chosen), chosen, methods)
+
+    def run(lean: Lean) -> Array:
+        attitude, site = settings.attitude, replace(settings.site, gravity=lean.gravity)
+        if attitude.roll is not None:
+            attitude = replace(attitude, roll=replace(attitude.roll, value=lean.roll))
+        return found(replace(settings, site=site, attitude=attitude)).theta
+
+    return _with_stated(found(settings), settings, run)
+
+
+def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Array]) -> Angles:
+    """The angles with what is stated in their uncertainty; ``run`` gives theta under a change."""
+    changes = leans(settings, angles.roll is not None)
+    with ThreadPoolExecutor() as pool:
+        return widened(angles, settings, changes, list(pool.map(run, changes)))
+
+
+def widened(
+    angles: Angles, settings: AoaSettings, changes: Sequence[Lean], turned: Sequence[Array]
+) -> Angles:
+    """The angles with what is stated in their uncertainty, from theta (n,) under each of the ``changes``.
+
+    A row in which there is no such theta goes without.
+    """
+    for lean, theta in zip(changes, turned, strict=True):
+        off = np.remainder(theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
+        slope = np.where(np.isnan(off) & np.isfinite(angles.theta), 0.0, off) / lean.step
+        if lean.name == "roll":
+            angles = stated_roll(replace(angles, by_roll=slope), settings.attitude)
+        else:
+            angles = replace(angles, u=np.hypot(angles.u, slope * gravity_u(settings)))
+    return angles
+
+
+def gravity_u(settings: AoaSettings) -> float:
+    """Standard uncertainty [m/s^2] of the gravity of the site."""
+    return math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in settings.site.inputs))
+
+
+def uncertain_roll(settings: AoaSettings, tracked: bool) -> float:
+    """Standard uncertainty [rad] of the roll that is stated; 0 where gyros track it: then it is a state."""
+    roll = settings.attitude.roll
+    return 0.0 if roll is None or tracked else roll.u

@@ -1,0 +1,245 @@
+"""Tables of an angle of attack for people: the angle, points, sensors, where u comes from, methods side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Container, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from inercal.aoa.flow import stated
+from inercal.aoa.result.budget import ANGLE
+from inercal.aoa.result.display import (
+    in_words,
+    off_stated,
+    off_statement,
+    short,
+    shown_unit,
+    sized,
+    use_of_fit,
+)
+from inercal.aoa.result.points import Point
+from inercal.aoa.settings import AoaSettings
+from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.table import Table
+
+_OF_AXIS = ("mrad", 1e-3)
+"""Unit of the error of an axis."""
+
+_SMALL = 0.001
+"""Share of a variance below which a source is not listed."""
+
+
+def answer(estimate: Estimate, points: Iterable[Point], settings: AoaSettings) -> list[Table]:
+    """What was asked for: the angle, and the points where there are any."""
+    return _with_rows(angle(estimate), points_table(points, settings))
+
+
+def on_page(estimate: Estimate) -> list[Table]:
+    """What a page shows besides the answer, and the errors of the sensors as its coefficients."""
+    return _with_rows(fitted(estimate), uncertainty(estimate), methods(estimate))
+
+
+def on_terminal(estimate: Estimate) -> list[Table]:
+    """What a terminal shows besides the answer: of a fit to a reference what is off."""
+    fit = estimate.result.get("verified")
+    off = fitted(estimate, () if fit is None else off_statement(fit))
+    return _with_rows(sensors(estimate), off, uncertainty(estimate), methods(estimate))
+
+
+def _with_rows(*tables: Table) -> list[Table]:
+    """Those that have any."""
+    return [each for each in tables if each.rows]
+
+
+def angle(estimate: Estimate) -> Table:
+    """Range of the angle, its uncertainty, and its error where there is a reference."""
+    told = estimate.result
+    found, u, judged = told["angle"]["range"], told["angle"]["u"], told.get("reference", {})
+    rate = estimate.conditions["ranges"]["rate_rad_s"]
+    rows = [
+        ("angle, smallest", *_degrees(None if found is None else found[0], 6)),
+        ("angle, largest", *_degrees(None if found is None else found[1], 6)),
+        ("u of the angle, median after 2 s", *_degrees(u["median"])),
+        ("u of the angle, largest after 2 s", *_degrees(u["max"])),
+        ("rate, largest", short(None if rate is None else math.degrees(rate)), "deg/s"),
+    ]
+    for key, words in (
+        ("max_abs_deg", "largest error"),
+        ("rms_deg", "rms error"),
+        ("mean_deg", "mean error"),
+    ):
+        if key in judged:
+            rows.append((f"{words} against theta_ref", short(judged[key]), "deg"))
+    return Table("Angle", f"By {told['method']}.", (("", ""), ("value", ""), ("unit", "")), tuple(rows))
+
+
+def points_table(points: Iterable[Point], settings: AoaSettings) -> Table:
+    """Points in a row each, with alpha and beta where the study says how the model lies in the stream."""
+    flow = stated(settings.attitude)
+    rows = []
+    for each in points:
+        alpha, u_alpha = _rounded(each.alpha, each.u_alpha)
+        beta, u_beta = _rounded(each.beta, each.u_beta)
+        rows.append(
+            (
+                f"{each.number:g}",
+                _numbers(each.trigger, each.last_trigger),
+                f"{each.begin:.3f}",
+                f"{each.end:.3f}",
+                *_rounded(each.theta, each.u),
+                short(math.degrees(each.scatter)),
+                *((alpha, u_alpha, beta, u_beta) if flow else ()),
+            )
+        )
+    return Table(
+        "Points",
+        "Mean angle of each point and its standard uncertainty; scatter is the standard deviation about it.",
+        (
+            ("point", ""),
+            ("trigger", ""),
+            ("begins", "s"),
+            ("ends", "s"),
+            ("theta", "deg"),
+            ("u", "deg"),
+            ("scatter", "deg"),
+            *((("alpha", "deg"), ("u", "deg"), ("beta", "deg"), ("u", "deg")) if flow else ()),
+        ),
+        tuple(rows),
+        2,
+    )
+
+
+def sensors(estimate: Estimate) -> Table:
+    """What was learned of the sensors, with the uncertainty before and after."""
+    rows = []
+    for name, each in estimate.parameters.items():
+        unit, size = shown_unit(each.unit)
+        prior = estimate.result["posterior"][name]["prior"]
+        value, u = rounded(each.value / size, each.u / size)
+        rows.append((name, in_words(name), value, u, short(prior / size), unit))
+    return Table(
+        "Errors of the sensors",
+        "As estimated at the end of the recording; u before is the standard uncertainty that the study, or an earlier "
+        "run, gave.",
+        (("", ""), ("what it is", ""), ("value", ""), ("u", ""), ("u before", ""), ("unit", "")),
+        tuple(rows),
+        2,
+    )
+
+
+def fitted(estimate: Estimate, names: Container[str] | None = None) -> Table:
+    """What the reference angle says of the sensors: of those with these ``names``, or of all."""
+    fit = estimate.result.get("verified")
+    heads = (("", ""), ("what it is", ""), ("value", ""), ("u", ""), ("unit", ""), ("as angle", "deg"))
+    title, rows = "Sensors as fitted to the reference angle", []
+    if fit is None:
+        return Table(title, "", heads, ())
+    for each in fit["parameters"]:
+        name, value = each["name"], off_stated(each)
+        if names is not None and name not in names:
+            continue
+        unit, size = _OF_AXIS if name.startswith("dlambda_") else shown_unit(each["unit"])
+        shown, u = rounded(value / size, each["u"] / size)
+        angle = f"{math.degrees(value):.4f}" if name.startswith("dlambda_") else ""
+        told = ("not seen", "–", "", "") if name in fit["unseen"] else (shown, u, unit, angle)
+        rows.append((name, in_words(name), *told))
+    title += "" if fit["converged"] else ": it did not converge, and is not to be used"
+    noise = short(math.degrees(fit["reference_noise_rad"]))
+    rows.append(("", "noise of theta_ref from sample to sample", noise, "–", "deg", ""))
+    caption = f"What each sensor reads against theta_ref, its zero and its clock taken as true. {use_of_fit(estimate)}"
+    return Table(title, caption, heads, tuple(rows), 2)
+
+
+def uncertainty(estimate: Estimate) -> Table:
+    """Where the uncertainty of the angle comes from, the largest part first."""
+    variance = estimate.result["angle"]["u"]["median"]
+    found = sorted(estimate.budget, key=lambda each: -each.share.get(ANGLE, 0.0))
+    rows = []
+    for each in found:
+        share = each.share.get(ANGLE, 0.0)
+        if share >= _SMALL and variance is not None:
+            stated_u, unit = sized(each.u, each.unit)
+            size = "" if unit == "1" else f"{short(stated_u)} {unit}"
+            part = math.degrees(variance) * math.sqrt(share)
+            rows.append((each.source, size, short(100.0 * share), short(part)))
+    return Table(
+        "Where the uncertainty of the angle comes from",
+        "Share of each source in the variance of the angle, on average after the first 2 s of a stretch at the "
+        "beginning, and its part of the median u.",
+        (("source", ""), ("standard uncertainty", ""), ("share", "%"), ("part of u", "deg")),
+        tuple(rows),
+        2,
+    )
+
+
+def methods(estimate: Estimate) -> Table:
+    """Methods side by side: errors against the reference angle where there is one, else differences from the first."""
+    told = estimate.result
+    judged = "reference" in told
+    rows = [
+        (
+            told["method"],
+            _errors(told.get("reference")) if judged else ("–", "–"),
+            told["angle"]["u"]["median"],
+        )
+    ]
+    for name, each in told["compare"].items():
+        u = each["u_median_deg"]
+        u = None if u is None else math.radians(u)
+        apart = each["difference"]
+        numbers = (
+            _errors(each.get("reference"))
+            if judged
+            else (short(apart["max_abs_deg"]), short(apart["rms_deg"]))
+        )
+        rows.append((name, numbers, u))
+    lines = tuple((name, *numbers, _degrees(u)[0]) for name, numbers, u in rows) if told["compare"] else ()
+    caption, heads = (
+        (
+            "Angle less theta_ref after the first 2 s, also where the reference rests and moves.",
+            ("largest error", "rms", "mean", "rms at rest", "rms moving"),
+        )
+        if judged
+        else (f"Difference of the angle from that of {told['method']}.", ("largest difference", "rms"))
+    )
+    return Table(
+        "Methods side by side",
+        f"{caption} The last column is the median u that each method states.",
+        (("method", ""), *((head, "deg") for head in heads), ("u", "deg")),
+        lines,
+    )
+
+
+def _errors(judged: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Largest, rms and mean error, and rms at rest and in motion."""
+    if judged is None:
+        return ("–",) * 5
+    return (
+        short(judged["max_abs_deg"]),
+        short(judged["rms_deg"]),
+        short(judged["mean_deg"]),
+        short(judged["static"]["rms_deg"]),
+        short(judged["moving"]["rms_deg"]),
+    )
+
+
+def _degrees(value: float | None, digits: int = 2) -> tuple[str, str]:
+    """An angle [rad] in degrees, and the unit."""
+    return short(None if value is None else math.degrees(value), digits), "deg"
+
+
+def _rounded(value: float, u: float) -> tuple[str, str]:
+    """An angle and its standard uncertainty [rad] in degrees; dashes where there is none."""
+    if not math.isfinite(value):
+        return "–", "–"
+    shown, spread = rounded(float(np.degrees(value)), float(np.degrees(u)))
+    return shown, spread
+
+
+def _numbers(first: float, last: float) -> str:
+    """Trigger numbers: the first and the last."""
+    if math.isnan(first):
+        return "–"
+    return f"{first:g}" if first == last else f"{first:g}-{last:g}"

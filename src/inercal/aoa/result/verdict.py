@@ -1,0 +1,187 @@
+"""Whether angles can be used: the status of an estimate, its sentence, and what is found beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.angles import Angles
+from inercal.aoa.fusion.filter_result import SETTLED, Filtered
+from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+from inercal.estimate.factor import NEGATIVE
+from inercal.findings import Finding, Status
+from inercal.records.places import counted, counted_names
+from inercal.units import STANDARD_GRAVITY
+
+NIS_LIMIT = 2.0
+"""Mean squared innovation, over its variance, above which a recording contradicts the model."""
+
+NIS_CHANCE = 1e-5
+"""Chance to find a sound recording above the limit, where that is so short that scatter alone may be."""
+
+AT_PRIOR = 0.9
+"""Part of its prior above which a coefficient is no better known than before."""
+
+SHAKING = 5.0
+"""Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
+
+_LOSSES = 3
+"""Losses of the angle without a gap from which a filter does not hold it."""
+
+_BLIND = 0.1
+"""Time [s] without accelerometers after which no filter has the angle."""
+
+_CAUSES = (
+    "unit_suspect", "channel_swap", "sign_suspect", "command_shift", "dead_channel", "rate_change", "saturation",
+    "unmodelled", "site_suspect", "prior_suspect", "excess_scatter", "contradiction", "outlier", "gap",
+)  # fmt: skip
+"""Findings that explain innovations too large, the likeliest first."""
+
+_GROSS = frozenset(("unit_suspect", "channel_swap", "sign_suspect", "command_shift"))
+"""Faults for which the angle is another one."""
+
+_HARMLESS = frozenset(
+    ("gap", "nan", "bad_row", "outlier", "saturation", "low_scatter", "at_prior", "gyro_missing")
+)
+"""Findings that leave an angle good, or say so by themselves."""
+
+
+def of_fusion(
+    recording: Recording, filtered: Filtered, angles: Angles, said: Sequence[Finding]
+) -> tuple[Status, str]:
+    """Status and sentence of what the fusion found; ``said`` all findings.
+
+    ``inconsistent`` where the mean NIS is beyond its limit, and also below it where sensors contradict each other so
+    grossly that a fault of sign, unit or order is named: resonators and gates take much of it up, and the angle is
+    wrong all the same.
+    """
+    state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
+    if 2 * known.sum() <= len(known):
+        return Status.NOT_CONVERGED, _because(_missing(known), said)
+    if not (np.isfinite(state.x).all() and is_covariance(state.P)):
+        return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
+    limit = nis_limit(filtered.nis_count)
+    if mean > limit:
+        text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {limit:.3g}"
+        return Status.INCONSISTENT, _because(text, said)
+    gross = [each for each in said if each.code in _GROSS and each not in recording.findings]
+    if gross:
+        return Status.INCONSISTENT, _because("the sensors contradict each other or the study", gross)
+    lost = _lost(recording, filtered)
+    if lost is not None:
+        return Status.NOT_CONVERGED, _because(lost, said)
+    judged = f"mean NIS {mean:.3g}" if math.isfinite(mean) else "too few readings for a NIS"
+    return Status.OK, _doubted(f"{_words(angles)}, {judged}", said)
+
+
+def nis_limit(count: int) -> float:
+    """Most that the mean of ``count`` squared innovations may be: `NIS_LIMIT`, and more where they are few.
+
+    A sound filter's squares are chi-square with one degree of freedom each (Bar-Shalom et al., Estimation with
+    Applications to Tracking and Navigation, 2001, section 5.4).
+    """
+    from scipy.special import chdtri
+
+    return max(NIS_LIMIT, float(chdtri(count, NIS_CHANCE)) / count) if count else NIS_LIMIT
+
+
+def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:
+    """Status and sentence of what one of the paper's methods found."""
+    known = np.isfinite(angles.theta)
+    if 2 * known.sum() <= len(known):
+        return Status.NOT_CONVERGED, _because(_missing(known), said)
+    return Status.OK, _doubted(f"{angles.method}: {_words(angles)}", said)
+
+
+def is_covariance(P: Array) -> bool:
+    """Whether no combination of states has a negative variance, but for rounding."""
+    if not (np.isfinite(P).all() and (np.diag(P) >= 0.0).all()):
+        return False
+    u = np.sqrt(np.diag(P))
+    u[u == 0.0] = 1.0
+    with np.errstate(over="ignore"):
+        correlation = P / u / u[:, None]
+    return bool(np.isfinite(correlation).all() and np.linalg.eigvalsh(correlation)[0] >= NEGATIVE)
+
+
+def _lost(recording: Recording, filtered: Filtered) -> str | None:
+    """That a filter lost the angle too often, in words; None where it did not."""
+    seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
+    losses = [
+        row
+        for row in filtered.starts[1:]
+        if np.searchsorted(seen, recording.t[row] - _BLIND) < np.searchsorted(seen, recording.t[row])
+    ]
+    if len(losses) < _LOSSES:
+        return None
+    return (
+        f"the filter lost the angle {counted(len(losses), 'time')} though there were accelerometers, first at "
+        f"{recording.t[losses[0]]:.6g} s"
+    )
+
+
+def _missing(known: NDArray[np.bool_]) -> str:
+    """That most rows have no angle."""
+    return f"{counted(int((~known).sum()), 'row')} of {len(known)} have no angle"
+
+
+def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
+    """Of all coefficients whose u is a ``ratio`` (p,) of their prior's: those of which the recording says nothing."""
+    left = [name for name, each in zip(names, ratio, strict=True) if each > AT_PRIOR]
+    if not left:
+        return None
+    text = (
+        f"{counted_names(left, 8)}: no better known than before, as is common; a sweep of pitch shows biases, "
+        "oscillation lever arms, heights and the gyro's scale"
+    )
+    return Finding("at_prior", text)
+
+
+def shaken(problem: Problem, filtered: Filtered, settings: AoaSettings) -> Finding | None:
+    """That the sting shakes the model, where it does."""
+    at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
+    if not at or not len(filtered.kept_t):
+        return None
+    rows = filtered.states[filtered.kept_t - filtered.kept_t[0] >= SETTLED][:, at]
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    if not len(rows):
+        return None
+    rms = float(np.sqrt(np.mean(np.square(rows), axis=0)).max())
+    noise = settings.noise.accelerometer
+    if not rms > SHAKING * noise:
+        return None
+    text = (
+        f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms, {rms / noise:.2g} times their noise: u "
+        "of the angle may be too small, by some 20 %"
+    )
+    return Finding("flexure", text)
+
+
+def _because(text: str, said: Sequence[Finding]) -> str:
+    """A bad verdict with the finding that explains it best."""
+    ranked = sorted(
+        (each for each in said if each.code in _CAUSES), key=lambda each: _CAUSES.index(each.code)
+    )
+    cause = ranked[0].message if ranked else "check signs, units, positions, noise and gravity"
+    return f"{text}; {cause}"
+
+
+def _doubted(text: str, said: Sequence[Finding]) -> str:
+    """A good verdict with the findings for which angles may be wrong all the same."""
+    codes = dict.fromkeys(each.code for each in said if each.code not in _HARMLESS)
+    return f"{text}; but see {', '.join(codes)}: angles may be off by more than u" if codes else text
+
+
+def _words(angles: Angles) -> str:
+    """How many angles, from where to where, and how well they are known."""
+    known = np.isfinite(angles.theta)
+    low, high = np.degrees([angles.theta[known].min(), angles.theta[known].max()])
+    u = angles.u[np.isfinite(angles.u)]
+    told = f", u {math.degrees(float(np.median(u))):.2g} deg (median)" if len(u) else ""
+    return f"{counted(int(known.sum()), 'angle')} from {low:.4g} to {high:.4g} deg{told}"

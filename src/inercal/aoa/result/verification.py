@@ -1,0 +1,81 @@
+"""How far angles are from a reference angle, as a turntable gives it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.angles import Angles
+from inercal.aoa.fusion.filter_result import SETTLED
+from inercal.aoa.reading.pauses import at_rest
+from inercal.aoa.reading.recording import Recording
+from inercal.arrays import Array
+from inercal.errors import RecordError
+
+REFERENCE_U = 1e-5
+"""Angle [rad], some seconds of arc, by which a reference may creep in half a second and stand still."""
+
+
+@dataclass(frozen=True)
+class Error:
+    """Angle less reference over some ``rows`` [rad]: largest magnitude, root mean square and mean; NaN without rows.
+
+    ``ratio`` is the root mean square of the error over its standard uncertainty: about 1, or below, where that holds.
+    """
+
+    max_abs: float
+    rms: float
+    mean: float
+    ratio: float
+    rows: int
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of a ``method`` over ``all`` rows, and where the reference stands still or moves."""
+
+    method: str
+    all: Error
+    static: Error
+    moving: Error
+
+
+def errors(recording: Recording, angles: Angles, after: float = SETTLED) -> Errors:
+    """Errors of angles against the recording's reference from ``after`` [s] on, while a filter settles before.
+
+    The reference stands still in the windows of `inercal.aoa.reading.pauses.at_rest`.
+
+    Raises
+    ------
+    RecordError
+        There is no reference angle.
+    """
+    if recording.reference is None or not np.isfinite(recording.reference).any():
+        raise RecordError("theta_ref", "missing, expected a reference angle to verify angles against")
+    known = np.flatnonzero(np.isfinite(recording.reference) & np.isfinite(recording.t))
+    t, reference = recording.t[known], np.unwrap(recording.reference[known])
+    off = np.remainder(angles.theta[known] - reference + math.pi, 2.0 * math.pi) - math.pi
+    u = angles.u[known]
+    still, _ = at_rest(t, reference, np.full(len(t), REFERENCE_U))
+    taken = np.isfinite(off) & (t >= t[0] + after)
+    return Errors(
+        angles.method,
+        _error(off, u, taken),
+        _error(off, u, taken & still),
+        _error(off, u, taken & ~still),
+    )
+
+
+def _error(off: Array, u: Array, taken: NDArray[np.bool_]) -> Error:
+    """Of the rows that are taken."""
+    off, u = off[taken], u[taken]
+    if len(off) == 0:
+        return Error(math.nan, math.nan, math.nan, math.nan, 0)
+    told = np.isfinite(u) & (u > 0.0)
+    ratio = math.sqrt(float(np.mean((off[told] / u[told]) ** 2))) if told.any() else math.nan
+    return Error(
+        float(np.abs(off).max()), math.sqrt(float(np.mean(off**2))), float(off.mean()), ratio, len(off)
+    )

@@ -1,0 +1,147 @@
+"""What is said of a recording or a result: findings, and the verdict that programs test."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+
+class Harm(enum.Enum):
+    """Whether a finding of a code says that an effect outside the model may shift a value by more than its u."""
+
+    NEVER = "never"
+    BY_SIZE = "by size"
+    ALWAYS = "always"
+
+
+@dataclass(frozen=True)
+class Code:
+    """What a code means, and whether findings of it do harm."""
+
+    meaning: str
+    harm: Harm
+
+
+_NEVER, _BY_SIZE, _ALWAYS = Harm
+
+#: codes are a contract; more may be added
+CODES: dict[str, Code] = {
+    "gap": Code("samples are missing", _NEVER),
+    "duplicate_time": Code("a time stamp is repeated", _NEVER),
+    "backward_time": Code("time runs backward", _BY_SIZE),
+    "nan": Code("values are missing or not numbers", _NEVER),
+    "bad_row": Code("rows that cannot be read as numbers", _NEVER),
+    "truncated": Code("the file ends within a row", _NEVER),
+    "file_changed": Code("a file was written to while it was read", _BY_SIZE),
+    "saturation": Code("a sensor sits at an extreme of its range", _BY_SIZE),
+    "dead_channel": Code("a channel never changes", _BY_SIZE),
+    "rate_change": Code("the sample rate changes", _BY_SIZE),
+    "other_clock": Code("channels have clocks of their own", _NEVER),
+    "unit_suspect": Code("the values do not fit the stated unit", _BY_SIZE),
+    "sign_suspect": Code("an axis looks reversed", _BY_SIZE),
+    "channel_swap": Code("axes look exchanged", _BY_SIZE),
+    "stuck_encoder": Code("an angle stands still while the instrument turns", _BY_SIZE),
+    "command_shift": Code("commanded and measured motion are shifted in time", _BY_SIZE),
+    "wrap_2pi": Code("an angle jumps by a full turn", _BY_SIZE),
+    "at_prior": Code("a parameter is no better known than before the measurement", _NEVER),
+    "gimbal_lock": Code("two axes of the gimbals come close to each other", _BY_SIZE),
+    "outlier": Code("single samples far from their neighbours", _NEVER),
+    "contradiction": Code("sensors contradict each other", _ALWAYS),
+    "gyro_missing": Code("there are no gyro channels, or they cannot be calibrated", _NEVER),
+    "gyro_restless": Code("the gyro is too restless in the holds to help in finding them", _NEVER),
+    "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),
+    "bias_drift": Code("a bias drifts over the recording", _BY_SIZE),
+    "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
+    "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
+    "unused_labels": Code("labels of a recording that were of no use", _NEVER),
+    "hysteresis": Code("values on rising and on falling temperature differ", _BY_SIZE),
+    "outside_range": Code("a value is stated outside the range it was measured over", _BY_SIZE),
+    "excess_scatter": Code("the scatter of the residuals exceeds what the sensor noise explains", _BY_SIZE),
+    "few_degrees_of_freedom": Code("hardly more data than unknowns", _NEVER),
+    "resolution": Code(
+        "steps of the output hide its noise, or numbers have more digits than can be kept", _BY_SIZE
+    ),
+    "poor_section": Code("a section of the recording does not hold what it should", _BY_SIZE),
+    "turn_cut": Code("a turn goes on beyond its section", _BY_SIZE),
+    "turn_doubtful": Code("which motion is a turn is not certain", _BY_SIZE),
+    "skipped_turn": Code("a turn was left out of the fit", _NEVER),
+    "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
+    "uncertain_site": Code("gravity or earth rate is known so badly that it rules the uncertainties", _NEVER),
+    "whole_turns": Code(
+        "the angle of a turning axis is not known, and whole turns are taken for granted", _BY_SIZE
+    ),
+    "weak_term": Code("a term is hardly known", _NEVER),
+    "noise_misfit": Code("the noise is not of the kinds that are fitted", _NEVER),
+    "large_errors": Code("errors of the table are so large that their squares matter", _ALWAYS),
+    "not_stated": Code("a file does not state what a calibration should", _NEVER),
+    "not_held": Code("something of a calibration is not taken along", _NEVER),
+    "other_frame": Code("the axes are not those of the calibration", _BY_SIZE),
+    "no_coefficients": Code("nothing is known of the instrument by which table errors act", _BY_SIZE),
+    "not_at_rest": Code("the instrument moves, or is disturbed, where it should be at rest", _BY_SIZE),
+    "bad_verdict": Code("a calibration that is used ended with a bad verdict", _ALWAYS),
+    "other_model": Code("two calibrations are not of the same kind", _BY_SIZE),
+    "same_recording": Code("two calibrations rest on the same recording", _BY_SIZE),
+    "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),
+    "flexure": Code("the support of the model shakes its sensors", _ALWAYS),
+    "unmodelled": Code("the recording shows errors that the model leaves out", _ALWAYS),
+    "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE),
+    "low_scatter": Code("the scatter of the residuals is below what the stated noise explains", _NEVER),
+    "prior_suspect": Code("a value is far outside what its prior allows", _BY_SIZE),
+    "filter_fails": Code("an estimator fails on a sound recording", _BY_SIZE),
+    "perhaps_common": Code("sources that may act alike in two calibrations", _NEVER),
+    "failed_case": Code("a case of the validation did not pass", _BY_SIZE),
+}
+
+EVERYTHING = ("*",)
+"""The ``harm`` of a finding that may shift every value; an estimate puts its own names in its place."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing worth knowing: a code of `CODES`, a sentence, and where it was seen.
+
+    ``harm`` names what an effect outside the model may shift by more than its u: parameters, ``theta`` of angles,
+    channels of a recording, or `EVERYTHING`. Always empty for a code that never does harm; `EVERYTHING` if absent for
+    one that always does.
+    """
+
+    code: str
+    message: str
+    where: str = ""
+    harm: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a code that is not in the table, and harm that its code rules out."""
+        if self.code not in CODES:
+            raise ValueError(f"unknown finding code {self.code!r}")
+        match CODES[self.code].harm:
+            case Harm.NEVER if self.harm:
+                raise ValueError(f"findings of the code {self.code!r} do no harm, found {self.harm}")
+            case Harm.ALWAYS if not self.harm:
+                object.__setattr__(self, "harm", EVERYTHING)
+
+
+class Status(enum.Enum):
+    """How an estimate ended. The value is the code of the JSON result; codes are a contract."""
+
+    OK = "ok"
+    ILL_CONDITIONED = "ill_conditioned"
+    NOT_CONVERGED = "not_converged"
+    INCONSISTENT = "inconsistent"
+    UNOBSERVABLE = "unobservable"
+    TOO_FEW_INTERVALS = "too_few_intervals"
+
+    @property
+    def meaning(self) -> str:
+        """One sentence: what this verdict says."""
+        return _MEANING[self]
+
+
+_MEANING = {
+    Status.OK: "the estimate is sound",
+    Status.ILL_CONDITIONED: "the data fix some combination of the parameters only weakly",
+    Status.NOT_CONVERGED: "the iteration ended before it reached a minimum",
+    Status.INCONSISTENT: "the data contradict the model or the stated noise",
+    Status.UNOBSERVABLE: "the data say nothing about some combination of the parameters",
+    Status.TOO_FEW_INTERVALS: "too few static intervals were found to fit the model",
+}

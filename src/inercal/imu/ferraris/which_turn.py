@@ -1,0 +1,134 @@
+"""Which of the motions about an axis was the turn, and what speaks against each of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.findings import Finding
+from inercal.imu.ferraris.detection import Detected
+from inercal.imu.ferraris.gravity_transfer import Carried, carry
+from inercal.imu.ferraris.motions import Motion
+from inercal.imu.ferraris.names import POSITIONS, TURNS
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.records.column import Triad
+
+NEAR = 0.25
+"""Largest deviation of a turn of physical outputs from the stated angle, as a part of it."""
+
+SMALLEST = 0.7
+"""Least size of the largest motion about an axis, over that of the others, that can be its turn of counts."""
+
+UNSEEN = 1e-3
+"""Standard uncertainty of a scale factor by a turn, as a part of it, that stands for all but its angle."""
+
+UNLIKELY = 5.0
+"""Deviation over its standard uncertainty beyond which a motion was not the turn."""
+
+CLOSER = 16.0
+"""Difference of the squares of such deviations from which the larger is not chosen."""
+
+BLUNT = 0.05
+"""Standard uncertainty of a carried scale factor, as a part of it, from which it tells nothing."""
+
+SLIGHT = 1e-3
+"""Difference of two motions, as a part of the turn, that needs no words."""
+
+GRAVE = 1e-2
+"""Difference of two motions, as a part of the turn, from which a result should not be used."""
+
+
+ASK = "label it, or state it under imu.ferraris.sections"
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The turns ``motions`` by axis; the ``doubt`` (3,) about their angles [rad], by what else they may have been; what
+    speaks ``against`` the result, and other ``findings``."""
+
+    motions: dict[int, Motion]
+    doubt: Array
+    against: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
+
+
+def choose(acc: Triad, gyro: Triad, found: Detected, options: FerrarisSettings) -> Choice:
+    """The turn about each axis, as far as there is a motion that can be it.
+
+    It gives the scale factor by which gravity is carried from rest to rest, where that is known; else one near the
+    nominal, or of counts one like those of the other axes. Of motions that cannot be told apart one in the stated
+    sense is taken, of a single stretch between holds, and the likeliest; the others make the doubt about its angle.
+    """
+    known = carry(acc, gyro, found) if all(name in found.positions for name in POSITIONS) else None
+    about = {axis: [m for m in found.motions if m.axis == axis] for axis in range(3)}
+    turns: dict[int, Motion] = {}
+    doubt, said, untold = np.zeros(3), list[tuple[bool, Finding]](), []
+    for axis, motions in about.items():
+        gains = np.array([_gain(m, axis, known, options.turn) for m in motions])
+        off, u = np.abs(gains), math.inf
+        if known is not None and known.u[axis] < BLUNT:
+            off = off / known.scale[axis] - 1.0
+            u = math.hypot(options.turn_u / options.turn, UNSEEN, float(known.u[axis]))
+        elif gyro.unit.dimension == "rate":
+            off = off * gyro.unit.factor - 1.0
+        else:
+            own = _largest({axis: motions})
+            off = off * abs(options.turn) / own - 1.0 if own > SMALLEST * _largest(about) else np.inf * off
+        rows = [k for k in range(len(motions)) if abs(off[k]) < NEAR]
+        if not rows:
+            continue
+        least = float(np.min(np.abs(off[rows]))) / u
+        rows = [k for k in rows if (off[k] / u) ** 2 <= least**2 + CLOSER]
+        rows = [k for k in rows if gains[k] > 0.0] or rows
+        best = min(rows, key=lambda k: (not motions[k].single, abs(off[k]), motions[k].stop))
+        other = max(rows, key=lambda k: abs(gains[k] - gains[best]))
+        turns[axis], where = motions[best], _where(acc, motions[best])
+        apart = abs(abs(float(gains[other] / gains[best])) - 1.0)
+        doubt[axis] = apart * abs(options.turn)
+        if least > UNLIKELY:
+            by = math.degrees(abs(options.turn) * (1.0 + float(off[best])))
+            message = (
+                f"gravity, carried through the motion between the rests, says that the turn {TURNS[axis]} found was "
+                f"by {by:.1f} deg, not by {math.degrees(abs(options.turn)):g} deg: {ASK}, and check imu.ferraris.turn"
+            )
+            said.append((True, Finding("contradiction", message, where)))
+        if apart > max(SLIGHT, abs(options.turn_u / options.turn)):
+            message = (
+                f"which motion is the turn {TURNS[axis]} is not certain: the one taken and the one from "
+                f"{_where(acc, motions[other])} differ by {100 * apart:.2g} %: {ASK}"
+            )
+            said.append((apart > GRAVE, Finding("turn_doubtful", message, where)))
+        if math.isinf(u):
+            untold.append(TURNS[axis])
+    if untold:
+        message = (
+            "the motion between the rests does not tell by what angle the instrument was turned: that the motions "
+            f"found are the whole of {', '.join(untold)} is taken for granted"
+        )
+        said.append((False, Finding("turn_doubtful", message)))
+    against, findings = (tuple(f for grave, f in said if grave is each) for each in (True, False))
+    return Choice(turns, doubt, against, findings)
+
+
+def _gain(motion: Motion, axis: int, known: Carried | None, turn: float) -> float:
+    """The scale factor [output per rad/s] if this was the turn; bias and g-sensitivity are those in the positions."""
+    if known is None:
+        return float(motion.rotation[axis] / turn)
+    bias = known.at_rest.rate_bias + known.at_rest.apparent_g @ motion.up
+    return float((motion.integral - motion.duration * bias)[axis] / turn)
+
+
+def _largest(about: Mapping[int, list[Motion]]) -> float:
+    """The largest rotation [output s] of a single stretch about one of the axes."""
+    return max(
+        (abs(m.rotation[k]) for k, each in about.items() for m in each if m.stretches == 1), default=0.0
+    )
+
+
+def _where(acc: Triad, motion: Motion) -> str:
+    """From when to when."""
+    return f"t {acc.t[motion.start]:.2f} to {acc.t[motion.stop - 1]:.2f} s"

@@ -1,0 +1,283 @@
+"""Bounds before the test: how well any unbiased estimator can know the coefficients along a path.
+
+The covariance of the error-state filter, linearised along the true path, is the Cramer-Rao bound of the model (Van
+Trees and Bell, Bayesian Bounds, 2007): its Riccati recursion needs no measurements, only the path, the noise, and the
+prior. Split by where errors come from, the same recursion says how much each source adds:
+
+    P_s+ = (1 - K h)(F P_s F^T + Q_s)(1 - K h)^T + K R_s K^T,   sum of all P_s = P,   K the gain of the whole
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal._jit import kernel
+from inercal.selfcal.filters.filter_result import Problem
+from inercal.selfcal.filters.gaps import anew
+from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
+from inercal.selfcal.platform.coefficients import names, product_slope, to_linear
+from inercal.selfcal.platform.kinematics import Axes, attitude
+from inercal.selfcal.platform.linearised import (
+    Indices,
+    accelerometer_row,
+    encoder_roots,
+    propagate_covariance,
+)
+from inercal.selfcal.platform.model import on_the_base, platform_rate, simulate_truth, specific_force
+from inercal.selfcal.platform.plan import Motion
+from inercal.selfcal.platform.recording import Recording
+
+Array: TypeAlias = NDArray[np.float64]
+Mask: TypeAlias = NDArray[np.bool_]
+
+BAYESIAN_BOUNDS: Final = (
+    "H. L. Van Trees, K. L. Bell (editors), Bayesian Bounds for Parameter Estimation and Nonlinear Filtering/Tracking, "
+    "Wiley (2007)"
+)
+"""The publication behind these bounds."""
+
+SOURCES: Final = ("angle random walk", "accelerometer", "encoder", "prior")
+"""Where the errors of an estimate come from, in the order of `Bounds.contributions`."""
+
+
+#: parts of accelerometer and encoder; an array, for numba compiles a kernel anew for each literal number
+_PARTS: Final = np.array([2, 3])
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """What a path can tell.
+
+    Attributes
+    ----------
+    names : length p
+    covariance : (p, p)
+        Of the coefficients at the end of the path, product form.
+    prior : (p,)
+        Standard deviations before it.
+    history : (n, p)
+        Standard uncertainties from row to row, linear form; without rows where not asked for.
+    contributions : mapping
+        Source (`SOURCES`) -> its part (p, p) of the covariance; they add up to it. Empty where not asked for. The first
+        encoder reading, from which the attitude is known at the start, belongs to the encoder.
+    """
+
+    names: tuple[str, ...]
+    covariance: Array
+    prior: Array
+    history: Array
+    contributions: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def u(self) -> Array:
+        """(p,) standard uncertainties at the end of the path."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def shares(self) -> Mapping[str, Array]:
+        """Source -> its share (p,) of each coefficient's variance; they add up to 1."""
+        variance = np.diag(self.covariance)
+        return {source: np.diag(part) / variance for source, part in self.contributions.items()}
+
+
+def bounds(
+    motion: Motion,
+    problem: Problem,
+    truth: Array | None = None,
+    measured: Mask | None = None,
+    history: bool = False,
+    contributions: bool = False,
+) -> Bounds:
+    """Bounds along a commanded motion.
+
+    Parameters
+    ----------
+    motion : Motion
+    problem : Problem
+        Noise, prior and near-level gating; the other settings of its filter play no part.
+    truth : (p,) or longer, optional
+        True coefficients, product form: the path is the one on which they take the platform. The nominal path if
+        absent.
+    measured : (n, 4) bool, optional
+        Which rows have a measurement by accelerometer x, y, z and by the encoders; all if absent. The first row's play
+        no part.
+    history, contributions : bool
+        Whether to return these.
+    """
+    p = len(problem.prior)
+    c = np.zeros(p) if truth is None else to_linear(truth[:p])
+    world, n, rate = problem.world, len(motion.t), motion.rate
+    q, dt = np.empty((n, 4)), np.diff(motion.t)
+    first = np.array(attitude(motion.angles[0], world.axes, world.signs))
+    without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
+    simulate_truth(first, rate[:, None], dt[0], without, c, world.earth, world.up, q, unused)
+    seen = np.ones((n, 4), dtype=np.bool_) if measured is None else measured
+    return _along(q, motion.angles, dt, rate, seen, c, problem, history, contributions)
+
+
+def recorded_bounds(
+    recording: Recording,
+    problem: Problem,
+    attitudes: Array,
+    coefficients: Array,
+    history: bool = False,
+    contributions: bool = False,
+    restarts: Sequence[int] = (),
+) -> Bounds:
+    """Bounds along a path as it was estimated, with the measurements that a recording has.
+
+    Parameters
+    ----------
+    recording : Recording
+    problem : Problem
+    attitudes : (n, 4)
+        Estimated ``q_bp`` at its rows.
+    coefficients : (p,)
+        Estimated, linear form.
+    history, contributions : bool
+        Whether to return these.
+    restarts : sequence of int
+        Rows at which the attitude was taken anew from the encoders.
+    """
+    seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
+    path = recording.th, recording.dt, recording.rate
+    return _along(attitudes, *path, seen, coefficients, problem, history, contributions, restarts)
+
+
+def _along(
+    q: Array,
+    th: Array,
+    dt: Array,
+    rate: Array,
+    seen: Mask,
+    c: Array,
+    problem: Problem,
+    history: bool,
+    contributions: bool,
+    restarts: Sequence[int] = (),
+) -> Bounds:
+    """Bounds along attitudes (n, 4) with coefficients (p,), linear form."""
+    p, world, noise = len(c), problem.world, problem.noise
+    u = np.empty((len(q) if history else 0, p))
+    start = np.zeros((2, 3 + p))
+    start[0, :3], start[1, 3:] = noise.encoder**2, problem.prior**2
+    P = np.zeros((1 + len(SOURCES) if contributions else 1, 3 + p, 3 + p))
+    P[0] = np.diag(start[0] + start[1])
+    if contributions:
+        P[3], P[4] = np.diag(start[0]), np.diag(start[1])
+    sigmas = noise.levels
+    gate = gate_of(problem.filter.gating)
+    told = c, world.earth, world.up, world.axes, world.signs, sigmas, gate
+    first, angles = 0, np.arange(3)
+    for last in (*restarts, len(q)):
+        rows, steps = slice(first, last), slice(first, max(last - 1, 0))
+        riccati(P, q[rows], th[rows], dt[steps], rate[steps], seen[rows], *told, u[rows])
+        if last < len(q):
+            P[:, :3], P[:, :, :3] = 0.0, 0.0
+            P[:, angles, angles] = [
+                [anew(problem, th[last]).sigma ** 2 if s in (0, 3) else 0.0] for s in range(len(P))
+            ]
+        first = last
+    slope = product_slope(c)
+    whole, *parts = (slope @ each[3:, 3:] @ slope.T for each in P)
+    split = dict(zip(SOURCES, parts, strict=True)) if contributions else {}
+    return Bounds(names(p), whole, problem.prior, u, split)
+
+
+@kernel
+def observe(P: Array, places: Indices, row: Array, count: int, r: float, source: int, work: Array) -> None:
+    """Covariance ``P[0]`` and its parts ``P[1:]`` (m, m) after a scalar measurement, in place.
+
+    ``row[:count]`` is its derivative by the states ``places[:count]``, ``r`` its variance, which belongs to the part
+    ``source``; ``work`` (2, m) is used up.
+    """
+    m = P.shape[1]
+    gain, own = work[0], work[1]
+    for s in range(len(P)):
+        inner = r if s == 0 or s == source else 0.0
+        for i in range(m):
+            own[i] = 0.0
+            for k in range(count):
+                own[i] += P[s, i, places[k]] * row[k]
+        for k in range(count):
+            inner += row[k] * own[places[k]]
+        if s == 0:
+            for i in range(m):
+                gain[i] = own[i] / inner
+        for i in range(m):
+            for k in range(i + 1):
+                P[s, i, k] += gain[i] * inner * gain[k] - gain[i] * own[k] - own[i] * gain[k]
+                P[s, k, i] = P[s, i, k]
+
+
+@kernel
+def riccati(
+    P: Array,
+    q: Array,
+    th: Array,
+    dt: Array,
+    w: Array,
+    seen: Mask,
+    c: Array,
+    earth: Array,
+    up: Array,
+    axes: Axes,
+    signs: Array,
+    sigmas: Array,
+    gate: Array,
+    u: Array,
+) -> None:
+    """Covariance of the error state along a path, in place.
+
+    Parameters
+    ----------
+    P : (1 or 1 + sources, 3 + p, 3 + p) at the first row; the whole, then its parts
+    q : (n, 4) attitudes
+    th : (n, 3) rad, gimbal angles
+    dt : (n - 1,) s
+    w : (n - 1, 3) rad/s, commanded
+    seen : (n, 4) whether accelerometers x, y, z and the encoders were measured
+    c : (p,) coefficients, linear form
+    earth, up : (3,) rad/s, m/s^2, in b
+    axes, signs : (3,) of the gimbals
+    sigmas : (3,) angle random walk [rad/sqrt(s)], accelerometer [m/s^2], encoder [rad]
+    gate : (4,) of `inercal.selfcal.filters.gating`
+    u : (n or 0, p) receives standard uncertainties
+    """
+    m, p = P.shape[1], len(c)
+    top, work, row = np.empty((6, m)), np.empty((2, m)), np.empty(10)
+    places, near = np.empty(10, dtype=np.int64), np.zeros(3, dtype=np.int64)
+    earth_e, up_e = on_the_base(earth, c), on_the_base(up, c)
+    for k in range(len(q)):
+        at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
+        if k > 0:
+            step = dt[k - 1]
+            rate_c = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
+            rate = platform_rate(rate_c, c)
+            gained = sigmas[0] * sigmas[0] * step
+            for s in range(len(P)):
+                noise = gained if s < 2 else 0.0
+                propagate_covariance(P[s], c, rate_c, rate, earth_e, at, step, noise, top)
+            if seen[k, 3]:
+                watch(specific_force(attitude(th[k], axes, signs), up_e), gate, near)
+            if updating(gate, near):
+                if seen[k, 3]:
+                    roots, _ = encoder_roots(th[k], axes, signs, sigmas[2])
+                    for i in range(3):
+                        for j in range(i + 1):
+                            places[j], row[j] = j, roots[i][j]
+                        observe(P, places, row, i + 1, 1.0, _PARTS[1], work)
+                f = specific_force(at, up_e)
+                for i in range(3):
+                    if seen[k, i] and admitted(i, gate, near):
+                        count = accelerometer_row(i, f, c, up_e, at, places, row)
+                        observe(P, places, row, count, sigmas[1] * sigmas[1], _PARTS[0], work)
+        if len(u) > 0:
+            for i in range(p):
+                u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

@@ -1,0 +1,130 @@
+"""What a path cannot see, for reports: bounds against prior and goal, the worst combinations in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.identifiability import Learned, learned
+from inercal.estimate.result import rounded
+from inercal.findings import Finding, Status
+from inercal.selfcal.before.bounds import Bounds
+from inercal.selfcal.display import of_field
+from inercal.selfcal.filters.filter_result import Filtered
+
+AT_PRIOR = 0.5
+"""Part of its prior above which a coefficient counts as left at it."""
+
+UNOBSERVABLE = 0.9
+"""Part of its prior above which a path says nothing about a coefficient."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A path judged by its bounds.
+
+    ``learned`` against the prior; ``to_goal`` u over the wanted u, by name, of those coefficients that have a goal.
+    """
+
+    bounds: Bounds
+    learned: Learned
+    to_goal: Mapping[str, float]
+
+    @property
+    def rank(self) -> int:
+        """Number of combinations of coefficients of which the path tells something."""
+        return int(np.sum(self.learned.left <= UNOBSERVABLE))
+
+    @property
+    def at_prior(self) -> tuple[str, ...]:
+        """Names of the coefficients that the path leaves at their prior."""
+        return self.learned.at_prior(AT_PRIOR)
+
+    @property
+    def unmet(self) -> tuple[str, ...]:
+        """Names of the coefficients whose goal the path does not reach."""
+        return tuple(name for name, ratio in self.to_goal.items() if ratio > 1.0)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What the path cannot see: one for each coefficient at its prior, or wider than wanted."""
+        ratio = dict(zip(self.bounds.names, self.learned.ratio, strict=True))
+        u = {name: f"{size} {unit}" for name, size, unit in self._shown()}
+        left = [
+            Finding(
+                "at_prior",
+                f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]}",
+            )
+            for name in self.at_prior
+        ]
+        wide = [
+            Finding(
+                "goal_missed",
+                f"{name}: the path leaves u = {u[name]}, {self.to_goal[name]:.3g} times the goal",
+            )
+            for name in self.unmet
+            if name not in self.at_prior
+        ]
+        return (*left, *wide)
+
+    def worst(self, count: int = 3) -> list[str]:
+        """The worst-known combinations in words, with what is left of the prior of each."""
+        weakest = self.learned.weakest(count)
+        return [
+            f"{words}: {100 * left:.3g} %" for words, left in zip(weakest, self.learned.left, strict=False)
+        ]
+
+    def table(self) -> str:
+        """Bounds, what is left of the prior, and what the goal asks, as aligned text."""
+        lines = [f"{'':<7}  {'bound u':>9}  {'unit':<7} {'of prior':>9}  {'of goal':>8}"]
+        for (name, u, unit), ratio in zip(self._shown(), self.learned.ratio, strict=True):
+            goal = f"{self.to_goal[name]:8.3g}" if name in self.to_goal else "       –"
+            lines.append(f"{name:<7}  {u:>9}  {unit:<7} {100 * ratio:7.3g} %  {goal}")
+        return "\n".join(lines)
+
+    def _shown(self) -> list[tuple[str, str, str]]:
+        """Name, u and unit of each coefficient for people."""
+        unit, size = of_field(len(self.bounds.names))
+        texts = (rounded(u, u)[1] for u in self.bounds.u / size)
+        return list(zip(self.bounds.names, texts, unit, strict=True))
+
+
+def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:
+    """Judge a path; ``goal`` wanted standard uncertainty [SI] by name of coefficient."""
+    to_goal = {
+        name: float(u / goal[name]) for name, u in zip(bounds.names, bounds.u, strict=True) if name in goal
+    }
+    return Seen(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
+
+
+def useless(filtered: Filtered, bounds: Bounds, by_filter: Array) -> tuple[Status, str] | None:
+    """Status and sentence where there are no numbers to be used, None where there are: ``by_filter`` (p, p), product
+    form, and the bounds must be covariances."""
+    if not filtered.converged:
+        return Status.NOT_CONVERGED, filtered.message
+    if not filtered.dims.any():
+        return Status.UNOBSERVABLE, (
+            "no row after the first has a measurement that is used: all are missing, or stopped by near-level gating"
+        )
+    return singular(bounds.prior, by_filter, bounds.covariance)
+
+
+def singular(prior: Array, *covariances: Array) -> tuple[Status, str] | None:
+    """Status and sentence where a covariance (p, p) is none within rounding, in units of the ``prior`` (p,)."""
+    scale = np.outer(prior, prior)
+    if all(_positive(P / scale) for P in covariances):
+        return None
+    return Status.ILL_CONDITIONED, (
+        "the covariance is numerically singular: noise and prior lie too many powers of ten apart for this path; "
+        "check their units"
+    )
+
+
+def _positive(P: Array) -> bool:
+    """True for a positive definite matrix."""
+    try:
+        return bool(np.isfinite(np.linalg.cholesky(P)).all())
+    except np.linalg.LinAlgError:
+        return False

@@ -1,0 +1,215 @@
+"""Designing the path of a self-calibration: the path found beside named ones of the same time, by their bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.findings import Finding
+from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, Bounds, bounds
+from inercal.selfcal.before.observability import Seen, seen
+from inercal.selfcal.before.path_search import LOCK, criterion, search
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
+from inercal.selfcal.settings import SelfcalSettings
+
+Array: TypeAlias = NDArray[np.float64]
+Mask: TypeAlias = NDArray[np.bool_]
+
+REFERENCES = (BAYESIAN_BOUNDS,)
+"""Publications behind the judgement of a path."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A plan, what its bounds say, its ``criterion``, and the joints it takes ``beyond`` their limits."""
+
+    name: str
+    plan: Plan
+    seen: Seen
+    criterion: float
+    beyond: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Designed:
+    """A path that was searched for.
+
+    Attributes
+    ----------
+    compare : tuple of Judged
+        The path found first, then those it is compared with: the study's own, and the named ones that take no more
+        than the time; each has a rest at the end where it takes less.
+    message : str
+        What was searched, in words.
+    findings : tuple of Finding
+        What the path found cannot see, and whether it comes close to gimbal lock.
+    """
+
+    compare: tuple[Judged, ...]
+    message: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """The path found."""
+        return self.compare[0].plan
+
+    @property
+    def bounds(self) -> Bounds:
+        """Bounds along it."""
+        return self.compare[0].seen.bounds
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The command's part of the JSON result: u in SI; turns as a study states them."""
+        least = min(map(_log_volume, self.compare))
+        entries = [_entry(each, least) for each in self.compare]
+        return {**{key: value for key, value in entries[0].items() if key != "name"}, "compare": entries}
+
+    def table(self) -> str:
+        """The moves, the bounds of the path found, and the comparison, as aligned text."""
+        first = self.compare[0]
+        stated = stated_moves(first.plan.moves)
+        moves = [f"{k:4d}  {what:<4}  {by:>10}" for k, (what, by, *_) in enumerate(stated, start=1)]
+        wide = max(len(each.name) for each in self.compare)
+        lines = [f"{'path':<{wide}}  {'time [s]':>8}  {'criterion':>9}  {'worst u of prior':>23}  at prior"]
+        for each in self.compare:
+            learned = each.seen.learned
+            k = int(np.argmax(learned.ratio))
+            worst = f"{100 * learned.ratio[k]:.3g} % {learned.names[k]}"
+            remark = ", ".join(each.seen.at_prior) or "none"
+            beyond = f"; beyond the limits of {', '.join(each.beyond)}" if each.beyond else ""
+            figures = f"{each.plan.duration:8.6g}  {each.criterion:9.3g}  {worst:>23}"
+            lines.append(f"{each.name:<{wide}}  {figures}  {remark}{beyond}")
+        return "\n".join(["   #  move", *moves, "", first.seen.table(), "", *lines])
+
+
+def design(
+    settings: SelfcalSettings, progress: Callable[[int, int], None] = lambda done, total: None
+) -> Designed:
+    """Search for a path within rate, time and limits, and set it beside others.
+
+    Bounds are those of the nominal path: nothing has to be known of the coefficients but their prior.
+
+    Parameters
+    ----------
+    settings : SelfcalSettings
+        ``plan`` for rate, step, start and time; ``search``; ``limits``; ``goal``; prior and noise.
+    progress : callable
+        Told (done, total) of the search.
+
+    Raises
+    ------
+    StudyError
+        No time is stated, or no turn fits into time and limits.
+    """
+    found = search(settings, progress)
+    asked = settings.search
+    plans = {"found": found}
+    if settings.plan is not None:
+        plans["study"] = lasting(settings.plan, found.duration)
+    for name in PATHS:
+        other = replace(path(name, found.step), rate=found.rate, start=found.start)
+        left = found.duration - other.duration
+        if left > -found.step / 2.0 and (settings.plan is None or other.moves != settings.plan.moves):
+            plans[name] = lasting(other, found.duration)
+    judged = tuple(_judged(name, plan, settings) for name, plan in plans.items())
+    lock = float(np.abs(np.cos(found.angles()[:, 1])).min())
+    near = (
+        [Finding("gimbal_lock", f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found")]
+        if lock < LOCK
+        else []
+    )
+    by = {"worst": "largest u", "mean": "geometric mean of u"}[asked.criterion]
+    return Designed(
+        judged,
+        f"up to {asked.turns} turns of multiples of {math.degrees(asked.angle):g} deg in {found.duration:g} s, by the "
+        f"{by} over {'goal or prior' if settings.goal else 'prior'}: {found.words()}",
+        (*judged[0].seen.findings(), *near),
+    )
+
+
+def lasting(plan: Plan, time: float) -> Plan:
+    """The plan with a rest at the end that makes it last ``time`` [s]."""
+    left = time - plan.duration
+    return replace(plan, moves=(*plan.moves, Rest(left))) if left > plan.step / 2.0 else plan
+
+
+def with_stops(plan: Plan, angle: float, rate: float) -> Plan:
+    """Multi-position calibration on the same path and of the same time: turns in parts of at most ``angle`` [rad] at a
+    higher ``rate`` [rad/s], and rests of equal length after each.
+
+    Raises
+    ------
+    ValueError
+        At that rate the turns alone take longer than the plan.
+    """
+    parts = []
+    for move in plan.moves:
+        if isinstance(move, Turn):
+            number = math.ceil(abs(move.angle) / angle - 1e-9)
+            parts += [Turn(move.joint, move.angle / number, rate)] * number
+    rest = (plan.duration - replace(plan, moves=tuple(parts)).duration) / len(parts)
+    if rest < 0.0:
+        raise ValueError(
+            f"found turns at {rate:g} rad/s that take longer than the plan, expected a higher rate"
+        )
+    rest = plan.step * math.floor(rest / plan.step + 1e-9)
+    stopping = replace(plan, moves=tuple(move for part in parts for move in (part, Rest(rest))))
+    return lasting(stopping, plan.duration)
+
+
+def at_rest(plan: Plan) -> Mask:
+    """(n, 4) whether a row is measured, for `inercal.selfcal.before.bounds`, where that is done at rest alone."""
+    resting = [isinstance(move, Rest) for move in plan.moves]
+    rows = np.repeat([False, *resting], [1, *map(plan.steps, plan.moves)])
+    return np.repeat(rows[:, None], 4, axis=1)
+
+
+def stated_moves(moves: tuple[Move, ...]) -> list[list[str]]:
+    """Moves as a study states them: joint, angle and where it is not the plan's the rate; or a rest."""
+    return [_stated(move) for move in moves]
+
+
+def _stated(move: Move) -> list[str]:
+    """A move as a study states it."""
+    if isinstance(move, Rest):
+        return ["rest", f"{move.duration:.10g} s"]
+    rate = [] if move.rate is None else [f"{math.degrees(move.rate):.10g} deg/s"]
+    return [move.joint, f"{math.degrees(move.angle):.10g} deg", *rate]
+
+
+def _judged(name: str, plan: Plan, settings: SelfcalSettings) -> Judged:
+    """Bounds along a plan, and what they say."""
+    along = bounds(motion(plan, settings.world), problem(settings))
+    value = criterion(along, settings.goal, settings.search.criterion)
+    return Judged(name, plan, seen(along, settings.goal), value, tuple(plan.beyond(settings.limits)))
+
+
+def _log_volume(judged: Judged) -> float:
+    """Mean logarithm of what is left of the prior of each combination."""
+    return float(np.mean(np.log(judged.seen.learned.left)))
+
+
+def _entry(judged: Judged, least: float) -> dict[str, Any]:
+    """A path for JSON; ``d_efficiency`` is 1 for the one of the comparison with the smallest confidence ellipsoid."""
+    learned = judged.seen.learned
+    return {
+        "name": judged.name,
+        "turns": stated_moves(judged.plan.moves),
+        "time": judged.plan.duration,
+        "rank": judged.seen.rank,
+        "condition": learned.condition,
+        "d_efficiency": math.exp(least - _log_volume(judged)),
+        "criterion": judged.criterion,
+        "predicted": dict(zip(judged.seen.bounds.names, judged.seen.bounds.u.tolist(), strict=True)),
+        "at_prior": list(judged.seen.at_prior),
+        "worst_combinations": judged.seen.worst(),
+        "beyond": list(judged.beyond),
+    }

@@ -1,0 +1,258 @@
+"""Searching for a path: sequences of turns, improved from random starts until no small change makes them better.
+
+A sequence is judged by its bounds at coarser steps, with the noise of a sample taken down accordingly: its turns are
+whole multiples of one angle. The changes tried are those of exchange algorithms (`inercal.designs.exchange`), for
+sequences: a turn reversed, given to another joint, shortened or lengthened, two exchanged, one divided.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.errors import StudyError
+from inercal.selfcal.before.bounds import Bounds, bounds
+from inercal.selfcal.filters.filter_result import Problem, problem
+from inercal.selfcal.platform.plan import MOST_ROWS, Plan, Rest, Turn, motion
+from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.settings import Search, SelfcalSettings
+
+Array: TypeAlias = NDArray[np.float64]
+Sequence: TypeAlias = tuple[tuple[int, int], ...]
+"""Turns as joint 0, 1, 2 and signed number of angles."""
+
+STARTS: Final = 24
+"""Random starts; on the 540 s of the paper ten times as many gain less than 1 %."""
+
+LOCK: Final = 0.2
+"""Least |cos| of the inner gimbal angle where its limits are not stated: nearer, two joints are almost one."""
+
+MOST: Final = 5000
+"""Angles within the time that a search can go through: it tries one change for each, again and again."""
+
+_GRAIN: Final = math.radians(3.0)
+"""Largest turn between two rows while searching."""
+
+_EVEN: Final = 1e-6
+"""Part of a row that is rounding."""
+
+
+def criterion(bounds: Bounds, goal: Mapping[str, float], kind: str) -> float:
+    """How good a path is; small is good.
+
+    Each u is set over its goal, or over its prior where it has none: ``worst`` is the largest, ``mean`` the geometric
+    mean.
+    """
+    wanted = [goal.get(name, prior) for name, prior in zip(bounds.names, bounds.prior, strict=True)]
+    ratio = bounds.u / wanted
+    return float(ratio.max() if kind == "worst" else np.exp(np.mean(np.log(ratio))))
+
+
+def search(
+    settings: SelfcalSettings, progress: Callable[[int, int], None] = lambda done, total: None
+) -> Plan:
+    """The best path that the search finds within rate, time, number of turns, and limits of the gimbals.
+
+    Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan. Where the study
+    does not limit the inner gimbal, it keeps a distance to gimbal lock (`LOCK`).
+
+    Parameters
+    ----------
+    settings : SelfcalSettings
+    progress : callable
+        Told how many of the random starts are done.
+
+    Raises
+    ------
+    StudyError
+        No time is stated, or no turn fits into time and limits.
+    """
+    ground = _ground(settings)
+    rng = np.random.default_rng(settings.search.seed)
+    found: dict[Sequence, float] = {}
+    progress(0, STARTS)
+    for start in range(STARTS):
+        _improve(ground, _random(ground, rng), found, rng)
+        progress(start + 1, STARTS)
+    return ground.plan(min(found, key=lambda turns: found[turns]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What a search moves on.
+
+    ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the start; ``number`` of
+    angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of such steps.
+    """
+
+    asked: Search
+    model: Plan
+    low: Array
+    high: Array
+    time: float
+    number: int
+    coarse: float
+    problem: Problem
+    goal: Mapping[str, float]
+
+    def plan(self, turns: Sequence) -> Plan:
+        """The plan of a sequence."""
+        turning, step = self._turning(turns), self.model.step
+        rest = step * math.floor((self.time - turning.duration) / step + _EVEN)
+        return replace(turning, moves=(*turning.moves, Rest(rest))) if rest > 0.0 else turning
+
+    def _turning(self, turns: Sequence) -> Plan:
+        """The turns alone."""
+        moves = tuple(Turn("xyz"[joint], count * self.asked.angle) for joint, count in turns)  # type: ignore[arg-type]
+        return replace(self.model, moves=moves)
+
+    def fits(self, turns: Sequence) -> bool:
+        """Whether a sequence keeps to number, limits and time, of which each turn takes whole rows."""
+        if not 0 < len(turns) <= self.asked.turns:
+            return False
+        if self._turning(turns).duration > self.time + _EVEN * self.model.step:
+            return False
+        at = [0, 0, 0]
+        for joint, count in turns:
+            at[joint] += count
+            if not self.low[joint] <= at[joint] <= self.high[joint]:
+                return False
+        return True
+
+    def value(self, turns: Sequence) -> float:
+        """Criterion of a sequence at coarse steps."""
+        path = motion(replace(self.plan(turns), step=self.coarse), self.problem.world)
+        return criterion(bounds(path, self.problem), self.goal, self.asked.criterion)
+
+
+def _ground(settings: SelfcalSettings) -> _Ground:
+    """The ground of a study's search."""
+    asked, model = settings.search, replace(settings.plan or Plan(()), moves=())
+    if asked.time is None and settings.plan is None:
+        raise StudyError("design.time", "missing, expected a time or a plan that is as long")
+    time = settings.plan.duration if asked.time is None and settings.plan else float(asked.time or 0.0)
+    if time / model.step > MOST_ROWS:
+        found = f"found {time / model.step:.6g} steps of {model.step:g} s"
+        raise StudyError("design.time", f"{found}, expected at most {MOST_ROWS:,}")
+    unit = asked.angle / model.rate
+    number = math.floor(time / unit + 1e-9)
+    if number > MOST:
+        found = f"found {number} turns of {math.degrees(asked.angle):g} deg within {time:g} s"
+        raise StudyError("design.angle", f"{found}, expected at most {MOST}: a larger angle, or less time")
+    low, high = _limits(settings, model)
+    made = _Ground(asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal)
+    if not any(made.fits(((joint, sign),)) for joint in range(3) for sign in (1, -1)):
+        raise StudyError(
+            "design.angle",
+            f"found no turn of {math.degrees(asked.angle):g} deg within {time:g} s and the limits of the gimbals, "
+            "expected a smaller angle, more time or wider limits",
+        )
+    return made
+
+
+def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float, Problem]:
+    """Coarse step [s] for turns of ``unit`` [s], and the problem with the noise of a mean over such a step."""
+    rows = min(max(1, round(unit / model.step)), max(1, math.ceil(settings.search.angle / _GRAIN)))
+    coarse, exact = unit / rows, problem(settings)
+    less = math.sqrt(model.step / coarse)
+    noise = replace(
+        exact.noise, accelerometer=exact.noise.accelerometer * less, encoder=exact.noise.encoder * less
+    )
+    return coarse, replace(exact, noise=noise)
+
+
+def _limits(settings: SelfcalSettings, model: Plan) -> tuple[Array, Array]:
+    """Limits (3,), (3,) of the angles from the start, in angles of the search."""
+    level = math.pi * round(model.start[1] / math.pi)
+    reach = math.acos(LOCK)
+    limits = {"th_y": (level - reach, level + reach)} | dict(settings.limits)
+    free = (-math.inf, math.inf)
+    ends = np.array([limits.get(joint, free) for joint in JOINTS]) - np.array(model.start)[:, None]
+    slack = 1e-9
+    return ends[:, 0] / settings.search.angle - slack, ends[:, 1] / settings.search.angle + slack
+
+
+def _random(ground: _Ground, rng: np.random.Generator) -> Sequence:
+    """A random sequence that fits; of many tries the first that fills the time, or that fills it most."""
+    best: Sequence = ()
+    filled = 0
+    for _ in range(200):
+        ends = np.sort(rng.integers(0, ground.number + 1, ground.asked.turns - 1))
+        lengths = np.diff(ends, prepend=0, append=ground.number)
+        turns: Sequence = ()
+        for length in lengths:
+            turns = _merged((*turns, (int(rng.integers(3)), int(length) * int(rng.choice((-1, 1))))))
+            while turns and not ground.fits(turns):
+                joint, count = turns[-1]
+                turns = _merged((*turns[:-1], (joint, count - int(np.sign(count)))))
+        total = sum(abs(count) for _, count in turns)
+        if total > filled:
+            best, filled = turns, total
+        if filled == ground.number:
+            break
+    return best
+
+
+def _improve(
+    ground: _Ground, turns: Sequence, found: dict[Sequence, float], rng: np.random.Generator
+) -> None:
+    """Change a sequence as long as that makes it better; all that were judged are kept in ``found``."""
+
+    def value(candidate: Sequence) -> float:
+        if candidate not in found:
+            found[candidate] = ground.value(candidate)
+        return found[candidate]
+
+    best, improved = value(turns), True
+    while improved:
+        improved = False
+        changes = sorted(set(_changes(turns)))
+        for k in rng.permutation(len(changes)):
+            candidate = changes[k]
+            if ground.fits(candidate) and value(candidate) < best:
+                turns, best, improved = candidate, value(candidate), True
+                break
+
+
+def _changes(turns: Sequence) -> Iterator[Sequence]:
+    """Sequences that differ by one small change; not all of them fit."""
+    for i, (joint, count) in enumerate(turns):
+        before, after, sign = turns[:i], turns[i + 1 :], int(np.sign(count))
+        others = ((joint + 1) % 3, (joint + 2) % 3)
+        yield _merged((*before, (joint, -count), *after))
+        yield _merged((*before, (joint, count + sign), *after))
+        yield _merged((*before, (joint, count - sign), *after))
+        for other in others:
+            yield _merged((*before, (other, count), *after))
+        for j, (to, more) in enumerate(turns):
+            if j != i:
+                longer = list(turns)
+                longer[i], longer[j] = (joint, count - sign), (to, more + int(np.sign(more)))
+                yield _merged(tuple(longer))
+            if j > i:
+                exchanged = list(turns)
+                exchanged[i], exchanged[j] = turns[j], turns[i]
+                yield _merged(tuple(exchanged))
+        for first in range(1, abs(count)):
+            for other in others:
+                for way in (1, -1):
+                    rest = way * (abs(count) - first)
+                    yield _merged((*before, (joint, sign * first), (other, rest), *after))
+
+
+def _merged(turns: Sequence) -> Sequence:
+    """The sequence without empty turns, and with turns one after the other of one joint the same way as one."""
+    merged: list[tuple[int, int]] = []
+    for joint, count in turns:
+        if count == 0:
+            continue
+        if merged and merged[-1][0] == joint and (merged[-1][1] > 0) == (count > 0):
+            merged[-1] = (joint, merged[-1][1] + count)
+        else:
+            merged.append((joint, count))
+    return tuple(merged)

@@ -1,0 +1,110 @@
+"""A simulated recording of a platform that turns through a plan, with what real rigs add."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.errors import StudyError
+from inercal.records.made import record_of
+from inercal.records.record import Record
+from inercal.selfcal.platform.coefficients import to_linear
+from inercal.selfcal.platform.kinematics import all_angles, attitude
+from inercal.selfcal.platform.model import simulate_truth
+from inercal.selfcal.platform.plan import Motion, motion
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import World
+from inercal.selfcal.settings import Disturbances, Noise, SelfcalSettings
+from inercal.units import parse_unit
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A plan on a rig, ready to be simulated many times.
+
+    ``motion`` what is commanded; ``fine`` (n - 1, m, 3) [rad/s] the rates on which the platform acts in each finer
+    step; ``truth`` (p,) coefficients in the linear form.
+    """
+
+    world: World
+    noise: Noise
+    motion: Motion
+    fine: Array
+    truth: Array
+    disturbances: Disturbances
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A ``recording`` and its truth: ``attitude`` (n, 4) q_bp, ``angles`` (n, 3) [rad]."""
+
+    recording: Recording
+    attitude: Array
+    angles: Array
+
+
+def experiment(settings: SelfcalSettings) -> Experiment:
+    """Prepare the simulation that a study states.
+
+    Raises
+    ------
+    StudyError
+        The study has no plan or no truth.
+    """
+    if settings.plan is None:
+        raise StudyError("plan", "missing, expected the turns to be simulated")
+    if settings.truth is None:
+        raise StudyError("truth", "missing, expected the true coefficients")
+    commanded = motion(settings.plan, settings.world)
+    other = settings.disturbances
+    m, step = other.substeps, settings.plan.step
+    # the platform acts late: at time t on what was commanded at t - delay, at the start on the first command
+    middle = (np.arange(len(commanded.rate) * m) + 0.5) * (step / m) - other.command_delay
+    row = np.clip(np.floor(middle / step), 0.0, len(commanded.rate) - 1.0).astype(np.int64)
+    fine = np.ascontiguousarray(commanded.rate[row].reshape(-1, m, 3))
+    return Experiment(settings.world, settings.noise, commanded, fine, to_linear(settings.truth), other)
+
+
+def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
+    """Turn the platform once through its plan."""
+    world, noise, other = experiment.world, experiment.noise, experiment.disturbances
+    commanded, n = experiment.motion, len(experiment.motion.t)
+    fine = experiment.fine
+    dt = float(commanded.t[1] - commanded.t[0]) / fine.shape[1]
+    wander = rng.standard_normal(fine.shape)
+    wander *= noise.angle_random_walk / np.sqrt(dt)
+    q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
+    q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
+    simulate_truth(q0, fine, dt, wander, experiment.truth, world.earth, world.up, q, acc)
+    all_angles(q, commanded.angles[0], world.axes, world.signs, th)
+    acc += noise.accelerometer * rng.standard_normal((n, 3))
+    measured = th + noise.encoder * rng.standard_normal((n, 3))
+    for joint, order, amplitude, phase in other.harmonics:
+        measured[:, joint] += amplitude * np.sin(order * th[:, joint] + phase)
+    acc[0] = np.nan
+    if other.dropouts > 0.0:
+        lost = np.append(False, rng.random(n - 1) < other.dropouts)
+        acc[lost], measured[lost] = np.nan, np.nan
+    return Simulated(Recording(commanded.t, commanded.rate, measured, acc), q, th)
+
+
+#: sensor -> unit of its columns in a simulated file
+_UNITS = {"wc": "deg/h", "th": "deg", "acc": "m/s^2"}
+
+
+def to_record(recording: Recording) -> Record:
+    """A record as a file holds it: ``t``, ``wc_x..`` (the last row's empty), ``th_x..``, ``acc_x..``."""
+    values = {
+        "wc": np.vstack([recording.rate, np.full(3, np.nan)]),
+        "th": recording.th,
+        "acc": recording.acc,
+    }
+    columns = []
+    for sensor, symbol in _UNITS.items():
+        unit = parse_unit(symbol)
+        columns += [
+            (f"{sensor}_{axis}", unit, values[sensor][:, k] / unit.factor) for k, axis in enumerate("xyz")
+        ]
+    return record_of(columns, recording.t)

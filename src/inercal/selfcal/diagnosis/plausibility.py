@@ -1,0 +1,269 @@
+"""Whether rates, angles and accelerometers of a recording fit together, the rig and the study's path.
+
+Seen roughly, to some per cent: enough to tell wrong units, exchanged or reversed axes and another path from the
+coefficients that are to be found, which are a hundred times smaller. What the whole recording is about is compared, so
+that single bad stretches stay with the tests of the filters' innovations.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.arrays import Array
+from inercal.errors import RecordError
+from inercal.findings import Finding
+from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
+from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.platform.plan import Plan
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import JOINTS, Gimbals, World
+from inercal.selfcal.settings import SelfcalSettings
+
+STRETCHES = 100
+"""Stretches of a recording that are compared, so long that the noise of encoders does not matter."""
+
+MISFIT = 0.1
+"""Part of the motion (of gravity) by which two sensors may differ before that is said: coefficients are far less."""
+
+FIT = 0.03
+"""Part by which they may differ under another order or sign, for that to be named."""
+
+OFF_THE_PATH = math.radians(5.0)
+"""Angle from the study's path that is said: earth rate moves a platform less, which is not told to follow it."""
+
+#: ratio of rates to angles -> units that look exchanged
+_EXCHANGED = {
+    180.0 / math.pi: "degrees and radians",
+    60.0: "per second and per minute, or minutes of arc and degrees",
+    3600.0: "per second and per hour, or seconds of arc and degrees",
+    3600.0 * 180.0 / math.pi: "deg/h and rad/s",
+    1000.0: "thousandths and wholes",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """Motion in each of m steps between rows whose angles are known.
+
+    ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
+    space, in p, that the rates tell of; ``stretch`` (m,) the stretch that each step belongs to; ``told`` (m,) whether
+    all rates in it were recorded.
+    """
+
+    th: Array
+    dt: Array
+    rate: Array
+    stretch: NDArray[np.int64]
+    told: NDArray[np.bool_]
+
+    def turned(self, world: World) -> Array:
+        """(s, 3) rad: turns of the stretches against inertial space, in p, that the angles tell of such a rig."""
+        q, _ = gimbals(self.th, world)
+        of_earth = rotate(conjugate(q[:-1]), world.earth) * self.dt[:, None]
+        return self.summed(log(multiply(conjugate(q[:-1]), q[1:])) + of_earth)
+
+    def summed(self, steps: Array) -> Array:
+        """(s, 3) of each stretch, without steps whose rates are a guess."""
+        return np.stack([np.bincount(self.stretch, steps[:, k] * self.told) for k in range(3)], axis=-1)
+
+
+def implausible(recording: Recording, settings: SelfcalSettings, where: object) -> list[Finding]:
+    """What does not fit together: rates, angles, accelerometers.
+
+    Codes are ``sign_suspect`` and ``channel_swap`` of gimbals, rates and accelerometers, ``contradiction``,
+    ``unit_suspect``, and ``at_prior`` without any motion. ``where`` is named in the error.
+
+    Raises
+    ------
+    RecordError
+        Rates many times as fast as the angles, or the reverse: a unit is wrong, and nothing can be computed.
+    """
+    findings: list[Finding] = []
+    known = np.flatnonzero(np.isfinite(recording.th).all(axis=1))
+    if known.size < 2:
+        raise RecordError(where, "found one row with all angles th_x, th_y, th_z, expected more")
+    motion = _motion(recording, known)
+    moved = np.linalg.norm(motion.summed(np.diff(motion.th, axis=0)), axis=1)
+    commanded = motion.summed(motion.rate)
+    noise = 10.0 * settings.noise.encoder
+    if moved.max() < noise:
+        still = (
+            "th: the platform does not turn, expected turns: most coefficients stay as they were known before"
+        )
+        findings.append(Finding("at_prior", still))
+    else:
+        _units(commanded, moved, noise, where)
+        findings += _rig(motion, commanded, settings, "gyro" if recording.measured else "wc")
+    if all(finding.code not in ("channel_swap", "sign_suspect", "contradiction") for finding in findings):
+        findings += _accelerometers(recording, settings, known)
+    return findings
+
+
+def _motion(recording: Recording, known: NDArray[np.int64]) -> _Motion:
+    """Motion between the rows whose angles are ``known``."""
+    t = recording.t
+    gained = np.vstack([np.zeros(3), np.cumsum(recording.rate * recording.dt[:, None], axis=0)])
+    part = (t[known[:-1]] - t[known[0]]) / (t[known[-1]] - t[known[0]])
+    _, numbered = np.unique((STRETCHES * part).astype(np.int64), return_inverse=True)
+    held = np.zeros(len(t), dtype=np.int64)
+    held[np.array(recording.held, dtype=np.int64) + 1] = 1
+    told = np.diff(np.cumsum(held)[known]) == 0
+    return _Motion(recording.th[known], np.diff(t[known]), np.diff(gained[known], axis=0), numbered, told)
+
+
+def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
+    """Refuse rates that turn the platform many times as fast as the angles do, or the reverse."""
+    turned = np.linalg.norm(commanded, axis=1)
+    moving = (turned > 0.3 * turned.max()) & (moved > noise)
+    if not moving.any():
+        return
+    ratio = float(np.median(turned[moving] / moved[moving]))
+    if 0.2 < ratio < 5.0:
+        return
+    factor = max(ratio, 1.0 / ratio)
+    words = next((units for of, units in _EXCHANGED.items() if 0.8 < factor / of < 1.25), "units")
+    raise RecordError(
+        where,
+        f"the rates turn the platform {ratio:.4g} times as far as the angles say, expected the same: {words} look "
+        "exchanged",
+    )
+
+
+def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
+    """Rates against angles: gimbals of another order or with other signs, exchanged or reversed rates."""
+    world, noise = settings.world, 2.0 * settings.noise.encoder
+    turned = motion.turned(world)
+    misfit = _misfit(turned, commanded, noise)
+    if misfit < MISFIT:
+        return []
+    for other in _other_gimbals(settings.gimbals):
+        tried = replace(world, axes=other.index, signs=other.sign)
+        if _misfit(motion.turned(tried), commanded, noise) < FIT:
+            code = "sign_suspect" if other.axes == settings.gimbals.axes else "channel_swap"
+            text = f"th: the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
+            return [Finding(code, f"{text} of the rig, not with those of the study")]
+    for order in itertools.permutations(range(3)):
+        exchanged = replace(motion, th=motion.th[:, order])
+        if _misfit(exchanged.turned(world), commanded, noise) < FIT:
+            names = ", ".join(
+                f"th_{axis} looks like th_{'xyz'[order.index(k)]}"
+                for k, axis in enumerate("xyz")
+                if order[k] != k
+            )
+            return [Finding("channel_swap", f"th: {names}, as the rates have it")]
+    return _exchanged(sensor, commanded, turned, noise) or [
+        Finding(
+            "contradiction",
+            f"th: the angles do not follow the rates {sensor}_x..z, off by {100.0 * misfit:.3g} % of the motion",
+        )
+    ]
+
+
+def _other_gimbals(stated: Gimbals) -> list[Gimbals]:
+    """All other orders and signs, the fewest changes first."""
+    found = [
+        Gimbals(axes, (outer, inner, platform))
+        for axes in itertools.permutations(get_args(Axis))
+        for outer, inner, platform in itertools.product((1, -1), repeat=3)
+    ]
+    now = (*stated.axes, *stated.signs)
+
+    def changes(other: Gimbals) -> int:
+        return sum(a != b for a, b in zip((*other.axes, *other.signs), now, strict=True))
+
+    return sorted(found, key=changes)[1:]
+
+
+def _accelerometers(
+    recording: Recording, settings: SelfcalSettings, known: NDArray[np.int64]
+) -> list[Finding]:
+    """Accelerometers against the specific force at the angles: wrong units, exchanged or reversed axes."""
+    world = settings.world
+    whole = known[np.isfinite(recording.acc[known]).all(axis=1)]
+    if not whole.size:
+        return []
+    acc, g0 = recording.acc[whole], float(np.linalg.norm(world.up))
+    norm = float(np.median(np.linalg.norm(acc, axis=1)))
+    if not 0.9 < norm / g0 < 1.1:
+        if any(
+            finding.code == "unit_suspect" and finding.message.startswith("acc")
+            for finding in recording.findings
+        ):
+            return []
+        text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
+        return [Finding("unit_suspect", text)]
+    force = rotate(conjugate(gimbals(recording.th[whole], world)[0]), world.up)
+    noise = 2.0 * settings.noise.accelerometer
+    misfit = _misfit(acc, force, noise)
+    if misfit < MISFIT:
+        return []
+    return _exchanged("acc", acc, force, noise) or [
+        Finding(
+            "contradiction",
+            f"acc: specific force does not follow the angles, off by {100.0 * misfit:.3g} % of gravity",
+        )
+    ]
+
+
+def _misfit(a: Array, b: Array, noise: float) -> float:
+    """Root mean square of a - b (s, 3), less that of the ``noise`` of an axis, over that of b; inf where b is 0."""
+    left = max(float(np.sum((a - b) ** 2)) - 3.0 * len(a) * noise**2, 0.0)
+    whole = float(np.sum(b**2))
+    return math.sqrt(left / whole) if whole > 0.0 else math.inf if left > 0.0 else 0.0
+
+
+def _exchanged(sensor: str, found: Array, expected: Array, noise: float) -> list[Finding]:
+    """``channel_swap`` or ``sign_suspect`` where axes (s, 3) of a sensor fit in another order or with other signs."""
+    fits = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            changed = found[:, list(order)] * signs
+            changes = sum(k != j for k, j in enumerate(order)) + signs.count(-1.0)
+            if (misfit := _misfit(changed, expected, noise)) < FIT:
+                fits.append((changes, misfit, order, signs))
+    if not fits:
+        return []
+    _, _, order, signs = min(fits)
+    words = ", ".join(
+        f"{sensor}_{axis} should be {'-' if sign < 0.0 else ''}{sensor}_{'xyz'[k]}"
+        for axis, k, sign in zip("xyz", order, signs, strict=True)
+        if "xyz"[k] != axis or sign < 0.0
+    )
+    code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
+    return [Finding(code, f"{sensor}: {words}, as the angles have it")]
+
+
+def off_the_path(
+    recording: Recording, plan: Plan, world: World, began: float, rows: NDArray[np.int64]
+) -> list[Finding]:
+    """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s].
+
+    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it: at gimbal lock they are not
+    unique.
+    """
+    t = recording.t - began
+    findings = []
+    if t[-1] < plan.duration - 1.5 * plan.step:
+        text = f"the recording ends after {t[-1]:.6g} s, the study's path takes {plan.duration:.6g} s"
+        findings.append(Finding("truncated", text))
+    nominal = plan.angles()
+    then = plan.step * np.arange(len(nominal))
+    expected = np.stack([np.interp(t, then, nominal[:, k]) for k in range(3)], axis=-1)
+    away = np.abs(np.remainder(recording.th - expected + math.pi, 2.0 * math.pi) - math.pi)
+    there, planned = (gimbals(np.nan_to_num(th), world)[0] for th in (recording.th, expected))
+    turned = attitude_difference(planned, there)[:, None]
+    away = np.where(np.isfinite(recording.th).all(axis=1, keepdims=True) & (turned > OFF_THE_PATH), away, 0.0)
+    if away.max() > OFF_THE_PATH:
+        first, joint = divmod(int(np.argmax(away > OFF_THE_PATH)), 3)
+        text = (
+            f"{JOINTS[joint]} leaves the study's path at {t[first]:.6g} s; the angles are up to "
+            f"{math.degrees(away.max()):.3g} deg away from it"
+        )
+        findings.append(Finding("contradiction", text, f"row {rows[first] + 1}"))
+    return findings

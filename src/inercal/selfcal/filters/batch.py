@@ -1,0 +1,285 @@
+"""Estimator 5, all at once: the most probable attitudes and coefficients, by Gauss-Newton on a banded system.
+
+Unknowns are the attitude at every row and the coefficients (linear form). Each term of the sum of squares is whitened:
+
+    the first attitude against the first encoder reading (or a start), and the coefficients against their prior,
+    each step: log(propagated^-1 next), of covariance ARW^2 dt I,
+    each row: accelerometers, and log(q^-1 q_encoders) of covariance sigma^2 (J J^T + 0.05^2 I).
+
+Attitudes are tied to their neighbours alone, so that their part of the normal matrix has a band of five beside its
+diagonal; with them eliminated, the Schur complement is left for the coefficients. Its inverse is their covariance, the
+Cramer-Rao bound along the path found (Triggs et al. 2000, "Bundle adjustment - a modern synthesis", section 6).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal._jit import kernel
+from inercal.arrays import Array
+from inercal.geometry.rotations import (
+    boxminus,
+    boxplus,
+    conjugate,
+    exp,
+    inverse_left_jacobian,
+    multiply,
+    normalize,
+    right_jacobian,
+    to_matrix,
+)
+from inercal.selfcal.filters.filter_result import Filtered, History, Problem, Start
+from inercal.selfcal.filters.gaps import broken
+from inercal.selfcal.filters.residuals import (
+    Readings,
+    Sensed,
+    first_reading,
+    followed,
+    least_cosine,
+    normalised,
+    on_base,
+    readings,
+    sensed,
+    turns,
+)
+from inercal.selfcal.filters.start import rough_path
+from inercal.selfcal.platform.recording import Recording
+
+BAND = 5
+"""Entries below the diagonal that the attitudes' normal matrix has."""
+
+STEP = 1e-6
+"""Size of the last step, over the standard uncertainties of the coefficients, at which the iteration ends."""
+
+ITERATIONS = 30
+
+
+def estimate_map(
+    recording: Recording, problem: Problem, start: Start | None = None, history: bool = True
+) -> Filtered:
+    """Maximum a posteriori over all attitudes and coefficients.
+
+    Parameters
+    ----------
+    recording : Recording
+        Missing measurements (NaN) are left out, and those that the near-level gate stops.
+    problem : Problem
+    start : Start, optional
+        Of the first attitude; its encoder reading if absent. The iteration begins at the encoders all the same; where
+        these never read it begins at the estimate of ``lm``.
+    history : bool
+        Whether to return attitudes and their standard deviations, given all measurements, and innovations.
+
+    Returns
+    -------
+    Filtered
+        ``nis`` of a row: squared normalised residuals of its measurements and of the steps since the row measured
+        before, and an equal share of those of the prior. All rows sum up to the minimum of the sum of squares,
+        chi-square with as many degrees of freedom as there are scalar measurements (unknowns and terms of prior and
+        steps are as many); so the mean is 6 where six are measured, as for a filter. ``innovations`` are residuals
+        over the standard deviations of their noise. Not ``converged`` where the iteration did not end.
+    """
+    import scipy.linalg  # noqa: F401  as the kernels, loaded before time is taken
+
+    first = first_reading(recording, problem) if start is None else start
+    followed(first.attitude, np.empty((0, 3)))
+    inverse_diagonal(np.ones((2, 2), order="F"), np.empty(2))
+    began = time.perf_counter()
+    measured, loose = readings(recording, problem), broken(recording, problem, start)
+    q, c = _first_guess(recording, problem, measured, start)
+    p = len(c)
+    message = f"the iteration did not end in {ITERATIONS} steps, so far is the recording from the model"
+    covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
+    for _ in range(ITERATIONS):
+        try:
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # what is lost is not finite, and refused below
+                terms = _terms(q, c, recording, problem, measured, first, loose)
+                step = _step(terms, history)
+        except (np.linalg.LinAlgError, ValueError):
+            message = "the iteration diverged: the normal equations are not positive definite"
+            break
+        covariance, u = step.covariance, step.attitude_u
+        q, c = normalize(boxplus(q, step.attitudes)), c + problem.prior * step.coefficients
+        if np.max(np.abs(step.coefficients) / np.sqrt(np.diag(covariance))) < STEP:
+            message = ""
+            break
+    covariance = covariance * np.outer(problem.prior, problem.prior)
+    rows = [np.tile(a, (len(q), 1)) for a in (c, np.sqrt(np.diag(covariance)))]
+    return Filtered(
+        kind="map",
+        coefficients=c,
+        covariance=covariance,
+        attitude=q[-1],
+        nis=_per_row(terms, measured),
+        dims=measured.dims,
+        innovations=normalised(terms.sensed.residual, measured) if history else np.empty((0, 6)),
+        history=History(q, u, *rows) if history else None,
+        seconds=time.perf_counter() - began,
+        converged=not message,
+        message=message,
+        gimbal_cosine=least_cosine(recording),
+        restarts=tuple(k + 1 for k in loose),
+    )
+
+
+def _first_guess(
+    recording: Recording, problem: Problem, measured: Readings, start: Start | None
+) -> tuple[Array, Array]:
+    """Attitudes (n, 4) and coefficients (p,) to begin with: the encoders', carried by the commands where silent."""
+    seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
+    if start is not None and not seen.any():
+        return rough_path(recording, problem, start)
+    first = first_reading(recording, problem).attitude if start is None else start.attitude
+    known = np.vstack([first, measured.attitude])
+    path = followed(first, recording.rate * recording.dt[:, None])
+    # the reading before each row, or the first one before there is any
+    last = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), int(np.argmax(seen))))
+    since = recording.t - recording.t[last]
+    turned = multiply(exp(-since[:, None] * problem.world.earth), known[last])
+    carried = multiply(turned, multiply(conjugate(path[last]), path))
+    return normalize(carried), np.zeros(len(problem.prior))
+
+
+class _Terms(NamedTuple):
+    """Whitened residuals and derivatives of the model, per change of coefficients over their prior.
+
+    ``first`` (3,) of the first attitude, ``by_first`` (3, 3); ``sensed`` of the measurements; ``process`` (n - 1, 3)
+    of the steps, by the attitude before (``by_last``) and after (``by_next``, both (n - 1, 3, 3)) and by the
+    coefficients (n - 1, 3, p); ``prior`` (p,) of the coefficients.
+    """
+
+    first: Array
+    by_first: Array
+    sensed: Sensed
+    process: Array
+    by_last: Array
+    by_next: Array
+    by_coefficients: Array
+    prior: Array
+
+
+def _terms(
+    q: Array,
+    c: Array,
+    recording: Recording,
+    problem: Problem,
+    measured: Readings,
+    start: Start,
+    loose: Sequence[int] = (),
+) -> _Terms:
+    """All terms at attitudes (n, 4) and coefficients (p,); of the ``loose`` steps nothing is known."""
+    world, prior, dt = problem.world, problem.prior, recording.dt
+    found = sensed(q[1:], c, measured, world)
+    base = on_base(c, world)
+    turn, slope = turns(recording.rate, dt, c)
+    ahead, of_earth = exp(turn), -dt[:, None] * base.earth
+    propagated = multiply(multiply(exp(of_earth), q[:-1]), ahead)
+    if base.earth_slope is not None:
+        # qexp(-(w + d) dt) = qexp(-Jl d dt) qexp(-w dt), which turns the propagated attitude from the left
+        by_earth = -dt[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
+        slope[:, :, -3:] += np.swapaxes(to_matrix(propagated), 1, 2) @ by_earth
+    residual = boxminus(q[1:], propagated)
+    weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(dt))
+    weight[list(loose)] = 1.0 / np.pi
+    left = inverse_left_jacobian(residual) * weight[:, None, None]
+    miss = boxminus(start.attitude, q[0])
+    return _Terms(
+        miss / start.sigma,
+        inverse_left_jacobian(miss) / start.sigma,
+        found._replace(by_coefficients=found.by_coefficients * prior),
+        residual * weight[:, None],
+        left @ np.swapaxes(to_matrix(ahead), 1, 2),
+        -np.swapaxes(left, 1, 2),
+        left @ (slope * prior),
+        -c / prior,
+    )
+
+
+class _Step(NamedTuple):
+    """A step of Gauss-Newton: of ``attitudes`` (n, 3) [rad] and ``coefficients`` (p,), over their prior; with the
+    ``covariance`` (p, p) of these and standard deviations ``attitude_u`` (n, 3) [rad], or (0, 3)."""
+
+    attitudes: Array
+    coefficients: Array
+    covariance: Array
+    attitude_u: Array
+
+
+def _step(terms: _Terms, attitude_u: bool) -> _Step:
+    """Solve the normal equations of all terms."""
+    from scipy.linalg import cho_solve_banded, cholesky_banded
+
+    of_rows = terms.sensed
+    last, following = np.swapaxes(terms.by_last, 1, 2), np.swapaxes(terms.by_next, 1, 2)
+    seen = np.swapaxes(of_rows.by_attitude, 1, 2)
+    n, p = len(of_rows.residual) + 1, len(terms.prior)
+    diagonal = np.zeros((n, 3, 3))
+    diagonal[0] = terms.by_first.T @ terms.by_first
+    diagonal[1:] += seen @ of_rows.by_attitude + following @ terms.by_next
+    diagonal[:-1] += last @ terms.by_last
+    below = following @ terms.by_last
+    # gradients of the attitudes, and their ties to the coefficients beside them
+    right = np.zeros((n, 3, 1 + p))
+    right[0, :, 0] = terms.by_first.T @ terms.first
+    of_process = np.concatenate([terms.process[:, :, None], terms.by_coefficients], axis=2)
+    of_sensed = np.concatenate([of_rows.residual[:, :, None], of_rows.by_coefficients], axis=2)
+    right[1:] += seen @ of_sensed + following @ of_process
+    right[:-1] += last @ of_process
+    band = np.zeros((BAND + 1, 3 * n))
+    for j in range(3):
+        for i in range(3):
+            if i >= j:
+                band[i - j, j::3] = diagonal[:, i, j]
+            band[3 + i - j, j:-3:3] = below[:, i, j]
+    factor = cholesky_banded(band, lower=True)
+    ties = right.reshape(3 * n, 1 + p)
+    solved = cho_solve_banded((factor, True), ties)
+    flat_process, flat_sensed = of_process.reshape(-1, 1 + p), of_sensed.reshape(-1, 1 + p)
+    both = flat_process.T @ flat_process + flat_sensed.T @ flat_sensed - ties.T @ solved
+    schur = both[1:, 1:] + np.eye(p)
+    covariance = np.linalg.inv(schur)
+    if not (np.diag(covariance) > 0.0).all():
+        raise np.linalg.LinAlgError("the coefficients have no variance")
+    coefficients = np.linalg.solve(schur, both[1:, 0] + terms.prior)
+    by_coefficients = solved[:, 1:]
+    attitudes = solved[:, 0] - by_coefficients @ coefficients
+    variance = np.empty(0)
+    if attitude_u:
+        variance = np.empty(3 * n)
+        inverse_diagonal(factor, variance)
+        variance += np.einsum("ki,ij,kj->k", by_coefficients, covariance, by_coefficients, optimize=True)
+    return _Step(attitudes.reshape(n, 3), coefficients, covariance, np.sqrt(variance).reshape(-1, 3))
+
+
+def _per_row(terms: _Terms, measured: Readings) -> Array:
+    """Squared residuals of each measured row, of the steps since the one before, and a share of those of the prior."""
+    total = np.cumsum(np.sum(terms.sensed.residual**2, axis=1) + np.sum(terms.process**2, axis=1))
+    nis, rows = np.full(len(total), np.nan), np.flatnonzero(measured.dims)
+    of_prior = float(terms.first @ terms.first + terms.prior @ terms.prior)
+    nis[rows] = np.diff(total[rows], prepend=0.0) + of_prior / max(len(rows), 1)
+    return nis
+
+
+@kernel
+def inverse_diagonal(factor: Array, out: Array) -> None:
+    """Diagonal ``out`` (m,) of the inverse of a banded matrix, without the rest (Takahashi et al. 1973).
+
+    ``factor`` (b + 1, m) is its Cholesky factor L in LAPACK's lower form, ``factor[i, j] = L[j + i, j]``. With Z the
+    inverse, ``Z L = L^-T`` gives column j of Z within the band from those after it.
+    """
+    b, m = factor.shape[0] - 1, factor.shape[1]
+    Z = np.zeros((b + 1, m))
+    for j in range(m - 1, -1, -1):
+        near = min(b, m - 1 - j)
+        for i in range(near, -1, -1):
+            total = 1.0 / factor[0, j] if i == 0 else 0.0
+            for k in range(1, near + 1):
+                total -= factor[k, j] * Z[abs(k - i), j + min(k, i)]
+            Z[i, j] = total / factor[0, j]
+        out[j] = Z[0, j]

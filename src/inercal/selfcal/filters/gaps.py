@@ -1,0 +1,272 @@
+"""Steps of which no rate was recorded: gaps between rows, and rows whose rate is no number.
+
+The platform is taken to turn on as before. Against the base it does so at a constant rate; earth rate, which it is
+commanded to follow besides, turns in p meanwhile. Holding the rate against inertial space instead is wrong by earth
+rate times half of the angle turned, 2 seconds of arc after 4 s at 1 deg/s.
+
+That is a guess. So nothing measured after such a step counts before the encoders read again, and where these contradict
+it, as where a turn began or ended meanwhile, the attitude is theirs from then on and owes nothing to what was before:
+coefficients and their covariance stay, correlations with the attitude are dropped. Measured rates are dealt with in
+the same way: a servo that did not hold its rate through a gap is found out like a turn that ended.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.arrays import Array
+from inercal.findings import Finding
+from inercal.geometry.rotations import boxminus, conjugate, exp, log, multiply, rotate
+from inercal.records.places import counted
+from inercal.selfcal.filters import error_state
+from inercal.selfcal.filters.filter_result import (
+    Filtered,
+    Problem,
+    Start,
+    State,
+    Trace,
+    empty_trace,
+    known_in,
+)
+from inercal.selfcal.platform.kinematics import attitude, nearest_turn
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import World
+
+LONG = 1.5
+"""Ratio to the usual interval beyond which an interval is a gap: the rate was not meant for so long."""
+
+RECENT = 9
+"""Intervals, with the one in question, of which the middle one is the usual one."""
+
+CONTRADICTION = 5.0
+"""Standard deviations about an axis beyond which the encoders contradict a turn that was held: by chance once in a
+million gaps, while a turn that ended a hundredth of a second before the gap did is off by more."""
+
+_SHOWN = 5
+
+
+def usual(recent: Array) -> Array:
+    """The usual interval (...) [s] by the last ones (..., 9), NaN where there were fewer: their lower median."""
+    count = np.count_nonzero(np.isfinite(recent), axis=-1)
+    middle = np.expand_dims((count - 1) // 2, -1)
+    return np.asarray(np.take_along_axis(np.sort(recent, axis=-1), middle, axis=-1)[..., 0])
+
+
+def held_rate(w: Array, th: Array, world: World, middle: float, since: float, dt: float) -> Array:
+    """Rate (3,) [rad/s] against inertial space, constant over a step, that turns the platform on over the base.
+
+    Parameters
+    ----------
+    w : (3,) rad/s
+        The last known rate, against inertial space, in p.
+    th : (3,) rad
+        The last known gimbal angles; times are counted from then.
+    world : World
+    middle : float
+        When ``w`` was that of the platform [s].
+    since, dt : float
+        When the step begins and how long it takes [s].
+    """
+    q = np.array(attitude(th, world.axes, world.signs))
+    turn = w
+    for _ in range(4):  # each round is nearer by earth rate times `middle`
+        turn = w - rotate(conjugate(multiply(q, exp(turn * middle))), world.earth)
+    of_earth = rotate(conjugate(multiply(q, exp(turn * since))), world.earth)
+    # qexp(-earth dt) q qexp(rate dt) = q qexp(turn dt)
+    rotvec = log(multiply(exp(of_earth * dt), exp(turn * dt)))
+    angle = float(np.linalg.norm(rotvec))
+    if angle > 0.0:  # on the turn on which it is
+        wanted = float(turn @ rotvec) * dt / angle
+        rotvec = rotvec * (1.0 + 2.0 * math.pi * round((wanted - angle) / (2.0 * math.pi)) / angle)
+    return np.asarray(rotvec / dt)
+
+
+def with_held(t: Array, rate: Array, th: Array, world: World, gained: bool) -> tuple[Array, tuple[int, ...]]:
+    """Rates (n - 1, 3) without gaps, and the steps whose rates are held.
+
+    Parameters
+    ----------
+    t : (n,) s
+    rate : (n - 1, 3) rad/s
+        NaN where not recorded; the first row is complete.
+    th : (n, 3) rad
+        NaN where not measured; the first row is complete.
+    world : World
+    gained : bool
+        Whether rates are those just before the next row, instead of just after theirs.
+    """
+    dt = np.diff(t)
+    before = np.append(np.full(RECENT - 1, np.nan), dt)
+    step = usual(np.lib.stride_tricks.sliding_window_view(before, RECENT))
+    long = dt > LONG * step
+    known = np.all(np.isfinite(rate), axis=1)
+    held = np.flatnonzero(long | ~known)
+    rated, read = _last(known), _last(np.all(np.isfinite(th), axis=1))
+    rate = rate.copy()
+    filled = []
+    for k in held:
+        i, j = rated[k], read[k]
+        half = 0.5 * step[k]
+        middle = t[i + 1] - half if gained else t[i] + half
+        filled.append(held_rate(rate[i], th[j], world, middle - t[j], t[k] - t[j], dt[k]))
+    for k, each in zip(held, filled, strict=True):
+        rate[k] = np.where(long[k] | ~np.isfinite(rate[k]), each, rate[k])
+    return rate, tuple(held.tolist())
+
+
+def _last(known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Of each row, the last one before or at it that is known."""
+    return np.asarray(np.maximum.accumulate(np.where(known, np.arange(len(known)), 0)))
+
+
+def advance(
+    module: ModuleType,
+    state: State,
+    problem: Problem,
+    dt: Array,
+    rate: Array,
+    acc: Array,
+    th: Array,
+    held: Sequence[int],
+    history: bool = True,
+) -> tuple[State, Trace]:
+    """Take a recursive filter through m steps, of which those ``held`` are guesses.
+
+    Other arguments as of `inercal.selfcal.filters.error_state.advance`. ``restarts`` of the trace are the steps after
+    which the attitude was taken anew.
+    """
+    if not held:
+        state, trace = module.advance(state, problem, dt, rate, acc, th, history)
+        return state, trace
+    nothing = np.full((1, 3), np.nan)
+    parts, restarts, done = list[Trace](), list[int](), 0
+    seen = np.all(np.isfinite(th), axis=1)
+    for k in doubtful(held, th):
+        step = slice(k, k + 1)
+        if k > done:
+            before = slice(done, k)
+            state, trace = module.advance(
+                state, problem, dt[before], rate[before], acc[before], th[before], history
+            )
+            parts.append(trace)
+        propagated, trace = module.advance(
+            _copy(state), problem, dt[step], rate[step], nothing, nothing, history
+        )
+        if not seen[k]:
+            state = propagated
+        elif _contradicted(propagated, problem, th[k]):
+            state, trace = _anew(module, propagated, problem, th[k], history)
+            restarts.append(k)
+        else:
+            state, trace = module.advance(state, problem, dt[step], rate[step], acc[step], th[step], history)
+        parts.append(trace)
+        done = k + 1
+    state, trace = module.advance(state, problem, dt[done:], rate[done:], acc[done:], th[done:], history)
+    return state, _joined([*parts, trace])._replace(restarts=tuple(restarts))
+
+
+def doubtful(held: Sequence[int], th: Array) -> list[int]:
+    """Steps after which nothing counts until the encoders (m, 3) have agreed: held ones, and on until they read."""
+    seen, doubt = np.all(np.isfinite(th), axis=1), np.zeros(len(th), dtype=np.bool_)
+    for k in held:
+        until = k + int(np.argmax(seen[k:])) if seen[k:].any() else len(th) - 1
+        doubt[k : until + 1] = True
+    return [int(k) for k in np.flatnonzero(doubt)]
+
+
+def broken(recording: Recording, problem: Problem, start: Start | None = None) -> list[int]:
+    """Steps held that the encoders contradict, as the error-state filter sees it."""
+    if not recording.held:
+        return []
+    state = error_state.initial(problem, recording.th[0], start)
+    th = recording.th[1:]
+    _, trace = advance(
+        error_state,
+        state,
+        problem,
+        recording.dt,
+        recording.rate,
+        recording.acc[1:],
+        th,
+        recording.held,
+        False,
+    )
+    seen = np.all(np.isfinite(th), axis=1)
+    return [
+        k for k in recording.held for end in trace.restarts if k <= end and not seen[k:end].any()
+    ]  # those since the encoders read last
+
+
+def taken_anew(recording: Recording, found: Filtered) -> list[Finding]:
+    """``gap``: over which the platform did something else."""
+    rows = np.array(found.restarts, dtype=np.int64)
+    if not rows.size:
+        return []
+    text = (
+        f"the platform did not turn on as before where no rate was recorded: {counted(len(rows), 'time')} the encoders "
+        "contradict that, and the attitude is taken anew from them"
+    )
+    shown = ", ".join(f"{each:.10g}" for each in recording.t[rows[:_SHOWN]])
+    more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+    return [Finding("gap", text, f"t = {shown} s{more}")]
+
+
+def _contradicted(state: State, problem: Problem, th: Array) -> bool:
+    """Whether encoder readings (3,) [rad] are not where a state that has not seen them expects the platform."""
+    known, read = known_in(state, problem), anew(problem, th)
+    limit = CONTRADICTION * np.hypot(known.attitude_u[0], read.sigma)
+    return bool((np.abs(boxminus(read.attitude, known.attitude[0])) > limit).any())
+
+
+def anew(problem: Problem, th: Array) -> Start:
+    """The attitude that encoders (3,) [rad] read, with the most that they leave uncertain about any axis.
+
+    Outer and platform axis are at an angle of 90 deg less the inner one, so that ``J J^T`` has no larger eigenvalue
+    than ``1 + |sin thy|``.
+    """
+    q = np.array(attitude(th, problem.world.axes, problem.world.signs))
+    return Start(q, problem.noise.encoder * math.sqrt(1.0 + abs(math.sin(th[1]))))
+
+
+def _anew(
+    module: ModuleType, state: State, problem: Problem, th: Array, history: bool
+) -> tuple[State, Trace]:
+    """The state with its attitude as encoders (3,) [rad] read it, and the trace of that row, without an update."""
+    p = len(problem.prior)
+    on_turn = np.array([nearest_turn(*each) for each in zip(th, state.th, strict=True)])
+    begun: State = module.initial(problem, on_turn, anew(problem, on_turn))
+    begun.covariance[-p:, -p:] = state.covariance[-p:, -p:]
+    state = begun._replace(coefficients=state.coefficients, near=state.near)
+    trace = empty_trace(1, p, history)
+    trace.nis[:], trace.dims[:] = math.nan, 0
+    if history:
+        trace.innovations[:] = math.nan
+        for name, row in vars(known_in(state, problem)).items():
+            getattr(trace, name)[:] = row
+    return state, trace._replace(gimbal_cosine=abs(math.cos(on_turn[1])))
+
+
+def _copy(state: State) -> State:
+    """A state of its own, as a filter uses up the arrays that it is given."""
+    return State._make(each.copy() for each in state)
+
+
+def _joined(parts: Sequence[Trace]) -> Trace:
+    """Traces one after the other as one."""
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("attitude", "attitude_u", "coefficients", "u", "innovations", "nis", "dims")
+    }
+    lowest = [part.lowest_eigenvalue for part in parts if not math.isnan(part.lowest_eigenvalue)]
+    return Trace(
+        **joined,
+        lowest_eigenvalue=min(lowest, default=math.nan),
+        fallbacks=sum(part.fallbacks for part in parts),
+        gimbal_cosine=min(part.gimbal_cosine for part in parts),
+    )

@@ -1,0 +1,206 @@
+"""What a recording says against attitudes and coefficients: all rows at once, with derivatives, for batch estimators.
+
+Attitudes change to the right, ``q qexp(dtheta)`` with dtheta (3,) [rad] about the axes of p; coefficients are in the
+linear form. Derivatives are those of what the model says, so that a residual changes by minus them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.arrays import Array
+from inercal.geometry.kernels import integrate
+from inercal.geometry.rotations import (
+    boxminus,
+    conjugate,
+    exp,
+    inverse_left_jacobian,
+    multiply,
+    right_jacobian,
+    rotate,
+    skew,
+    to_matrix,
+)
+from inercal.selfcal.filters.filter_result import Problem, Start
+from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
+from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
+from inercal.selfcal.platform.linearised import FLOOR
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import World
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Measurements of m rows, of which those missing or stopped by the near-level gate weigh nothing.
+
+    Attributes
+    ----------
+    acc : (m, 3) m/s^2, 0 where missing
+    acc_weight : (m, 3) s^2/m, reciprocal standard deviations
+    attitude : (m, 4) q_bp at the encoders' angles
+    root : (m, 3, 3) rad
+        Cholesky factor of the covariance ``sigma^2 (J J^T + 0.05^2 I)`` of that attitude about the axes of p.
+    whitening : (m, 3, 3) 1/rad, its inverse
+    used : (m, 6) bool, accelerometers and encoders
+    """
+
+    acc: Array
+    acc_weight: Array
+    attitude: Array
+    root: Array
+    whitening: Array
+    used: NDArray[np.bool_]
+
+    @property
+    def dims(self) -> NDArray[np.int64]:
+        """(m,) number of scalars measured in each row."""
+        return np.asarray(np.count_nonzero(self.used, axis=1))
+
+
+def readings(recording: Recording, problem: Problem) -> Readings:
+    """The measurements of all rows but the first."""
+    acc, th = recording.acc[1:], recording.th[1:]
+    seen = np.all(np.isfinite(th), axis=1)
+    attitude, joints = gimbals(np.where(seen[:, None], th, 0.0), problem.world)
+    used = np.column_stack([np.isfinite(acc), np.repeat(seen[:, None], 3, axis=1)])
+    if problem.filter.gating is not None:
+        used &= _gate(attitude, seen, problem)
+    covariance = joints @ np.swapaxes(joints, 1, 2) + FLOOR**2 * np.eye(3)
+    root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
+    return Readings(
+        np.where(used[:, :3], acc, 0.0),
+        used[:, :3] / problem.noise.accelerometer,
+        attitude,
+        root,
+        np.linalg.inv(root) * used[:, 3:, None],
+        used,
+    )
+
+
+def gimbals(th: Array, world: World) -> tuple[Array, Array]:
+    """Attitudes q_bp (m, 4) at gimbal angles (m, 3) [rad], and the axes J (m, 3, 3) of the joints in p as columns."""
+    axes = np.eye(3)[world.axes] * world.signs[:, None]
+    outer, inner, last = (exp(th[:, [k]] * axes[k]) for k in range(3))
+    back = conjugate(last)
+    columns = [
+        rotate(multiply(back, conjugate(inner)), axes[0]),
+        rotate(back, axes[1]),
+        np.broadcast_to(axes[2], (len(th), 3)),
+    ]
+    return multiply(multiply(outer, inner), last), np.stack(columns, axis=-1)
+
+
+def _gate(attitude: Array, seen: NDArray[np.bool_], problem: Problem) -> NDArray[np.bool_]:
+    """(m, 6) what the near-level gate lets pass; where the encoders are silent it stays as it was."""
+    gate, near = gate_of(problem.filter.gating), np.zeros(3, dtype=np.int64)
+    force = rotate(conjugate(attitude), problem.world.up)
+    passed = np.ones((len(attitude), 6), dtype=np.bool_)
+    for k in range(len(attitude)):
+        if seen[k]:
+            watch((force[k, 0], force[k, 1], force[k, 2]), gate, near)
+        passed[k, :3] = [admitted(i, gate, near) for i in range(3)]
+        passed[k] &= updating(gate, near)
+    return passed
+
+
+def normalised(residual: Array, measured: Readings, attitude_variance: Array | float = 0.0) -> Array:
+    """Residuals (m, 6), whitened, each over its own standard deviation instead; NaN where not measured.
+
+    ``attitude_variance`` (m, 1) [rad^2] is added to that of the encoders' attitude about each axis.
+    """
+    encoders = np.einsum("kij,kj->ki", measured.root, residual[:, 3:])
+    variance = np.sum(measured.root**2, axis=2) + attitude_variance
+    return np.where(measured.used, np.hstack([residual[:, :3], encoders / np.sqrt(variance)]), np.nan)
+
+
+def least_cosine(recording: Recording) -> float:
+    """Least |cos thy| that the encoders read."""
+    cosine = np.abs(np.cos(recording.th[:, 1]))
+    return float(np.min(cosine, where=np.isfinite(cosine), initial=1.0))
+
+
+def first_reading(recording: Recording, problem: Problem) -> Start:
+    """The attitude of the first encoder reading."""
+    return Start(gimbals(recording.th[:1], problem.world)[0][0], problem.noise.encoder)
+
+
+class OnBase(NamedTuple):
+    """Earth rate (3,) [rad/s] and specific force at rest (3,) [m/s^2] in the frame of the encoders, and their
+    derivatives (3, 3) by beta; these are None without the extended model."""
+
+    earth: Array
+    up: Array
+    earth_slope: Array | None
+    up_slope: Array | None
+
+
+def on_base(c: Array, world: World) -> OnBase:
+    """The world as coefficients (p,) have it: turned by beta, where ``d(R(beta) v) = -[R v]x Jr(-beta) dbeta``."""
+    if len(c) <= BETA.start:
+        return OnBase(world.earth, world.up, None, None)
+    turn = exp(c[BETA])
+    earth, up = rotate(turn, world.earth), rotate(turn, world.up)
+    left = right_jacobian(-c[BETA])
+    return OnBase(earth, up, -skew(earth) @ left, -skew(up) @ left)
+
+
+class Sensed(NamedTuple):
+    """Whitened residuals (m, 6) of accelerometers and of the encoders' attitude, and the derivatives of the model by
+    the attitude (m, 6, 3) and by the coefficients (m, 6, p); 0 where nothing was measured."""
+
+    residual: Array
+    by_attitude: Array
+    by_coefficients: Array
+
+
+def sensed(q: Array, c: Array, measured: Readings, world: World) -> Sensed:
+    """Compare measurements with attitudes (m, 4) and coefficients (p,)."""
+    base = on_base(c, world)
+    back = conjugate(q)
+    f = rotate(back, base.up)
+    through = np.array([[1.0 + c[15], 0.0, 0.0], [-c[4], 1.0 + c[16], 0.0], [c[3], -c[5], 1.0 + c[17]]])
+    miss = boxminus(measured.attitude, q)
+    weight, whitening = measured.acc_weight, measured.whitening
+    residual = np.concatenate(
+        [(measured.acc - c[KA0] - f @ through.T) * weight, np.einsum("kij,kj->ki", whitening, miss)], axis=1
+    )
+    by_attitude = np.empty((len(q), 6, 3))
+    by_attitude[:, :3] = (through @ skew(f)) * weight[:, :, None]
+    by_attitude[:, 3:] = whitening @ inverse_left_jacobian(miss)
+    by_coefficients = np.zeros((len(q), 6, len(c)))
+    by_coefficients[:, :3, KA0] = np.eye(3)
+    for i in range(3):
+        by_coefficients[:, i, KA1.start + i] = f[:, i]
+    by_coefficients[:, 2, 3], by_coefficients[:, 1, 4], by_coefficients[:, 2, 5] = f[:, 0], -f[:, 0], -f[:, 1]
+    if base.up_slope is not None:
+        by_coefficients[:, :3, BETA] = through @ np.swapaxes(to_matrix(q), 1, 2) @ base.up_slope
+    by_coefficients[:, :3] *= weight[:, :, None]
+    return Sensed(residual, by_attitude, by_coefficients)
+
+
+def turns(rate: Array, dt: Array, c: Array) -> tuple[Array, Array]:
+    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step, at commanded ``rate`` (m, 3).
+
+    With them the rotations (m, 3, p), about the axes of p after the step, per change of each coefficient.
+    """
+    x, y, z = rate.T
+    slope = np.zeros((len(rate), 3, len(c)))
+    slope[:, :, KG0] = np.eye(3)
+    slope[:, 0, 6], slope[:, 1, 7], slope[:, 2, 8] = y, z, x
+    slope[:, 0, 9], slope[:, 1, 10], slope[:, 2, 11] = -z, -x, -y
+    if len(c) > KG1.start:
+        for i in range(3):
+            slope[:, i, KG1.start + i] = rate[:, i]
+    turn = (rate + slope @ c) * dt[:, None]
+    return turn, right_jacobian(turn) @ slope * dt[:, None, None]
+
+
+def followed(q0: Array, turn: Array) -> Array:
+    """Attitudes (m + 1, 4) from ``q0`` (4,) on, each turned further by a rotation vector (m, 3) [rad]."""
+    out = np.empty((len(turn) + 1, 4))
+    integrate(q0, turn, np.ones(len(turn)), out)
+    return out

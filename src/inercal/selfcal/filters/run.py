@@ -1,0 +1,148 @@
+"""One door to all estimators: a recording and a problem in, what was found out."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+
+from inercal.estimate.factor import NEGATIVE
+from inercal.selfcal.filters.filter_result import (
+    Filtered,
+    History,
+    Problem,
+    Start,
+    State,
+    Trace,
+    attitude_of,
+    known_in,
+)
+from inercal.selfcal.filters.gaps import advance
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.settings import FilterKind
+
+LOCK = 0.01
+"""Least |cos thy| at which the gimbal angles of a model can still be used."""
+
+_LOADED = set[FilterKind]()
+"""Recursive filters whose kernels this process has; their types do not depend on the problem."""
+
+
+def recursive(kind: FilterKind) -> ModuleType | None:
+    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
+    if kind == "error-state":
+        from inercal.selfcal.filters import error_state
+
+        return error_state
+    if kind == "svd-qukf":
+        from inercal.selfcal.filters import quaternion
+
+        return quaternion
+    if kind == "mukf":
+        from inercal.selfcal.filters import multiplicative
+
+        return multiplicative
+    if kind == "gimbal-ukf":
+        from inercal.selfcal.filters import gimbal
+
+        return gimbal
+    return None
+
+
+def estimate(
+    recording: Recording,
+    problem: Problem,
+    kind: FilterKind | None = None,
+    start: Start | None = None,
+    history: bool = True,
+) -> Filtered:
+    """Find the coefficients that a recording tells.
+
+    Parameters
+    ----------
+    recording : Recording
+    problem : Problem
+    kind : str, optional
+        Of the estimator; that of the problem if absent.
+    start : Start, optional
+        Of the attitude; the first encoder reading if absent.
+    history : bool
+        Whether to keep what is known after each row.
+    """
+    kind = problem.filter.kind if kind is None else kind
+    module = recursive(kind)
+    if module is None:
+        from inercal.selfcal.filters.batch import estimate_map
+        from inercal.selfcal.filters.start import estimate_lm
+
+        whole = estimate_map if kind == "map" else estimate_lm
+        return whole(recording, problem, start, history)
+    load_kernels(kind, problem)
+    began = time.perf_counter()
+    state: State = module.initial(problem, recording.th[0], start)
+    first = known_in(state, problem)
+    rows = recording.dt, recording.rate, recording.acc[1:], recording.th[1:]
+    state, trace = advance(module, state, problem, *rows, recording.held, history)
+    seconds = time.perf_counter() - began
+    size = len(problem.prior)
+    found = Filtered(
+        kind=kind,
+        coefficients=state.coefficients,
+        covariance=state.covariance[-size:, -size:],
+        attitude=attitude_of(state, problem),
+        nis=trace.nis,
+        dims=trace.dims,
+        innovations=trace.innovations,
+        history=_history(first, trace) if history else None,
+        seconds=seconds,
+        lowest_eigenvalue=trace.lowest_eigenvalue,
+        fallbacks=trace.fallbacks,
+        gimbal_cosine=trace.gimbal_cosine,
+        restarts=tuple(k + 1 for k in trace.restarts),
+        state=state,
+    )
+    message = _fault(found)
+    return replace(found, converged=False, message=message) if message else found
+
+
+def load_kernels(kind: FilterKind, problem: Problem) -> None:
+    """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
+    module = recursive(kind)
+    if module is not None and kind not in _LOADED:
+        none = np.empty((0, 3))
+        module.advance(module.initial(problem, np.zeros(3)), problem, np.empty(0), none, none, none)
+        _LOADED.add(kind)
+
+
+def _history(first: History, trace: Trace) -> History:
+    """The start and what followed."""
+    return History(
+        np.concatenate([first.attitude, trace.attitude]),
+        np.concatenate([first.attitude_u, trace.attitude_u]),
+        np.concatenate([first.coefficients, trace.coefficients]),
+        np.concatenate([first.u, trace.u]),
+    )
+
+
+def _fault(found: Filtered) -> str:
+    """Why the numbers of a filter must not be used; empty if they may."""
+    variances = np.diag(found.covariance)
+    numbers = (found.coefficients, found.covariance, found.attitude)
+    if not all(np.isfinite(each).all() for each in numbers):
+        at = " where the gimbals lock" if found.gimbal_cosine < LOCK else ""
+        return f"the filter diverged{at}: coefficients or covariance are not finite"
+    if not (variances > 0.0).all() or found.lowest_eigenvalue < NEGATIVE:
+        return (
+            "the covariance lost its positive sign (lowest eigenvalue of the correlation matrix "
+            f"{found.lowest_eigenvalue:.1e}): use another filter or factor"
+        )
+    if found.kind == "gimbal-ukf" and found.gimbal_cosine < LOCK:
+        angle = math.degrees(math.acos(found.gimbal_cosine))
+        return (
+            f"the inner gimbal came to {angle:.2f} deg, where outer and platform axis coincide and the gimbal-angle "
+            "model does not hold: use a quaternion filter"
+        )
+    return ""

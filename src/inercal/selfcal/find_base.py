@@ -1,0 +1,153 @@
+"""How the base stands, found from the record before the calibration where a study says it too roughly.
+
+Filters linearise at what they know so far. About a base that is a degree off, the first rows turn beta by far more than
+what the record tells of it in the end, while all else is known poorly too; what is lost there does not come back, and
+information is made up. The batch estimator linearises all rows again and again where it stands, and so ends right.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.errors import StudyError
+from inercal.geometry.rotations import exp, from_matrix, log, multiply
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.observability import singular
+from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import BETA
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import Base
+from inercal.selfcal.settings import SelfcalSettings
+
+NEAR = math.radians(2.0 / 60.0)
+"""Standard deviation [rad] of beta up to which filters find it from the base as stated.
+
+Linearising neglects its square, 0.07 arcsec: less than what is averaged of the best encoders and accelerometers.
+"""
+
+WIDTH = math.radians(60.0)
+"""Standard deviation [rad] of a first guess of the heading; the batch estimator finds it from 60 degrees away."""
+
+TELLING = math.radians(1.0)
+"""Standard uncertainty [rad] of a heading up to which it counts as found."""
+
+LAST = 10.0
+"""Prior of beta at last, in standard uncertainties of the base found: a hundredth of what the recording tells."""
+
+
+def is_rough(settings: SelfcalSettings) -> bool:
+    """Whether the base is to be found before the calibration: heading unknown, or a wide prior of beta."""
+    wide = settings.filter.extended and bool((settings.prior[BETA] > NEAR).any())
+    return settings.heading_unknown or wide
+
+
+def stated_well(settings: SelfcalSettings, use: str) -> None:
+    """Refuse a rough base where it cannot be found first, for a ``use`` in words; raises `StudyError`."""
+    if settings.heading_unknown:
+        raise StudyError("rig.heading", f"found it unknown, expected a known one for {use}")
+    if is_rough(settings):
+        widest = math.degrees(float(settings.prior[BETA].max())) * 60.0
+        limit = math.degrees(NEAR) * 60.0
+        raise StudyError(
+            "prior.beta",
+            f"found {widest:.3g} arcmin, with the uncertainty of heading and tilt, expected {limit:.0f} arcmin or less "
+            f"for {use}: find the base from a record first",
+        )
+
+
+def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSettings:
+    """The study with the base that its recording tells, and beta, relative to that, to correct it.
+
+    The most probable base is the batch estimator's, with the prior of the study; one of unknown heading is looked for
+    from four headings, a quarter turn apart, and the most probable of these is taken. The prior of beta about the base
+    found is `LAST` times its bound, the study's where that is narrower; about level axes too, as a tilt of a minute of
+    arc by a wide heading is enough to make up information. The bound is linearised at one base: it does not add up what
+    different headings would tell. Where residuals are larger than the noise that is stated, so is the prior. Where
+    rounding leaves no bound the prior stays as it is: the covariance of the calibration is lost too, and its verdict
+    says so.
+
+    What the study knows enters twice, in the base and about it: that is nothing where the recording tells a hundred
+    times more, a tenth too little in u where it tells as much.
+
+    Raises
+    ------
+    StudyError
+        The heading is unknown, and the recording tells less of it than `TELLING`: earth rate has no north at the poles.
+    """
+    prior, base, vertical = settings.prior.copy(), settings.base, _vertical(settings.base)
+    guesses = [base]
+    if settings.heading_unknown:
+        prior[BETA] = np.hypot(prior[BETA], WIDTH * vertical)
+        guesses = [replace(base, heading=0.5 * math.pi * k) for k in range(4)]
+    wide = replace(settings, prior=prior, filter=replace(settings.filter, extended=True))
+    tried = [(guess, _batch(recording, replace(wide, base=guess))) for guess in guesses]
+    base, found = min(tried, key=lambda each: _misfit(each[1]))
+    if not math.isfinite(_misfit(found)):
+        return wide  # a recording that contradicts the model: the diagnosis says how
+    near = replace(wide, base=base.turned(found.coefficients[BETA]))
+    bound = _bound(recording, near, found)
+    if singular(prior[BETA], bound) is not None:
+        return near
+    u = np.sqrt(np.diag(bound))
+    if settings.heading_unknown:
+        _told(float(vertical @ u), settings)
+    scatter = math.sqrt(max(1.0, np.nansum(found.nis) / max(found.dims.sum(), 1)))
+    last = prior.copy()
+    last[BETA] = np.minimum(prior[BETA], LAST * scatter * u)
+    return replace(near, prior=last)
+
+
+def heading(base: Base, beta: Array, covariance: Array) -> tuple[float, float]:
+    """Heading [rad] of a base that beta (3,) with its covariance (3, 3) corrects, and its standard uncertainty."""
+    step = 1e-6
+    ends = [base.turned(beta + by).heading for by in step * np.vstack([np.eye(3), -np.eye(3)])]
+    slope = np.array([math.remainder(ends[k] - ends[k + 3], 2.0 * math.pi) for k in range(3)]) / (2.0 * step)
+    return base.turned(beta).heading, math.sqrt(slope @ covariance @ slope)
+
+
+def relative(beta: Array, stated: Base, found: Base) -> Array:
+    """Beta (3,) [rad], stated against one base, against another."""
+    between = stated.from_geographic() @ found.from_geographic().T
+    return log(multiply(exp(beta), from_matrix(between)))
+
+
+def _batch(recording: Recording, settings: SelfcalSettings) -> Filtered:
+    """The batch estimator."""
+    return estimate(recording, problem(settings), "map")
+
+
+def _misfit(found: Filtered) -> float:
+    """Sum of squares that the batch estimator made smallest; infinite where it did not end."""
+    return float(np.nansum(found.nis)) if found.converged else math.inf
+
+
+def _bound(recording: Recording, settings: SelfcalSettings, found: Filtered) -> Array:
+    """(3, 3) covariance of beta about the base of ``settings`` [rad^2], along the path found."""
+    assert found.history is not None
+    coefficients = found.coefficients.copy()
+    coefficients[BETA] = 0.0
+    along = found.history.attitude, coefficients
+    bounds = recorded_bounds(recording, problem(settings), *along, restarts=found.restarts)
+    return bounds.covariance[BETA, BETA]
+
+
+def _vertical(base: Base) -> Array:
+    """(3,) 1 for the axis of b about which the heading turns, upward or downward where the base is level; 0 else."""
+    return np.abs(Base(base.frame).from_geographic()[:, 2])
+
+
+def _told(u: float, settings: SelfcalSettings) -> None:
+    """Refuse a heading that stays unknown."""
+    if u > TELLING:
+        at = math.degrees(settings.site.latitude or 0.0)
+        raise StudyError(
+            "rig.heading",
+            f"found unknown, but at latitude {at:.6g} deg this recording tells it to {math.degrees(u):.2g} deg only, "
+            "expected a heading that is stated with its uncertainty (or a recording from which u is below "
+            f"{math.degrees(TELLING):.2g} deg)",
+        )

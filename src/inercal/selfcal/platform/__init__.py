@@ -1,0 +1,1 @@
+"""The platform: gimbals, path, coefficients, equations of motion and measurement."""

@@ -1,0 +1,56 @@
+"""A recording of a platform, as estimators take it: in SI, one clock, continuous angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.findings import Finding
+from inercal.inputs import Source
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a platform recorded; what is missing is NaN.
+
+    Attributes
+    ----------
+    t : (n,) s, increasing
+    rate : (n - 1, 3) rad/s
+        Of the platform against inertial space, in p, held from each row to the next: commanded, or ``measured`` by
+        gyros in their place.
+    th : (n, 3) rad
+        Gimbal angles at each row, continuous through full turns; the first row is complete.
+    acc : (n, 3) m/s^2
+        Accelerometers at each row; the first row is not used.
+    measured : bool
+    findings, sources
+        Of the record.
+    held : tuple of int
+        Steps whose rate was not recorded, and is that of a platform that turns on as before
+        (`inercal.selfcal.filters.gaps`).
+    temperature : str or None
+        That was recorded, its mean in words.
+    """
+
+    t: Array
+    rate: Array
+    th: Array
+    acc: Array
+    measured: bool = False
+    findings: tuple[Finding, ...] = ()
+    sources: tuple[Source, ...] = ()
+    held: tuple[int, ...] = ()
+    temperature: str | None = None
+
+    @property
+    def dt(self) -> Array:
+        """(n - 1,) s, from each row to the next."""
+        return np.diff(self.t)
+
+    @property
+    def scalars(self) -> int:
+        """Number of scalar measurements used: all but the first row's."""
+        return int(np.isfinite(self.th[1:]).sum() + np.isfinite(self.acc[1:]).sum())

@@ -1,0 +1,99 @@
+"""What coefficients are uncertain by: noise, prior, and what is stated of site and base.
+
+The covariance of a filter is split as that of the bounds along its path is; what is stated (type B) acts through the
+error-state filter, run again with it changed by one standard uncertainty either way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.budget import TypeA, TypeB
+from inercal.selfcal.before.bounds import Bounds
+from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import names, to_product
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.result.systematic import statements
+from inercal.selfcal.settings import Noise, SelfcalSettings
+
+
+def within(covariance: Array, bounds: Bounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
+    """Noise and prior, whose covariances add up to that of the filter (p, p), product form.
+
+    Bounds and filter differ by little; ``T`` with ``T P_bounds T^T = P_filter`` takes the parts of one to the other.
+    """
+    prior = bounds.prior
+    roots = [np.linalg.cholesky(P / np.outer(prior, prior)) for P in (covariance, bounds.covariance)]
+    to_filter = prior[:, None] * np.linalg.solve(roots[1].T, roots[0].T).T / prior
+    levels = {
+        "angle random walk": (noise.angle_random_walk, "rad/sqrt(s)"),
+        "accelerometer": (noise.accelerometer, "m/s^2"),
+        "encoder": (noise.encoder, "rad"),
+    }
+    found: list[TypeA | TypeB] = []
+    for source, part in bounds.contributions.items():
+        P = to_filter @ part @ to_filter.T
+        P = 0.5 * (P + P.T)  # where hardly anything is known, rounding is not the same on both sides
+        if source in levels:
+            found.append(
+                TypeA(f"{source} noise" if source != "angle random walk" else source, *levels[source], P, dof)
+            )
+        else:
+            # u in units of the prior standard deviations
+            values, vectors = np.linalg.eigh(P / np.outer(prior, prior))
+            root = prior[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+            found.append(TypeB(source, 1.0, "1", root))
+    return found
+
+
+def stated(
+    recording: Recording, settings: SelfcalSettings, u: Array
+) -> tuple[list[TypeB], Mapping[str, str]]:
+    """What is stated of site and base.
+
+    Parameters
+    ----------
+    recording : Recording
+    settings : SelfcalSettings
+    u : (p,)
+        Standard uncertainties of the coefficients by noise and prior.
+
+    Returns
+    -------
+    sources : list of `TypeB`
+        What is stated with an uncertainty.
+    exact : mapping
+        What is stated without -> the error of it, in words, that does as much as one u of a coefficient.
+    """
+    sources, exact = list[TypeB](), dict[str, str]()
+    known = names(len(u))
+    for statement in statements(settings):
+        by = statement.u or statement.step
+        ends = [
+            to_product(
+                estimate(
+                    recording, problem(statement.changed(each)), "error-state", history=False
+                ).coefficients
+            )
+            for each in (-by, by)
+        ]
+        slope = (ends[1] - ends[0]) / (2.0 * by)
+        worst = int(np.argmax(np.abs(slope) / u))
+        if statement.name == "gravity" and statement.u:
+            sources += [
+                TypeB(each.source, each.u, each.unit, each.sensitivity * slope)
+                for each in settings.site.inputs
+                if each.source != "latitude"
+            ]
+        elif statement.u:
+            sources.append(TypeB(statement.name, statement.u, "rad", slope))
+        elif not np.isfinite(slope).all():
+            exact[statement.name] = f"an unknown error of {statement.name}, as the filter does not follow it"
+        elif slope[worst] != 0.0:
+            error = u[worst] / abs(slope[worst]) / statement.size
+            exact[statement.name] = f"{error:.2g} {statement.unit} of {statement.name} ({known[worst]})"
+    return sources, exact

@@ -1,0 +1,385 @@
+"""The estimate of a self-calibration: coefficients, covariance, budget and verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.budget import BudgetItem, combine, common
+from inercal.estimate.conditions import conditions
+from inercal.estimate.consistency import Nis, nis
+from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.findings import Finding, Status
+from inercal.records.places import counted
+from inercal.selfcal.before.bounds import Bounds
+from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen, singular, useless
+from inercal.selfcal.diagnosis.small import filtered as judging
+from inercal.selfcal.diagnosis.small import likely
+from inercal.selfcal.display import shown_unit
+from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.run import LOCK
+from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.result.budget import stated, within
+from inercal.selfcal.result.systematic import stated_errors
+from inercal.selfcal.settings import SelfcalSettings
+
+COMMAND = "selfcal"
+
+FRAME = "p, of the platform: X_p along accelerometer x, Y_p in the plane of accelerometers x and y"
+
+MODEL = (
+    "w_Ip^p = w_c + M w_c + kg0, M = [[0, ds_x, -do_x], [-do_y, 0, ds_y], [ds_z, -do_z, 0]]; "
+    "ax = ka0_x + (1 + ka1_x) fx, ay = ka0_y + (1 + ka1_y) (fy - eta_oy fx), "
+    "az = ka0_z + (1 + ka1_z) (fz + eta_pz fx - eta_oz fy); f the specific force in p (+g up at rest), w_c the "
+    "commanded or measured rate of the platform against inertial space"
+)
+
+EXTENSION = (
+    "; kg1 on the diagonal of M; q_encoders = qexp(beta) q, beta the zero of the encoders against the base"
+)
+
+REFERENCES = (
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+    "Continuous self-calibration model of attitude quaternion for hybrid inertial navigation system, Journal of "
+    "Beijing University of Aeronautics and Astronautics (2018-19)",
+    "A. D. Jackson, Continuous calibration and alignment techniques for an all-attitude inertial platform, AIAA paper "
+    "73-865 (1973)",
+)
+
+_SIGMA_POINTS = (
+    "S. J. Julier, J. K. Uhlmann, Unscented filtering and nonlinear estimation, Proceedings of the IEEE 92 (2004) "
+    "401"
+)
+_BY_KIND = {
+    "error-state": (
+        "E. J. Lefferts, F. L. Markley, M. D. Shuster, Kalman filtering for spacecraft attitude estimation, Journal of "
+        "Guidance, Control, and Dynamics 5 (1982) 417",
+    ),
+    "mukf": (
+        _SIGMA_POINTS,
+        "J. L. Crassidis, F. L. Markley, Unscented filtering for spacecraft attitude estimation, Journal of Guidance, "
+        "Control, and Dynamics 26 (2003) 536",
+    ),
+    "svd-qukf": (_SIGMA_POINTS,),
+    "gimbal-ukf": (_SIGMA_POINTS,),
+}
+
+_CAUSES = (
+    "unit_suspect", "channel_swap", "sign_suspect", "command_shift", "stuck_encoder", "dead_channel", "gap",
+    "unmodelled", "site_suspect", "prior_suspect", "excess_scatter", "filter_fails", "contradiction", "outlier",
+)  # fmt: skip
+"""Findings that explain innovations too large, those of a recording's reading the likeliest first."""
+
+#: findings of the diagnosis that leave the values good
+_HARMLESS = ("gap", "low_scatter")
+
+#: axis of p -> coefficients that only a turn about it shows well
+_BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
+
+
+def assemble(
+    recording: Recording,
+    settings: SelfcalSettings,
+    filtered: Filtered,
+    bounds: Bounds,
+    findings: Sequence[Finding] = (),
+) -> Estimate:
+    """Put the estimate together.
+
+    Parameters
+    ----------
+    recording : Recording
+    settings : SelfcalSettings
+    filtered : Filtered
+    bounds : Bounds
+        Along the path as it was estimated, with ``contributions``.
+    findings : sequence of Finding
+        Of the diagnosis, beside those of the recording.
+    """
+    p = len(filtered.coefficients)
+    fields: dict[str, Any] = {
+        "model": MODEL + (EXTENSION if settings.filter.extended else ""),
+        "conditions": _conditions(recording, settings),
+        "traceability": settings.traceability,
+        "inputs": recording.sources,
+        "provenance": provenance(settings.given),
+        "references": REFERENCES + _BY_KIND.get(filtered.kind, ()),
+    }
+    known = {each.code for each in recording.findings} - {"gap", "outlier"}
+    said = [*recording.findings, *(each for each in findings if each.code not in known)]
+    if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LOCK:
+        angle = math.degrees(math.acos(filtered.gimbal_cosine))
+        text = f"the inner gimbal comes to {angle:.2f} deg, where the gimbal-angle model does not hold"
+        said.append(Finding("gimbal_lock", text))
+    interval = float(np.median(recording.dt))
+    result: dict[str, Any] = {
+        "filter": filtered.kind,
+        "bounds": {},
+        "at_prior": [],
+        "goal": {},
+        "step_us": filtered.step_us,
+        "sample_share": 1e-6 * filtered.step_us / interval,
+        "compare": {},
+    }
+    slope, values = product_slope(filtered.coefficients), to_product(filtered.coefficients)
+    by_filter = slope @ filtered.covariance @ slope.T
+    if (unusable := useless(filtered, bounds, by_filter)) is not None:
+        return without_parameters(COMMAND, *unusable, findings=tuple(said), result=result, **fields)
+
+    result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
+    used = _scalars(filtered)
+    dof = float(used - p - 3)
+    of_site, exact = stated(recording, settings, np.sqrt(np.diag(by_filter)))
+    sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
+    covariance, _, budget = combine(names(p), sources)
+    if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
+        text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
+        return without_parameters(
+            COMMAND, Status.ILL_CONDITIONED, text, findings=tuple(said), result=result, **fields
+        )
+    if (unusable := singular(bounds.prior, covariance)) is not None:
+        return without_parameters(COMMAND, *unusable, findings=tuple(said), result=result, **fields)
+    # all noises are judged by one set of innovations; their parts add up to them but for rounding
+    more = np.square(np.diag(covariance) / np.diag(by_filter))
+    effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
+    u = np.sqrt(np.diag(covariance))
+
+    judged = seen(replace(bounds, covariance=by_filter), settings.goal)
+    agreement = nis(filtered.nis, filtered.dims)
+    hidden = _hidden(judged, u / bounds.prior, budget)
+    result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
+    result["goal"] = _goal(settings.goal, names(p), u)
+    hints = _hardly_turned(recording, settings)
+    said += _left_at_prior(judged, hints)
+    limit = _limit(agreement, recording, settings)
+    status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
+    # of numbers that are not to be used, more would be noise
+    if status is not Status.INCONSISTENT:
+        said += _missed(result["goal"], units(p), hints)
+        said += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
+        said += _taken_as_exact(exact)
+    lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNOBSERVABLE and name in NAMES}
+    if status is Status.OK and lost:
+        status, message = (
+            Status.UNOBSERVABLE,
+            f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better",
+        )
+    if status is Status.OK:
+        message = _doubted(message, findings)
+    return Estimate(
+        command=COMMAND,
+        names=names(p),
+        units=units(p),
+        values=values,
+        covariance=covariance,
+        dof=effective,
+        k=np.array([coverage_factor(float(each)) for each in effective]),
+        status=status,
+        message=message,
+        findings=tuple(said),
+        statistics={
+            "dof": dof,
+            "condition": judged.learned.condition**2,
+            "residual_rms": _rms(filtered),
+            "chi2": float(np.nansum(filtered.nis)),
+            "nis_mean": agreement.mean,
+            "nis_expected": agreement.expected,
+            "nis_limit": limit,
+            "steps": float(filtered.steps),
+        },
+        budget=budget,
+        result=result,
+        common=common(sources, p),
+        **fields,
+    )
+
+
+def verdict(
+    filtered: Filtered, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
+) -> tuple[Status, str]:
+    """Status of what an estimator found, and its sentence, without all that an estimate holds: for comparisons."""
+    slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
+    known = Bounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
+    if (unusable := useless(filtered, known, known.covariance)) is not None:
+        return unusable
+    agreement = nis(filtered.nis, filtered.dims)
+    cause = _cause(findings, recording.findings)
+    limit = _limit(agreement, recording, settings)
+    return _verdict(seen(known, {}), agreement, limit, cause, _hardly_turned(recording, settings))
+
+
+def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
+    """What explains innovations that are too large: the diagnosis, else the reading of the recording."""
+    by_rank = sorted(
+        (each for each in recorded if each.code in _CAUSES), key=lambda each: _CAUSES.index(each.code)
+    )
+    explaining = [*(each for each in diagnosed if each.code in _CAUSES), *by_rank]
+    return explaining[0].message if explaining else "check noise, commands, signs and units"
+
+
+def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> float:
+    """Largest mean NIS of a recording that does not contradict the model.
+
+    Beyond that of an exact study there is room for as much as disappears where what is stated of site and base is
+    moved, within its uncertainty, to where the recording fits best.
+    """
+    errors, of = stated_errors(settings), problem(settings)
+    if errors is None:
+        return agreement.limit()
+    moved = likely(recording, of, errors)
+    before, after = (float(np.nansum(judging((recording, each)).nis)) for each in (of, moved))
+    return agreement.limit() + max(0.0, before - after) / agreement.rows
+
+
+def _doubted(message: str, diagnosed: Sequence[Finding]) -> str:
+    """The sentence of a verdict that values can be used, with the findings for which they may be wrong all the same."""
+    codes = dict.fromkeys(each.code for each in diagnosed if each.code not in _HARMLESS)
+    if not codes:
+        return message
+    return f"{message}; but see {', '.join(codes)}: values may be off by more than their u"
+
+
+def _verdict(
+    judged: Seen, agreement: Nis, limit: float, cause: str, hints: Mapping[str, str]
+) -> tuple[Status, str]:
+    """Status and its sentence, of numbers that can be used."""
+    if agreement.mean > limit:
+        return Status.INCONSISTENT, (
+            f"the recording contradicts the model: mean NIS {agreement.mean:.4g}, expected {agreement.expected:.4g} "
+            f"and at most {limit:.4g}; {cause}"
+        )
+    ratio = judged.learned.ratio[: len(NAMES)]
+    unseen = [name for name, left in zip(NAMES, ratio, strict=True) if left > UNOBSERVABLE]
+    if unseen:
+        help = next(
+            (hints[name] for name in unseen if name in hints), "add turns about other axes, or there and back"
+        )
+        return Status.UNOBSERVABLE, (
+            f"the path says nothing about {', '.join(unseen)}: {100 * float(ratio.max()):.0f} % of the prior is left; "
+            f"the weakest combination is {judged.learned.weakest()[0]}; {help}"
+        )
+    left = judged.learned.left
+    if left[-1] ** 2 < len(left) * np.finfo(float).eps * left[0] ** 2:
+        return Status.ILL_CONDITIONED, (
+            f"the covariance is numerically singular: {judged.learned.weakest()[0]} is known too weakly beside the "
+            "rest; add turns about other axes"
+        )
+    return Status.OK, (
+        f"{counted(len(left), 'coefficient')} from {counted(agreement.rows, 'row')}, mean NIS {agreement.mean:.3g}"
+    )
+
+
+def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str, str]:
+    """Coefficients that only a turn about one axis of p shows well, of axes without one -> what would help."""
+    earth = float(np.linalg.norm(settings.world.earth))
+    moving = np.abs(recording.rate).max(axis=1) > 2.0 * earth
+    turned = np.degrees((np.abs(recording.rate) * recording.dt[:, None])[moving].sum(axis=0))
+    words = dict[str, str]()
+    for axis, coefficients in zip("XYZ", _BY_AXIS, strict=True):
+        if (by := float(turned["XYZ".index(axis)])) < 45.0:
+            text = (
+                f"{axis}_p is turned by {by:.2g} deg in all, so that {' and '.join(coefficients)} see little more "
+                f"than earth rate: add turns with {axis}_p along the turning axis"
+            )
+            words |= dict.fromkeys(coefficients, text)
+    return words
+
+
+def _left_at_prior(judged: Seen, hints: Mapping[str, str]) -> list[Finding]:
+    """Coefficients of which more than half of the prior is left."""
+    ratio = dict(zip(judged.learned.names, judged.learned.ratio, strict=True))
+    return [
+        Finding(
+            "at_prior", _with(f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left", hints.get(name))
+        )
+        for name in judged.at_prior
+    ]
+
+
+def _hidden(judged: Seen, ratio: Array, budget: Sequence[BudgetItem]) -> dict[str, tuple[float, str]]:
+    """Coefficients that the path shows, but what is stated of site or base hides: u over prior, and why."""
+    found = {}
+    for name, left in zip(judged.learned.names, ratio, strict=True):
+        if left > AT_PRIOR and name not in judged.at_prior:
+            source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
+            why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
+            found[name] = (float(left), why)
+    return found
+
+
+def _with(text: str, hint: str | None) -> str:
+    """A sentence with what would help, if that is known."""
+    return text if hint is None else f"{text}; {hint}"
+
+
+def _goal(goal: Mapping[str, float], known: tuple[str, ...], u: Array) -> dict[str, dict[str, Any]]:
+    """What was wanted of each coefficient, and what came of it."""
+    return {
+        name: {"wanted": goal[name], "u": float(each), "met": bool(each <= goal[name])}
+        for name, each in zip(known, u, strict=True)
+        if name in goal
+    }
+
+
+def _missed(
+    goal: Mapping[str, Mapping[str, Any]], si: tuple[str, ...], hints: Mapping[str, str]
+) -> list[Finding]:
+    """Goals that were not met."""
+    found = []
+    for name, unit in zip(names(len(si)), si, strict=True):
+        if name in goal and not goal[name]["met"]:
+            shown, size = shown_unit(unit)
+            u, wanted = goal[name]["u"] / size, goal[name]["wanted"] / size
+            text = f"{name}: u = {u:.2g} {shown}, wanted {wanted:.2g} {shown}"
+            found.append(Finding("goal_missed", _with(text, hints.get(name))))
+    return found
+
+
+def _taken_as_exact(words: Mapping[str, str]) -> list[Finding]:
+    """What was stated without an uncertainty, and what that hides."""
+    if not words:
+        return []
+    text = (
+        f"{', '.join(words)} taken as exact: an error as large as one u of a coefficient comes from "
+        f"{', '.join(words.values())}; state them with uncertainties"
+    )
+    return [Finding("stated_exact", text)]
+
+
+def _scalars(filtered: Filtered) -> int:
+    """Number of scalar measurements used."""
+    known = np.isfinite(filtered.innovations)
+    return int(known.sum() if len(known) else filtered.dims.sum())
+
+
+def _rms(filtered: Filtered) -> float:
+    """Root mean square of the normalised innovations; 1 where all is well."""
+    count = float(filtered.dims.sum())
+    return math.sqrt(float(np.nansum(filtered.nis)) / count) if count else math.nan
+
+
+def _conditions(recording: Recording, settings: SelfcalSettings) -> dict[str, Any]:
+    """Conditions and ranges over which the result is valid."""
+    angles = recording.th[np.isfinite(recording.th).all(axis=1)]
+    return conditions(
+        settings,
+        recording.temperature,
+        {
+            "duration_s": float(recording.t[-1] - recording.t[0]),
+            "step_s": float(np.median(recording.dt)),
+            "rate_rad_s": float(np.linalg.norm(recording.rate, axis=1).max()),
+            **{
+                f"{name}_rad": [float(low), float(high)]
+                for name, low, high in zip(JOINTS, angles.min(axis=0), angles.max(axis=0), strict=True)
+            },
+        },
+        frame=FRAME,
+        rate="measured" if recording.measured else "commanded",
+    )

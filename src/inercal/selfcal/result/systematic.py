@@ -1,0 +1,104 @@
+"""What a study states of site and base: latitude, gravity, heading, tilt, each with its uncertainty, and what changes
+where one is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from inercal.arrays import Array
+from inercal.selfcal.diagnosis.small import Cause
+from inercal.selfcal.filters.filter_result import Problem
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.settings import SelfcalSettings
+
+_DEG = math.radians(1.0)
+_SECOND = ("arcsec", _DEG / 3600.0)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One thing that is stated: its ``u`` (0 where it is taken as exact), a step for the derivative, the study with it
+    changed, and how errors of it are said."""
+
+    name: str
+    u: float
+    step: float
+    changed: Callable[[float], SelfcalSettings]
+    unit: str
+    size: float
+
+
+def statements(settings: SelfcalSettings) -> list[Statement]:
+    """What is stated; heading and tilt not where beta, with its prior, takes their place."""
+    site, base = settings.site, settings.base
+
+    def with_base(**change: Any) -> SelfcalSettings:
+        return replace(settings, base=replace(base, **change))
+
+    by_gravity = (each for each in site.inputs if each.source != "latitude")
+    gravity_u = math.hypot(*(each.u * each.sensitivity for each in by_gravity))
+    of_site = [
+        Statement(
+            "latitude", site.latitude_u, 1e-4, lambda by: _moved(settings, by), "deg", _DEG
+        ),
+        Statement(
+            "gravity", gravity_u, 1e-5 * site.gravity,
+            lambda by: replace(settings, site=replace(site, gravity=site.gravity + by)), "m/s^2", 1.0,
+        ),
+    ]  # fmt: skip
+    if settings.filter.extended:
+        return of_site
+    north, east = base.tilt
+    return [
+        *of_site,
+        Statement(
+            "heading", base.heading_u, 1e-4, lambda by: with_base(heading=base.heading + by), "deg", _DEG
+        ),
+        Statement(
+            "tilt about north", base.tilt_u[0], 1e-6, lambda by: with_base(tilt=(north + by, east)), *_SECOND
+        ),
+        Statement(
+            "tilt about east", base.tilt_u[1], 1e-6, lambda by: with_base(tilt=(north, east + by)), *_SECOND
+        ),
+    ]
+
+
+def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
+    """The study at another latitude, with gravity as it was computed from it, if it was.
+
+    Beyond a pole the latitude falls again and north is the other way, so that earth rate goes on turning evenly.
+    """
+    site, base = settings.site, settings.base
+    slope = sum(each.sensitivity for each in site.inputs if each.source == "latitude")
+    latitude = math.remainder((site.latitude or 0.0) + by, 2.0 * math.pi)
+    if abs(latitude) > 0.5 * math.pi:
+        latitude = math.copysign(math.pi, latitude) - latitude
+        base = replace(base, heading=base.heading + math.pi)
+    return replace(
+        settings, site=replace(site, latitude=latitude, gravity=site.gravity + slope * by), base=base
+    )
+
+
+def stated_errors(settings: SelfcalSettings) -> Cause | None:
+    """Errors of what is stated with an uncertainty, in units of it; None where nothing is.
+
+    They are small enough for changes of earth rate and gravity to add up.
+    """
+    uncertain = [each for each in statements(settings) if each.u]
+    if not uncertain:
+        return None
+    here = settings.world
+
+    def corrected(recording: Recording, problem: Problem, values: Array) -> tuple[Recording, Problem]:
+        earth, up = problem.world.earth, problem.world.up
+        for statement, value in zip(uncertain, values, strict=True):
+            if value == 0.0:
+                continue
+            there = statement.changed(float(value) * statement.u).world
+            earth, up = earth + there.earth - here.earth, up + there.up - here.up
+        return recording, replace(problem, world=replace(problem.world, earth=earth, up=up))
+
+    return Cause("stated", tuple(each.name for each in uncertain), 0.1, corrected, prior=1.0)

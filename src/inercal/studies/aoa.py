@@ -1,0 +1,366 @@
+"""The study of an angle of attack: one file for its simulation and its measurement."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainSerializer, PlainValidator, StrictBool, WithJsonSchema, model_validator
+
+from inercal._toml import Strict, check
+from inercal.aoa.settings import (
+    AoaSettings,
+    Attitude,
+    Centrifugal,
+    Estimator,
+    Methods,
+    Noise,
+    Prior,
+    Resonance,
+    States,
+    Static,
+    Tangential,
+    Timing,
+    Zero,
+)
+from inercal.errors import StudyError
+from inercal.studies.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_of,
+)
+from inercal.studies.fields import QuantityText, positive, refusal
+from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
+from inercal.studies.ratios import ExactText
+from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
+from inercal.units import STANDARD_GRAVITY, Quantity, shown
+
+_DEVIATION = "a standard deviation above zero"
+
+
+def _deviation(dimension: str, example: str) -> QuantityText:
+    """A standard deviation."""
+    return QuantityText(dimension, example, positive, _DEVIATION)
+
+
+_Force = Annotated[Quantity, _deviation("acceleration", "1e-4 g")]
+# a bias near gravity leaves the angle unknown, which no u of first order can say
+_Bias = Annotated[
+    Quantity,
+    QuantityText(
+        "acceleration",
+        "1e-4 g",
+        lambda d: 0.0 < d <= 0.3 * STANDARD_GRAVITY,
+        f"{_DEVIATION}, 0.3 g at most, or gravity cannot be told from it (mg given as g?)",
+    ),
+]
+_Rate = Annotated[Quantity, _deviation("rate", "0.2 deg/s")]
+_Length = Annotated[
+    Quantity,
+    QuantityText("length", "3 mm", lambda d: 0.0 < d <= 1.0, f"{_DEVIATION}, 1 m at most (mm given as m?)"),
+]
+_Time = Annotated[Quantity, _deviation("time", "5 ms")]
+_Number = Annotated[Quantity, _deviation("number", "0.1 %")]
+_Frequency = Annotated[Quantity, QuantityText("frequency", "9 Hz", positive, "a frequency above zero")]
+_Damping = Annotated[
+    Quantity, QuantityText("number", "0.3", lambda z: 0.0 < z < 1.0, "a relative damping above 0, below 1")
+]
+_Delay = Annotated[Quantity, ExactText("time", "2 ms", lambda t: abs(t) <= 1.0, "a delay from -1 s to 1 s")]
+_CommonDelay = Annotated[
+    Quantity, QuantityText("time", "0.5(1) ms", lambda t: abs(t) <= 1.0, "a delay from -1 s to 1 s")
+]
+_Roll = Annotated[
+    Quantity,
+    QuantityText("angle", "2.0(1) deg", lambda a: abs(a) <= math.pi, "an angle from -180 deg to 180 deg"),
+]
+_Stream = Annotated[
+    Quantity,
+    QuantityText(
+        "angle", "0.10(2) deg", lambda a: abs(a) <= 0.25 * math.pi, "an angle from -45 deg to 45 deg"
+    ),
+]
+_Instant = Annotated[Quantity, QuantityText("time", "5 s", lambda t: abs(t) < 1e10, "a time of the record")]
+
+
+def _certain(value: object) -> Quantity:
+    """A known angle: its standard uncertainty is above zero."""
+    found = QuantityText(
+        "angle", "0.00(1) deg", lambda a: abs(a) <= math.pi, "an angle from -180 deg to 180 deg"
+    ).parse(value)
+    if not found.u > 0.0:
+        raise refusal(
+            f"found {shown(value)}, expected it with its standard uncertainty, such as '0.00(1) deg'"
+        )
+    return found
+
+
+_SNAP = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*rad(?:\^2|²)\s*/\s*s(?:\^7|⁷)\s*")
+
+
+def _snap(value: object) -> float:
+    """A spectral density [rad^2/s^7], as a text with that unit."""
+    match = _SNAP.fullmatch(value) if isinstance(value, str) else None
+    try:
+        found = float(match[1]) if match else math.nan
+    except ValueError:
+        found = math.nan
+    if not 0.0 < found < math.inf:
+        raise refusal(
+            f'found {shown(value)}, expected a spectral density above zero, such as "1e7 rad^2/s^7"'
+        )
+    return found
+
+
+_Snap = Annotated[
+    float,
+    PlainValidator(_snap),
+    PlainSerializer(lambda value: f"{value!r} rad^2/s^7"),
+    WithJsonSchema({"type": "string", "examples": ["1e7 rad^2/s^7"]}),
+]
+
+
+class StingTable(Strict):
+    """What carries the model."""
+
+    kind: Literal["sting"] = Field(description="a model that pitches about a pivot, on a sting")
+
+
+class SensorNoiseTable(Strict):
+    """Noise of each sample, and biases that nobody knows beforehand: standard deviations."""
+
+    accelerometer: _Force = Field(description="of a sample of an accelerometer")
+    accelerometer_bias: _Bias = Field(
+        description="of the accelerometers' biases, half its variance common to all; 0.3 g at most"
+    )
+    gyro: _Rate = Field(description="of a sample of a gyro")
+    gyro_bias: _Rate = Field(description="of the gyros' biases")
+
+
+class FlexureTable(Strict):
+    """Flexure of the sting as the filter takes it: a band-pass with random input."""
+
+    frequency: _Frequency | None = Field(default=None, description="of the resonance; as usual if absent")
+    damping: _Damping | None = Field(default=None, description="relative to critical; as usual if absent")
+    level: _Force | None = Field(
+        default=None, description="standard deviation of the acceleration; 0.01 g if absent"
+    )
+
+
+class SensorPriorTable(Strict):
+    """What is not known of the sensors before the run: standard deviations; the usual ones if absent."""
+
+    lever_common: _Length | None = Field(
+        default=None, description="of all positions r together, the pivot; 3 mm if absent"
+    )
+    lever: _Length | None = Field(default=None, description="of each position r; 1 mm if absent")
+    height: _Length | None = Field(default=None, description="of each height z; 5 mm if absent")
+    gyro_scale: _Number | None = Field(default=None, description="of the gyro's scale; 0.1 % if absent")
+    gyro_delay: _Time | None = Field(
+        default=None, description="of the gyro's delay, where it is estimated; 5 ms if absent"
+    )
+    heave: FlexureTable = Field(
+        default=FlexureTable(), title="Heave", description="flexure along z: 9 Hz, damping 0.3 if absent"
+    )
+    axial: FlexureTable = Field(
+        default=FlexureTable(), title="Axial", description="flexure along x: 12 Hz, damping 0.5 if absent"
+    )
+
+
+class TimingTable(Strict):
+    """Delays, positive where outputs come late."""
+
+    gyro_delay: _Delay | Literal["estimate"] | None = Field(
+        default=None, description="of the gyro against the accelerometers; or estimate; 0 if absent"
+    )
+    common_delay: _CommonDelay | None = Field(
+        default=None,
+        description="of all sensors against the stamps, which none of them sees, with its standard uncertainty; 0 if "
+        "absent",
+    )
+
+
+class EstimatorTable(Strict):
+    """The fusion of all sensors."""
+
+    states: States = Field(
+        default=19, description="of three accelerometers: 19 all errors, 15, 11, 8 biases alone"
+    )
+    smooth: StrictBool = Field(default=False, description="smooth, which uses later samples too")
+    prior: str | None = Field(
+        default=None,
+        min_length=1,
+        description="result (--out) of an earlier run, beside the study, whose posterior is the prior of this one",
+        examples=["last.json"],
+    )
+    snap: _Snap | None = Field(
+        default=None,
+        description="spectral density of the angle's fourth derivative; 1e7 rad^2/s^7 if absent, 1e8 from 15 "
+        "states on",
+    )
+    gate: Annotated[float, Field(strict=True, ge=1.0)] = Field(
+        default=25.0, description="innovation squared over its variance from which a sample is held back"
+    )
+
+
+class MethodsTable(Strict):
+    """The paper's way, where an option of the command asks for it; the options win."""
+
+    static: Static = Field(default="improved", description="the static mechanisation")
+    centrifugal: Centrifugal = Field(default="mechanical", description="compensation of r w^2")
+    tangential: Tangential = Field(default="dual", description="compensation of r times angular acceleration")
+
+
+class ModelTable(Strict):
+    """How the model lies in the tunnel beside its pitch; alpha and beta are given where this or the flow is."""
+
+    roll: _Roll | None = Field(default=None, description="right wing down positive; 0 if absent")
+    yaw: _Roll | None = Field(
+        default=None, description="nose left of the tunnel's axis positive; 0 if absent"
+    )
+
+
+class FlowTable(Strict):
+    """Angularity of the flow."""
+
+    upwash: _Stream | None = Field(default=None, description="a stream that rises positive; 0 if absent")
+    sidewash: _Stream | None = Field(
+        default=None, description="a stream from the right positive; 0 if absent"
+    )
+
+
+class ZeroTable(Strict):
+    """A stretch at rest, wind off, at a known angle."""
+
+    start: _Instant = Field(description="of the stretch, in the record's time")
+    end: _Instant = Field(description="of the stretch")
+    angle: Annotated[
+        Quantity,
+        PlainValidator(_certain),
+        PlainSerializer(lambda quantity: quantity.text),
+        WithJsonSchema({"type": "string", "examples": ["0.00(1) deg"]}),
+    ] = Field(description="pitch in that stretch, with its standard uncertainty")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ZeroTable:
+        """Refuse a stretch without length."""
+        if not self.start.value < self.end.value:
+            raise refusal(f"start: found {shown(self.start.text)}, expected it before end, {self.end.text}")
+        return self
+
+
+class AoaStudyFile(Strict):
+    """A study of inertial angle of attack, for `inercal simulate aoa` and `aoa`."""
+
+    version: Version = 1
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the tunnel stands")
+    rig: StingTable = Field(title="Rig", description="what carries the model")
+    sensors: SensorsTable = Field(title="Sensors", description="the sensors, by the names of their columns")
+    noise: SensorNoiseTable = Field(title="Noise", description="noise and biases of the sensors")
+    prior: SensorPriorTable = Field(
+        default=SensorPriorTable(), title="Prior", description="what is not known of the sensors"
+    )
+    motion: MotionTable | None = Field(
+        default=None, title="Motion", description="of a simulation; a recording can do without"
+    )
+    disturbances: AoaDisturbancesTable = Field(
+        default=AoaDisturbancesTable(),
+        title="Disturbances",
+        description="what a simulation adds to the model",
+    )
+    timing: TimingTable = Field(default=TimingTable(), title="Timing", description="delays of the sensors")
+    estimator: EstimatorTable = Field(default=EstimatorTable(), title="Estimator", description="the fusion")
+    methods: MethodsTable = Field(default=MethodsTable(), title="Methods", description="the paper's way")
+    model: ModelTable = Field(default=ModelTable(), title="Model", description="how the model lies")
+    flow: FlowTable = Field(default=FlowTable(), title="Flow", description="angularity of the flow")
+    zero: ZeroTable | None = Field(default=None, title="Zero", description="a stretch at a known angle")
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
+
+
+def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
+
+    ``path`` is where it came from; files that the study names lie beside it, and those of motion and
+    prior are read only where they are needed.
+    """
+    file = check(AoaStudyFile, data, path, StudyError)
+    layout, sensors = layout_of(file.sensors), calibrations_of(file.sensors, path)
+    noise = file.noise
+    return AoaSettings(
+        site=site_of(file.site, path),
+        layout=layout,
+        noise=Noise(
+            noise.accelerometer.value, noise.accelerometer_bias.value, noise.gyro.value, noise.gyro_bias.value
+        ),
+        prior=_prior(file.prior),
+        sensors=sensors,
+        timing=_timing(file.timing),
+        estimator=_estimator(file.estimator, path),
+        methods=Methods(file.methods.static, file.methods.centrifugal, file.methods.tangential),
+        attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
+        zero=None if file.zero is None else _zero(file.zero),
+        motion=None if file.motion is None else motion_of(file.motion, path),
+        disturbances=disturbances_of(file.disturbances, layout, sensors, path),
+        traceability=file.traceability.model_dump(),
+        temperature=file.conditions.temperature,
+        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+    )
+
+
+def _given(table: Strict) -> dict[str, float]:
+    """The quantities that a table gives, by key."""
+    return {
+        key: value.value
+        for key in type(table).model_fields
+        if isinstance(value := getattr(table, key), Quantity)
+    }
+
+
+def _prior(table: SensorPriorTable) -> Prior:
+    """What is not known of the sensors."""
+    usual = Prior()
+    return Prior(
+        **_given(table),
+        heave=_flexure(table.heave, usual.heave),
+        axial=_flexure(table.axial, usual.axial),
+    )
+
+
+def _flexure(table: FlexureTable, usual: Resonance) -> Resonance:
+    """A resonance, as usual where nothing is given."""
+    return Resonance(
+        usual.frequency if table.frequency is None else 2.0 * math.pi * table.frequency.value,
+        usual.damping if table.damping is None else table.damping.value,
+        usual.level if table.level is None else table.level.value,
+    )
+
+
+def _timing(table: TimingTable) -> Timing:
+    """The delays; None for one to be estimated."""
+    gyro = table.gyro_delay
+    delay = None if gyro == "estimate" else gyro.value if isinstance(gyro, Quantity) else 0.0
+    common = table.common_delay
+    return Timing(delay, 0.0 if common is None else common.value, 0.0 if common is None else common.u)
+
+
+def _estimator(table: EstimatorTable, path: str | Path) -> Estimator:
+    """The fusion."""
+    return Estimator(
+        states=table.states,
+        smooth=table.smooth,
+        prior=None if table.prior is None else Path(path).parent / table.prior,
+        snap=table.snap,
+        gate=table.gate,
+    )
+
+
+def _zero(table: ZeroTable) -> Zero:
+    """A stretch at a known angle."""
+    return Zero(table.start.value, table.end.value, table.angle.value, table.angle.u)

@@ -1,0 +1,107 @@
+"""The study of ``inercal calibrate imu``, by any of its methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, StrictBool, model_validator
+
+from inercal._toml import Strict, check
+from inercal.errors import StudyError
+from inercal.imu.aided.settings import AidedSettings
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.settings import ImuSettings
+from inercal.studies.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_of,
+)
+from inercal.studies.fields import Duration, RelativeUncertainty, refusal
+from inercal.studies.imu_aided import AidedTable, aided_settings
+from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings
+
+#: keys that not all methods heed -> those that do
+_METHODS = {
+    "static_start": ("multiposition",),
+    "g_sensitivity": ("multiposition", "aided"),
+    "bias_drift": ("multiposition",),
+    "ferraris": ("ferraris",),
+    "aided": ("aided",),
+}
+
+
+class ImuTable(Strict):
+    """How to calibrate the IMU."""
+
+    method: Literal["multiposition", "ferraris", "aided"] = Field(
+        default="multiposition",
+        description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
+        "turns by a known angle; aided: on a table whose angles are in the record",
+    )
+    static_start: Duration | None = Field(
+        default=None, description="length of the still period at the start; found automatically if absent"
+    )
+    g_sensitivity: StrictBool = Field(
+        default=False, description="also estimate how the gyro's drift depends on specific force"
+    )
+    bias_drift: StrictBool = Field(
+        default=False, description="also estimate how the gyro's bias drifts with time"
+    )
+    time_base: RelativeUncertainty | None = Field(
+        default=None, description="relative standard uncertainty of the record's clock; 0 if absent"
+    )
+    ferraris: FerrarisTable = Field(
+        default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
+    )
+    aided: AidedTable = Field(default=AidedTable(), title="Aided", description="options of the method aided")
+
+    @model_validator(mode="after")
+    def _of_the_method(self) -> ImuTable:
+        """Refuse what the method does not heed."""
+        for key in self.model_fields_set - {"method"}:
+            methods = _METHODS.get(key, ())
+            if methods and self.method not in methods:
+                raise refusal(
+                    f"{key}: found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
+                )
+        return self
+
+
+class ImuStudyFile(Strict):
+    """A study for ``inercal calibrate imu``."""
+
+    version: Version = 1
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
+    imu: ImuTable = Field(default=ImuTable(), title="Imu", description="how to calibrate the IMU")
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
+
+
+def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
+
+    ``path`` is where it came from; files that the study names lie beside it.
+    """
+    file = check(ImuStudyFile, data, path, StudyError)
+    method: FerrarisSettings | AidedSettings | None = None
+    if file.imu.method == "ferraris":
+        method = ferraris_settings(file.imu.ferraris)
+    elif file.imu.method == "aided":
+        method = aided_settings(file.imu.aided, path)
+    return ImuSettings(
+        site=site_of(file.site, path),
+        static_start=None if file.imu.static_start is None else file.imu.static_start.value,
+        g_sensitivity=file.imu.g_sensitivity,
+        bias_drift=file.imu.bias_drift,
+        time_base_u=0.0 if file.imu.time_base is None else file.imu.time_base.value,
+        traceability=file.traceability.model_dump(),
+        method=method,
+        temperature=file.conditions.temperature,
+        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+    )

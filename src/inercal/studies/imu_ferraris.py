@@ -1,0 +1,119 @@
+"""The table ``[imu.ferraris]`` of a study: six positions and three turns by a known angle."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
+
+from inercal._toml import Strict
+from inercal.errors import QuantityError
+from inercal.imu.ferraris.names import NAMES
+from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.studies.fields import QuantityText, refusal
+from inercal.units import Quantity, parse_quantity, shown
+
+_EXPECTED = (
+    'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a '
+    "label"
+)
+
+TurnAngle = Annotated[
+    Quantity,
+    QuantityText(
+        "angle",
+        "360(0.5) deg",
+        lambda a: math.radians(10.0) <= abs(a) <= math.radians(36000.0),
+        "an angle of 10 deg to 36000 deg, negative for turns against the right-hand rule",
+    ),
+]
+Alignment = Annotated[
+    Quantity,
+    QuantityText(
+        "angle", "0.5 deg", lambda a: 0.0 <= a <= math.radians(20.0), "a standard uncertainty up to 20 deg"
+    ),
+]
+
+
+def _ends(value: object) -> object:
+    """A section: two times, two sample numbers, or the label of its rows."""
+    match value:
+        case str() if value.strip():
+            return value
+        case [int(start), int(end)] if not isinstance(start, bool) and not isinstance(end, bool):
+            if 0 <= start < end - 1:
+                return value
+        case [str(start), str(end)]:
+            begin, stop = _seconds(start), _seconds(end)
+            if begin < stop:
+                return value
+    raise refusal(f"found {shown(value)}, {_EXPECTED}, the end after the start")
+
+
+def _seconds(text: str) -> float:
+    """A time [s]."""
+    try:
+        return parse_quantity(text, "time", "time").value
+    except QuantityError as error:
+        raise refusal(error.message) from error
+
+
+_Ends = Field(min_length=2, max_length=2)
+
+Section = Annotated[
+    Annotated[list[str], _Ends] | Annotated[list[int], _Ends] | str,
+    BeforeValidator(_ends),
+    Field(examples=[["5.2 s", "12.4 s"], [540, 1271], "X up"]),
+]
+
+
+class SectionsTable(Strict):
+    """Where the sections are: times of the record's time axis, samples from 0, the end not included, or labels."""
+
+    x_p: Section | None = Field(default=None, description="+x up: accelerometer x reads +g")
+    x_a: Section | None = Field(default=None, description="-x up: accelerometer x reads -g")
+    y_p: Section | None = Field(default=None, description="+y up: accelerometer y reads +g")
+    y_a: Section | None = Field(default=None, description="-y up: accelerometer y reads -g")
+    z_p: Section | None = Field(default=None, description="+z up: accelerometer z reads +g")
+    z_a: Section | None = Field(default=None, description="-z up: accelerometer z reads -g")
+    x_rot: Section | None = Field(default=None, description="the turn about x, from rest to rest")
+    y_rot: Section | None = Field(default=None, description="the turn about y, from rest to rest")
+    z_rot: Section | None = Field(default=None, description="the turn about z, from rest to rest")
+
+
+class FerrarisTable(Strict):
+    """Options of the Ferraris calibration: six positions, each axis up and down, and a turn about each axis."""
+
+    turn: TurnAngle | None = Field(
+        default=None,
+        description="angle of the turns, positive about the positive axis by the right-hand rule, perhaps with its "
+        "standard uncertainty; 360 deg if absent",
+    )
+    alignment: Alignment | None = Field(
+        default=None,
+        description="standard uncertainty of the direction of each position and of the axis of each turn; from the "
+        "scatter of the positions if absent",
+    )
+    sections: SectionsTable = Field(
+        default=SectionsTable(),
+        title="Sections",
+        description="where the sections are; by the labels of the record if absent, or else detected",
+    )
+
+
+def ferraris_settings(table: FerrarisTable) -> FerrarisSettings:
+    """The options in SI."""
+    given = {name: ends for name in NAMES if (ends := getattr(table.sections, name)) is not None}
+    sections = {name: _span(ends) for name, ends in given.items()}
+    turn = {} if table.turn is None else {"turn": table.turn.value, "turn_u": table.turn.u}
+    alignment = None if table.alignment is None else table.alignment.value
+    return FerrarisSettings(**turn, alignment=alignment, sections=sections)
+
+
+def _span(ends: list[str] | list[int] | str) -> tuple[float, float] | str:
+    """A section as the settings have it: seconds, samples or a label."""
+    if isinstance(ends, str):
+        return ends
+    start, end = (_seconds(each) if isinstance(each, str) else each for each in ends)
+    return start, end

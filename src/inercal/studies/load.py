@@ -1,0 +1,190 @@
+"""Study files in: TOML, then ``--set key=value``, then the kind of study the command wants."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inercal._toml import read_toml
+from inercal.errors import StudyError
+from inercal.studies.ways import DISTRIBUTIONS, PATHS, POSITIONS
+from inercal.units import shown
+
+# each kind of study brings models that take a tenth of a second to build: those of the others are not wanted
+if TYPE_CHECKING:
+    from inercal.aoa.settings import AoaSettings
+    from inercal.imu.settings import ImuSettings
+    from inercal.selfcal.settings import SelfcalSettings
+    from inercal.turntable.settings import TurntableSettings
+
+#: rig.kind -> the command whose studies have it; those of a turntable serve several
+_COMMANDS = {
+    "two_axis_turntable": "calibrate turntable",
+    "three_axis_turntable": "calibrate turntable",
+    "three_axis_gimbals": "selfcal",
+    "sting": "aoa",
+}
+
+_EXPECTED = {
+    "calibrate imu": "one for `inercal calibrate imu`",
+    "calibrate turntable": "one of a turntable",
+    "selfcal": "one for `inercal selfcal`",
+    "aoa": "one for `inercal aoa`",
+}
+
+#: tables (a regular expression) that hold one of these keys: setting one takes the place of the others
+_ONE_OF = (
+    (r"positions", POSITIONS),
+    (r"plan", PATHS),
+    (r"rig\.errors\.\w+", DISTRIBUTIONS),
+    (r"sensors\.\w+", ("axis", "angle")),
+    (r"sensors\.\w+", ("calibration", "scale")),
+    (r"sensors\.\w+", ("calibration", "bias")),
+    (r"sensors\.\w+", ("channel", "scale")),
+    (r"sensors\.\w+", ("channel", "bias")),
+)
+
+#: keys (a regular expression) that name a file
+_FILES = r"estimator\.prior|motion\.file|positions\.file|sensors\.\w+\.calibration"
+
+
+def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
+    """Read the study of ``inercal calibrate imu``.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file.
+    overrides : iterable of str
+        Keys to set over those of the file, ``"imu.static_start=50 s"``. A value that is TOML
+        (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text. Where a table holds one of several
+        keys (``positions.grid``, ``plan``, ...), one that is set takes the place of the others. A file that is set
+        is one of the working folder, not of the study's.
+
+    Raises
+    ------
+    StudyError
+        One sentence: file and key, what was found, what was expected.
+    """
+    from inercal.studies.imu import imu_study
+
+    return imu_study(_read(path, overrides, "calibrate imu"), path)
+
+
+def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> TurntableSettings:
+    """Read the study of a turntable: of its sensitivity analysis, design, simulation and calibration.
+
+    Parameters and errors as of `load_imu_study`.
+    """
+    from inercal.studies.turntable import turntable_study
+
+    return turntable_study(_read(path, overrides, "calibrate turntable"), path)
+
+
+def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> SelfcalSettings:
+    """Read the study of a self-calibration: of its simulation, path design and estimation.
+
+    Parameters and errors as of `load_imu_study`.
+    """
+    from inercal.studies.selfcal import selfcal_study
+
+    return selfcal_study(_read(path, overrides, "selfcal"), path)
+
+
+def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettings:
+    """Read the study of ``inercal aoa`` and ``inercal simulate aoa``.
+
+    Parameters and errors as of `load_imu_study`.
+    """
+    from inercal.studies.aoa import aoa_study
+
+    return aoa_study(_read(path, overrides, "aoa"), path)
+
+
+def files_of(path: Path, given: Mapping[str, Any], unread: str = "") -> tuple[Path, ...]:
+    """The study, and the files that it names; ``given`` as in its settings, without those of the table ``unread``."""
+    named = {key: name for key, name in _texts(given) if re.fullmatch(_FILES, key)}
+    return (path, *(path.parent / name for key, name in named.items() if key.split(".")[0] != unread))
+
+
+def _texts(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted keys and values of all texts in a table."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _texts(value, f"{above}{key}.")
+        elif isinstance(value, str):
+            yield above + key, value
+
+
+def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
+    """The file with the overrides put in; refused where it is a study for another command."""
+    data = read_toml(path, StudyError)
+    if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig"}:
+        raise StudyError(path, "found a column map, which goes behind --map, expected a study")
+    rig = data.get("rig")
+    kind = rig.get("kind") if isinstance(rig, dict) else None
+    meant_for = _COMMANDS.get(kind, command) if isinstance(kind, str) else command
+    if meant_for != command:
+        raise StudyError(
+            path,
+            f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, expected {_EXPECTED[command]}",
+        )
+    if rig is None and "imu" in data and command != "calibrate imu":
+        raise StudyError(
+            path,
+            f"found a study for `inercal calibrate imu`, expected {_EXPECTED[command]}, with a table [rig]",
+        )
+    for override in sorted(overrides, key=lambda each: not each.startswith("motion.kind")):  # it makes room
+        _put(data, override, Path(path).parent)
+    return data
+
+
+def _put(data: dict[str, Any], override: str, folder: Path) -> None:
+    """Set one key of the freshly read ``data``, of a study in ``folder``, by its dotted name."""
+    where = f"--set {shown(override)}"
+    name, equals, text = override.partition("=")
+    keys = [key.strip() for key in name.split(".")]
+    if not (equals and all(keys)):
+        raise StudyError(where, "found no key and value, expected key=value such as imu.static_start=50 s")
+    table = data
+    for depth, key in enumerate(keys[:-1], start=1):
+        table = table.setdefault(key, {})
+        if not isinstance(table, dict):
+            raise StudyError(where, f"{'.'.join(keys[:depth])} is no table, expected the key of a value")
+        _make_room(table, ".".join(keys[:depth]), keys[depth])
+    value = _value(text.strip())
+    if keys == ["motion", "kind"]:
+        _make_room_for_motion(table, value)
+    is_file = re.fullmatch(_FILES, ".".join(keys)) and isinstance(value, str)
+    # typed on a command line, and so beside where one is; what a study names lies beside the study
+    table[keys[-1]] = os.path.relpath(value, folder) if is_file and value else value
+
+
+def _make_room(table: dict[str, Any], name: str, key: str) -> None:
+    """Take out of the table of that name what cannot stand beside the key."""
+    for names, keys in _ONE_OF:
+        if key in keys and re.fullmatch(names, name):
+            for other in keys:
+                if other != key:
+                    table.pop(other, None)
+
+
+def _make_room_for_motion(table: dict[str, Any], kind: object) -> None:
+    """Take out of the motion of a study what belongs to other kinds alone."""
+    from inercal.studies.motion import of_other_kinds
+
+    for key in of_other_kinds(kind):
+        table.pop(key, None)
+
+
+def _value(text: str) -> Any:
+    """A TOML value, or else the text itself."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return parsed["value"] if len(parsed) == 1 else text

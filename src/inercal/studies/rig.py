@@ -1,0 +1,270 @@
+"""The table of a study: its kind, its errors by name, the attitude of its base, the limits of its axes."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model, model_validator
+from pydantic_core import core_schema
+
+from inercal._toml import Strict
+from inercal.errors import StudyError
+from inercal.rigs.chain import Chain, Scope
+from inercal.rigs.distribution import Distribution, normal, triangular, two_point, uniform
+from inercal.rigs.tables import TABLES, Slot, slots, turntable
+from inercal.studies.fields import QuantityText, refusal
+from inercal.units import Quantity, shown
+
+Limits: TypeAlias = Mapping[str, tuple[float, float]]
+RigKind = Literal["two_axis_turntable", "three_axis_turntable"]
+ScopeName = Literal["sample", "position", "run", "rig"]
+
+Angle = Annotated[Quantity, QuantityText("angle", "40 deg")]
+"""Any angle."""
+
+_MAKE: Mapping[str, Callable[[float], Distribution]] = {
+    "uniform": uniform,
+    "normal": normal,
+    "triangular": triangular,
+    "two_point": two_point,
+}
+_EXPECTED = "uniform, normal, triangular or two_point"
+_LEAVE_OUT = 'an error is left out with NAME = "none"'
+
+
+HalfWidth = Annotated[
+    Quantity,
+    QuantityText(
+        "angle",
+        "2 arcmin",
+        lambda size: 0.0 < size <= math.pi,
+        f"a half width above 0 and up to 180 deg; {_LEAVE_OUT}",
+    ),
+]
+StandardDeviation = Annotated[
+    Quantity,
+    QuantityText(
+        "angle",
+        "1 arcmin",
+        lambda size: 0.0 < size <= math.pi / 3.0,
+        f"a standard deviation above 0 and up to 60 deg; {_LEAVE_OUT}",
+    ),
+]
+Shift = Annotated[
+    Quantity,
+    QuantityText(
+        "length", "10 um", lambda d: 0.0 < d <= 1.0, f"a length above 0 and up to 1 m; {_LEAVE_OUT}"
+    ),
+]
+_SCOPE = "how long a value lasts: until the next sample, position or mounting, or for good (rig)"
+
+
+class _Distributed(Strict):
+    """What both kinds of error have in common."""
+
+    @model_validator(mode="after")
+    def _one_distribution(self) -> _Distributed:
+        """Refuse two distributions."""
+        given = [name for name in _MAKE if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise refusal(f"found {' and '.join(given)}, expected one distribution")
+        return self
+
+    def distribution(self) -> Distribution | None:
+        """The distribution [rad or m], if one is given."""
+        for name, make in _MAKE.items():
+            size = getattr(self, name)
+            if size is not None:
+                return make(size.value)
+        return None
+
+
+class AngularErrorTable(_Distributed):
+    """An error of an attitude: one distribution, and perhaps its scope."""
+
+    uniform: HalfWidth | None = Field(default=None, description="uniform, by its half width")
+    normal: StandardDeviation | None = Field(default=None, description="normal, by its standard deviation")
+    triangular: HalfWidth | None = Field(default=None, description="triangular, by its half width")
+    two_point: HalfWidth | None = Field(default=None, description="plus or minus that size")
+    scope: ScopeName | None = Field(default=None, description=_SCOPE)
+
+
+class OffsetErrorTable(_Distributed):
+    """An error of a place: one distribution of lengths, and perhaps its scope."""
+
+    uniform: Shift | None = Field(default=None, description="uniform, by its half width")
+    normal: Shift | None = Field(default=None, description="normal, by its standard deviation")
+    triangular: Shift | None = Field(default=None, description="triangular, by its half width")
+    two_point: Shift | None = Field(default=None, description="plus or minus that size")
+    scope: ScopeName | None = Field(default=None, description=_SCOPE)
+
+
+@dataclass(frozen=True)
+class OrNone:
+    """Lets a field that holds a table also take the text "none": ``Annotated[Table | Literal["none"], OrNone()]``.
+
+    A union would do the same, but would name its members in every error.
+    """
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Any], handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """The table's own validation, but for that text."""
+
+        def read(value: object, table: core_schema.ValidatorFunctionWrapHandler) -> object:
+            if value == "none":
+                return value
+            if isinstance(value, str):
+                raise refusal(
+                    f'found {shown(value)}, expected "none" or a table such as {{ uniform = "2 arcmin" }}'
+                )
+            return table(value)
+
+        as_given = core_schema.plain_serializer_function_ser_schema(
+            lambda value: value if value == "none" else value.model_dump(mode="json", exclude_unset=True)
+        )
+        inner = handler(get_args(source)[0])
+        return core_schema.no_info_wrap_validator_function(read, inner, serialization=as_given)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """The table, or the text."""
+        return {"anyOf": [handler(schema), {"const": "none"}]}
+
+
+def _slots() -> list[Slot]:
+    """Every error that some table may have, each name once."""
+    return list({slot.name: slot for kind in TABLES for slot in slots(kind)}.values())
+
+
+def _error_field(slot: Slot) -> Any:
+    """The field of one error of a table."""
+    table = OffsetErrorTable if slot.is_offset else AngularErrorTable
+    note = "; only where it is given" if slot.optional else ""
+    field = Field(
+        default=None, title=slot.name, description=f"{slot.what}; usual scope {slot.scope.value}{note}"
+    )
+    return (Annotated[table | Literal["none"], OrNone()], field)
+
+
+_BY_NAME: Any = create_model(
+    "ByName", __base__=Strict, **{slot.name: _error_field(slot) for slot in _slots()}
+)
+
+
+class ErrorsTable(_BY_NAME):  # type: ignore[misc]
+    """Errors of the table: one default, and by name what differs from it."""
+
+    default: AngularErrorTable | None = Field(
+        default=None, title="Default", description="of every error not named here, the optional ones aside"
+    )
+
+
+class BaseTable(Strict):
+    """Known attitude of the table's base, turned in this order."""
+
+    azimuth: Angle | None = Field(
+        default=None, description="about up, north towards west positive; 0 if absent"
+    )
+    tilt_north: Angle | None = Field(default=None, description="about north; 0 if absent")
+    tilt_west: Angle | None = Field(default=None, description="about west; 0 if absent")
+
+
+class LimitsTable(Strict):
+    """Ranges within which the axes turn; a whole circle if absent."""
+
+    phi1: tuple[Angle, Angle] | None = Field(default=None, description="lowest and highest outer angle")
+    phi2: tuple[Angle, Angle] | None = Field(default=None, description="of the next axis")
+    phi3: tuple[Angle, Angle] | None = Field(default=None, description="of the inner axis of three")
+
+
+class RigTable(Strict):
+    """The turntable."""
+
+    kind: RigKind = Field(description="two axes (outer y, inner z) or three (z, y, x)")
+    errors: ErrorsTable = Field(
+        default=ErrorsTable(), title="Errors", description="errors of the table; none if absent"
+    )
+    base: BaseTable = Field(
+        default=BaseTable(), title="Base", description="known attitude of the base; level and north if absent"
+    )
+    limits: LimitsTable = Field(
+        default=LimitsTable(), title="Limits", description="ranges of the axes; whole circles if absent"
+    )
+
+
+def chain_of(
+    table: RigTable, where: object, mounting: NDArray[np.float64] | None = None, key: str = "rig"
+) -> Chain:
+    """The chain of a table with the errors that are given for it, and an instrument ``mounting`` (3, 3) on it.
+
+    ``key`` is that of the table in the study, for errors.
+
+    Raises
+    ------
+    StudyError
+        An error that this kind of table does not have, or one without any distribution.
+    """
+    known = {slot.name: slot for slot in slots(table.kind)}
+    given: dict[str, Any] = {name: getattr(table.errors, name) for name in table.errors.model_fields_set}
+    usual = given.pop("default", None)
+    default = None if usual is None else usual.distribution()
+    if usual is not None and default is None:
+        raise StudyError(where, f"{key}.errors.default: found no distribution, expected {_EXPECTED}")
+    scopes: dict[str, Scope] = {}
+    if usual is not None and usual.scope is not None:
+        scopes = dict.fromkeys(known, Scope(usual.scope))
+    errors: dict[str, Distribution] = {}
+    for name, error in given.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+            raise StudyError(
+                where, f"{key}.errors.{name}: unknown error of a {table.kind}, did you mean {near}?"
+            )
+        if error == "none":
+            continue
+        distribution = error.distribution() or (None if known[name].is_offset else default)
+        if distribution is None:
+            raise StudyError(where, f"{key}.errors.{name}: found no distribution, expected {_EXPECTED}")
+        errors[name] = distribution
+        if error.scope is not None:
+            scopes[name] = Scope(error.scope)
+    if default is not None:
+        unnamed = (slot.name for slot in known.values() if not slot.optional and slot.name not in given)
+        errors |= dict.fromkeys(unnamed, default)
+    base = (table.base.azimuth, table.base.tilt_north, table.base.tilt_west)
+    return turntable(
+        table.kind, None, errors, scopes, [0.0 if angle is None else angle.value for angle in base], mounting
+    )
+
+
+def limits_of(table: RigTable, chain: Chain, where: object) -> dict[str, tuple[float, float]]:
+    """Allowed range (low, high) [rad] of the joints that have one.
+
+    Raises
+    ------
+    StudyError
+        Limits of a joint the table does not have, or ends out of order.
+    """
+    found = {}
+    for joint in LimitsTable.model_fields:
+        ends = getattr(table.limits, joint)
+        if ends is None:
+            continue
+        if joint not in chain.joints:
+            raise StudyError(where, f"rig.limits.{joint}: a {table.kind} has {', '.join(chain.joints)} only")
+        low, high = ends
+        if not low.value < high.value:
+            raise StudyError(
+                where,
+                f"rig.limits.{joint}: found {low.text!r} to {high.text!r}, expected the lower end first",
+            )
+        found[joint] = (low.value, high.value)
+    return found

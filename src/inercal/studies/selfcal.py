@@ -1,0 +1,353 @@
+"""The study of a self-calibration: one file for its simulation, path design and estimation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, StrictBool, StrictInt, create_model
+
+from inercal._toml import Strict, check
+from inercal.arrays import Array
+from inercal.errors import StudyError
+from inercal.geometry.site import Site
+from inercal.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
+from inercal.selfcal.platform.rig import Base
+from inercal.selfcal.settings import (
+    Disturbances,
+    FactorKind,
+    Filter,
+    FilterKind,
+    Gating,
+    Noise,
+    Search,
+    SelfcalSettings,
+)
+from inercal.studies.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_on_earth,
+)
+from inercal.studies.fields import Duration, QuantityText, Several, SeveralTexts, positive
+from inercal.studies.gimbals import GimbalsTable, base_of, gimbals_of, limits_of
+from inercal.studies.rig import Angle
+from inercal.studies.turns import PlanTable, plan_of
+from inercal.units import Quantity, parse_quantity
+
+#: group -> dimension and example of its values
+_MEASURED = {
+    "kg0": ("rate", "0.08 deg/h"),
+    "eta": ("angle", "60 arcsec"),
+    "ds": ("angle", "60 arcsec"),
+    "do": ("angle", "60 arcsec"),
+    "ka0": ("acceleration", "100 ug"),
+    "ka1": ("number", "500 ppm"),
+    "kg1": ("number", "10 ppm"),
+    "beta": ("angle", "5 arcsec"),
+}
+
+#: group -> its prior standard deviation where the study does not state one
+_USUAL_PRIOR = {
+    "kg0": "0.3 deg/h",
+    "eta": "300 arcsec",
+    "ds": "300 arcsec",
+    "do": "300 arcsec",
+    "ka0": "500 ug",
+    "ka1": "1500 ppm",
+    "kg1": "100 ppm",
+    "beta": "60 arcsec",
+}
+
+
+def _small(group: str) -> QuantityText:
+    """A value of a group: misalignments of some degrees and scale errors of a half are none."""
+    dimension, example = _MEASURED[group]
+    limit, words = {
+        "angle": (math.radians(10.0), "an angle within 10 deg"),
+        "number": (0.5, "a scale error within 0.5"),
+    }.get(dimension, (math.inf, ""))
+    return QuantityText(dimension, example, lambda value: abs(value) <= limit, words)
+
+
+_IN_WORDS = {
+    "kg0": "gyro biases",
+    "eta": "misalignments eta of accelerometers, pz, oy, oz",
+    "ds": "misalignments ds of gyros",
+    "do": "misalignments do of gyros",
+    "ka0": "accelerometer biases",
+    "ka1": "accelerometer scale errors",
+    "kg1": "gyro scale errors, in the extended model",
+    "beta": "the encoders' zero, in the extended model",
+}
+
+
+def _true_values() -> dict[str, Any]:
+    """Fields of three true values for each group."""
+    fields = {}
+    for group, words in _IN_WORDS.items():
+        texts = SeveralTexts(_small(group), ", ".join(GROUPS[group][0]))
+        fields[group] = (
+            Annotated[Several, texts] | None,
+            Field(default=None, description=f"{words}; 0 if absent"),
+        )
+    return fields
+
+
+_TRUE: Any = create_model("TrueValues", __base__=Strict, **_true_values())
+
+
+class TruthTable(_TRUE):  # type: ignore[misc]
+    """True coefficients of a simulation, in the product form, three of each group."""
+
+
+_WALK = QuantityText("angle random walk", "5e-4 deg/sqrt(h)", positive, "an angle random walk above zero")
+_ACCELEROMETER = QuantityText(
+    "acceleration", "10 ug", positive, "a standard deviation of a sample above zero"
+)
+_ENCODER = QuantityText("angle", "2 arcsec", positive, "a standard deviation of a sample above zero")
+
+
+class NoiseTable(Strict):
+    """Noise of the instruments."""
+
+    angle_random_walk: Annotated[Quantity, _WALK] = Field(description="of the gyros")
+    accelerometer: Annotated[Quantity, _ACCELEROMETER] = Field(description="standard deviation of a sample")
+    encoder: Annotated[Quantity, _ENCODER] = Field(description="standard deviation of a sample of an angle")
+
+
+def _of_deviations(what: str, note: str) -> dict[str, Any]:
+    """Fields of one standard deviation for each group, or three; ``note`` on what absent ones mean."""
+    fields = {}
+    for group, words in _IN_WORDS.items():
+        dimension, example = _MEASURED[group]
+        each = QuantityText(dimension, example, positive, f"{what} above zero")
+        texts = SeveralTexts(each, ", ".join(GROUPS[group][0]), one=True)
+        described = f"of {words}; {note.format(_USUAL_PRIOR[group])} if absent"
+        fields[group] = (Annotated[Several, texts] | None, Field(default=None, description=described))
+    return fields
+
+
+_BY_GROUP: Any = create_model("ByGroup", __base__=Strict, **_of_deviations("a standard deviation", "{}"))
+_WANTED: Any = create_model("Wanted", __base__=Strict, **_of_deviations("a standard uncertainty", "no goal"))
+
+
+class PriorTable(_BY_GROUP):  # type: ignore[misc]
+    """Standard deviations of the coefficients about 0 before the test: one for a group, or three.
+
+    To that of the encoders' zero the uncertainties of heading and tilt are added.
+    """
+
+
+class GoalTable(_WANTED):  # type: ignore[misc]
+    """Wanted standard uncertainties: one for a group, or three."""
+
+
+class FilterTable(Strict):
+    """Which estimator, and how."""
+
+    kind: FilterKind = Field(default="error-state", description="the estimator; --filter overrides it")
+    extended: StrictBool = Field(
+        default=False, description="estimate gyro scale errors and the encoders' zero too"
+    )
+    gating: Literal["off", "any", "two", "channel"] = Field(
+        default="off",
+        description="near-level gating: stop where any accelerometer is near level, where two are, or each by itself",
+    )
+    gating_stops: Literal["accelerometers", "step"] = Field(
+        default="accelerometers", description="what gating stops: the accelerometers, or the whole update"
+    )
+    factor: FactorKind | None = Field(
+        default=None,
+        description="of the covariance, for sigma points; cholesky if absent, but eigen for svd-qukf",
+    )
+    integration: Literal["rk4", "euler"] = Field(
+        default="rk4", description="of the gimbal angles, for gimbal-ukf"
+    )
+
+
+class HarmonicTable(Strict):
+    """An error of an encoder that repeats with its angle: amplitude times sin(order times angle + phase)."""
+
+    axis: Literal["x", "y", "z"] = Field(description="the joint")
+    order: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(description="periods in a full turn")
+    amplitude: Annotated[Quantity, QuantityText("angle", "5 arcsec")] = Field(description="of the error")
+    phase: Angle | None = Field(default=None, description="at angle 0; 0 if absent")
+
+
+class DisturbancesTable(Strict):
+    """What a simulation adds to the model; nothing if absent."""
+
+    dropouts: (
+        Annotated[
+            Quantity, QuantityText("number", "1 %", lambda p: 0.0 <= p < 1.0, "a part from 0 to below 1")
+        ]
+        | None
+    ) = Field(default=None, description="part of the rows without accelerometers and angles; 0 if absent")
+    harmonics: list[HarmonicTable] = Field(default=[], description="errors of the encoders; none if absent")
+    command_delay: (
+        Annotated[Quantity, QuantityText("time", "0.2 s", lambda t: t >= 0.0, "a time of 0 or more")] | None
+    ) = Field(default=None, description="by which the platform acts later than commanded; 0 if absent")
+
+
+class SearchTable(Strict):
+    """The search for a path."""
+
+    turns: Annotated[StrictInt, Field(ge=1, le=50)] = Field(default=5, description="how many at most")
+    angle: (
+        Annotated[
+            Quantity,
+            QuantityText(
+                "angle", "30 deg", lambda a: 0.0 < a <= 2.0 * math.pi, "an angle above 0 and up to 360 deg"
+            ),
+        ]
+        | None
+    ) = Field(default=None, description="turns are multiples of it; 30 deg if absent")
+    time: Duration | None = Field(
+        default=None, description="most that the path may take; that of the plan if absent"
+    )
+    criterion: Literal["worst", "mean"] = Field(
+        default="mean",
+        description="the mean of all uncertainties on a log scale, or the largest over goal or prior (worst)",
+    )
+    seed: Annotated[StrictInt, Field(ge=0)] = Field(default=1, description="of the random starts")
+
+
+class SelfcalStudyFile(Strict):
+    """A study of a self-calibration, for `inercal simulate selfcal`, `design selfcal` and `selfcal`."""
+
+    version: Version = 1
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the platform stands")
+    rig: GimbalsTable = Field(title="Rig", description="the gimbals and their base")
+    plan: PlanTable | None = Field(
+        default=None, title="Plan", description="the path; a recording can do without"
+    )
+    truth: TruthTable | None = Field(
+        default=None, title="Truth", description="true coefficients, for simulations"
+    )
+    noise: NoiseTable = Field(title="Noise", description="noise of the instruments")
+    prior: PriorTable = Field(
+        default=PriorTable(), title="Prior", description="what is known before the test"
+    )
+    goal: GoalTable = Field(default=GoalTable(), title="Goal", description="wanted uncertainties")
+    filter: FilterTable = Field(default=FilterTable(), title="Filter", description="the estimator")
+    disturbances: DisturbancesTable = Field(
+        default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
+    )
+    design: SearchTable = Field(default=SearchTable(), title="Design", description="the search for a path")
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
+
+
+def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
+
+    ``path`` is where it came from; files that the study names lie beside it.
+    """
+    file = check(SelfcalStudyFile, data, path, StudyError)
+    base, limits = base_of(file.rig), limits_of(file.rig, path)
+    noise = file.noise
+    return SelfcalSettings(
+        site=_site(file.site, path),
+        noise=Noise(noise.angle_random_walk.value, noise.accelerometer.value, noise.encoder.value),
+        prior=_prior(file.prior, base),
+        gimbals=gimbals_of(file.rig),
+        base=base,
+        heading_unknown=file.rig.heading == "unknown",
+        limits=limits,
+        plan=None if file.plan is None else plan_of(file.plan, limits, path),
+        truth=None if file.truth is None else _truth(file.truth),
+        goal=_wanted(file.goal),
+        filter=_filter(file.filter),
+        disturbances=_disturbances(file.disturbances),
+        search=_search(file.design),
+        traceability=file.traceability.model_dump(),
+        temperature=file.conditions.temperature,
+        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+    )
+
+
+def _site(table: SiteTable, path: str | Path) -> Site:
+    """The site, whose gravity is uncertain by what is typed alone.
+
+    Scale errors of parts in 1e7 are found against gravity; the uncertainty that other studies take for granted where
+    none is typed would hide all that the noise does, so it is left to a finding.
+    """
+    site = site_on_earth(table, path, "rig")
+    if table.gravity is not None or (table.height is not None and table.height.u > 0.0):
+        return site
+    return replace(site, inputs=tuple(each for each in site.inputs if each.source == "latitude"))
+
+
+def _prior(table: PriorTable, base: Base) -> Array:
+    """(24,) standard deviations; that of beta with the uncertainty of the base, about the axes of b."""
+    prior = np.concatenate(
+        [
+            [parse_quantity(_USUAL_PRIOR[group], _MEASURED[group][0], group).value] * 3
+            if (given := getattr(table, group)) is None
+            else given.values
+            for group in GROUPS
+        ]
+    )
+    (north, east), up = base.tilt_u, base.heading_u
+    prior[BETA] = np.sqrt(prior[BETA] ** 2 + base.from_geographic() ** 2 @ np.square([north, east, up]))
+    return prior
+
+
+def _truth(table: TruthTable) -> Array:
+    """(24,) true coefficients."""
+    return np.concatenate(
+        [(0.0,) * 3 if (given := getattr(table, group)) is None else given.values for group in GROUPS]
+    )
+
+
+def _wanted(table: GoalTable) -> dict[str, float]:
+    """Wanted standard uncertainty by name of coefficient."""
+    return {
+        name: value
+        for k, group in enumerate(GROUPS)
+        if (given := getattr(table, group)) is not None
+        for name, value in zip(EXTENDED[3 * k : 3 * k + 3], given.values, strict=True)
+    }
+
+
+def _filter(table: FilterTable) -> Filter:
+    """The estimator."""
+    gating = None if table.gating == "off" else Gating(table.gating, table.gating_stops)
+    return Filter(table.kind, table.extended, gating, table.factor, table.integration)
+
+
+def _disturbances(table: DisturbancesTable) -> Disturbances:
+    """What a simulation adds."""
+    return Disturbances(
+        dropouts=0.0 if table.dropouts is None else table.dropouts.value,
+        harmonics=tuple(
+            (
+                "xyz".index(each.axis),
+                each.order,
+                each.amplitude.value,
+                0.0 if each.phase is None else each.phase.value,
+            )
+            for each in table.harmonics
+        ),
+        command_delay=0.0 if table.command_delay is None else table.command_delay.value,
+    )
+
+
+def _search(table: SearchTable) -> Search:
+    """The search for a path."""
+    usual = Search()
+    return Search(
+        table.turns,
+        usual.angle if table.angle is None else table.angle.value,
+        None if table.time is None else table.time.value,
+        table.criterion,
+        table.seed,
+    )

@@ -1,0 +1,222 @@
+"""The study of a turntable: one file for its sensitivity analysis, design, simulation and calibration."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StrictBool, StrictInt
+
+from inercal._toml import Strict, check
+from inercal.errors import StudyError
+from inercal.rigs.chain import Chain
+from inercal.studies.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_on_earth,
+)
+from inercal.studies.fields import QuantityText, RelativeUncertainty, positive
+from inercal.studies.instrument import InstrumentTable, instrument_of
+from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
+from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
+from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
+from inercal.units import Quantity
+
+OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
+Seed = Annotated[StrictInt, Field(ge=0)]
+AnyRate = Annotated[Quantity, QuantityText("rate", "10 deg/s")]
+RateAbove = Annotated[Quantity, QuantityText("rate", "100 deg/s", positive, "a rate above zero")]
+
+
+class AnalysisTable(Strict):
+    """The sensitivity analysis."""
+
+    outputs: list[OutputName] = Field(
+        default=["ax", "ay", "az", "wx", "wy"],
+        min_length=1,
+        description="components of gravity (a) and earth rate (w) on the instrument's axes",
+    )
+    method: Literal["exact", "sampled", "local"] = Field(
+        default="exact", description="exact, from samples, or from derivatives alone"
+    )
+    sampling: Literal["random", "sobol"] = Field(
+        default="sobol", description="plain random rows, or scrambled Sobol points; for sampled"
+    )
+    samples: Annotated[StrictInt, Field(ge=2, le=2**24)] = Field(
+        default=1024, description="rows at each position; for sampled"
+    )
+    seed: Seed = Field(default=1, description="of the random numbers; for sampled")
+
+
+class ConstraintTable(Strict):
+    """Only positions where the sensitivity of outputs to errors is low."""
+
+    factors: list[str] = Field(min_length=1, description="errors of the table by name")
+    outputs: list[OutputName] = Field(min_length=1, description="outputs whose first-order indices count")
+    below: Annotated[float, Field(gt=0.0, le=1.0)] = Field(description="what each index stays below")
+
+
+class DesignTable(Strict):
+    """The search for positions."""
+
+    positions: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(default=24, description="how many")
+    criterion: Literal["D", "A", "I"] = Field(
+        default="D", description="D: volume, A: mean variance of the coefficients; I: variance of prediction"
+    )
+    table_errors: StrictBool = Field(
+        default=True, description="judge with the errors of the table, or by the noise alone"
+    )
+    candidates: GridTable | None = Field(
+        default=None,
+        title="Candidates",
+        description="positions to choose from; every 10 deg from 0 if absent",
+    )
+    compare: list[PlanName] | None = Field(
+        default=None, description="named plans to set beside; all the table can take if absent"
+    )
+    sensitivity: ConstraintTable | None = Field(
+        default=None, title="Sensitivity", description="only positions of low sensitivity; all if absent"
+    )
+    seed: Seed = Field(default=1, description="of the random starts")
+
+
+class AnglesTable(Strict):
+    """Angles of the axes."""
+
+    phi1: Angle | None = Field(default=None, description="outer angle; 0 if absent")
+    phi2: Angle | None = Field(default=None, description="of the next axis; 0 if absent")
+    phi3: Angle | None = Field(default=None, description="of the inner axis of three; 0 if absent")
+
+
+class RateTestTable(Strict):
+    """A rate test of gyros: the table turns at each rate in turn."""
+
+    joint: str = Field(default="phi2", description="axis that turns")
+    full_scale: RateAbove | None = Field(
+        default=None, description="rate that non-linearity is stated against; the largest if absent"
+    )
+    order: Literal[1, 2, 3] = Field(default=1, description="1 scale factor alone, 2 and 3 with S2 and S3")
+    rates: list[AnyRate] | None = Field(
+        default=None, min_length=1, description="rates of a simulation, in the order taken"
+    )
+    rate_uncertainty: RelativeUncertainty | None = Field(
+        default=None, description="relative standard uncertainty of the table's rate; 0 if absent"
+    )
+    at: AnglesTable = Field(
+        default=AnglesTable(), title="At", description="angles of a simulation, where each stay begins"
+    )
+
+
+class TurntableStudyFile(Strict):
+    """A study of a turntable, for `inercal sensitivity`, `design positions`, `simulate` and `calibrate turntable`."""
+
+    version: Version = 1
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the table stands")
+    rig: RigTable = Field(title="Rig", description="the turntable and its errors")
+    positions: PositionsTable = Field(
+        default=PositionsTable(), title="Positions", description="where to stop; a grid of 10 deg if absent"
+    )
+    analysis: AnalysisTable = Field(
+        default=AnalysisTable(), title="Analysis", description="the sensitivity analysis"
+    )
+    instrument: InstrumentTable = Field(
+        default=InstrumentTable(), title="Instrument", description="the instrument on the table"
+    )
+    design: DesignTable = Field(default=DesignTable(), title="Design", description="the search for positions")
+    rate_test: RateTestTable | None = Field(
+        default=None, title="Rate test", description="a rate test; none if absent"
+    )
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
+
+
+def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSettings:
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
+
+    ``path`` is where it came from; files that the study names lie beside it.
+    """
+    file = check(TurntableStudyFile, data, path, StudyError)
+    site = site_on_earth(file.site, path, "table")
+    chain = chain_of(file.rig, path)
+    limits = limits_of(file.rig, chain, path)
+    return TurntableSettings(
+        site=site,
+        rig=file.rig.kind,
+        chain=chain,
+        plan=plan_of(file.positions, chain, limits, path),
+        design=_design(file.design, chain, limits, path),
+        analysis=_analysis(file.analysis, path),
+        instrument=instrument_of(file.instrument, site.gravity, path),
+        limits=limits,
+        rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
+        traceability=file.traceability.model_dump(),
+        temperature=file.conditions.temperature,
+        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+    )
+
+
+def _analysis(table: AnalysisTable, where: object) -> Analysis:
+    """How to analyse; each output once."""
+    _once(table.outputs, "analysis.outputs", where)
+    return Analysis(tuple(table.outputs), table.method, table.sampling, table.samples, table.seed)
+
+
+def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> Design:
+    """How to search for positions."""
+    constraint = None
+    if table.sensitivity is not None:
+        limit = table.sensitivity
+        _known(limit.factors, chain.factors, "design.sensitivity.factors", where)
+        _once(limit.factors, "design.sensitivity.factors", where)
+        _once(limit.outputs, "design.sensitivity.outputs", where)
+        constraint = Constraint(tuple(limit.factors), tuple(limit.outputs), limit.below)
+    return Design(
+        candidates=grid_of(table.candidates, chain, limits, "design.candidates", where, half=False),
+        positions=table.positions,
+        criterion=table.criterion,
+        table_errors=table.table_errors,
+        compare=compared(table.compare, chain, limits, where),
+        constraint=constraint,
+        seed=table.seed,
+    )
+
+
+def _rate_test(table: RateTestTable, chain: Chain, where: object) -> RateTest:
+    """A rate test."""
+    _known([table.joint], chain.joints, "rate_test.joint", where)
+    at = {joint: angle.value for joint in AnglesTable.model_fields if (angle := getattr(table.at, joint))}
+    _known(list(at), chain.joints, "rate_test.at", where)
+    return RateTest(
+        joint=table.joint,
+        full_scale=None if table.full_scale is None else table.full_scale.value,
+        rates=tuple(rate.value for rate in table.rates or ()),
+        rate_u=0.0 if table.rate_uncertainty is None else table.rate_uncertainty.value,
+        order=table.order,
+        at=at,
+    )
+
+
+def _known(names: Sequence[str], known: Sequence[str], key: str, where: object) -> None:
+    """Refuse a name the table does not have."""
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
+            hint = (
+                f"did you mean {near[0]}?"
+                if near
+                else f"expected {', '.join(known) or 'errors in rig.errors'}"
+            )
+            raise StudyError(where, f"{key}: found {name!r}, {hint}")
+
+
+def _once(names: Sequence[str], key: str, where: object) -> None:
+    """Refuse a name that occurs twice."""
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise StudyError(where, f"{key}: found {name!r} twice, expected each once")
