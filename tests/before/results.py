@@ -34,6 +34,8 @@ PASSING = {
     "path",
     "seconds",
     "checksum",
+    "sources_sha256",
+    "date",
 }
 
 
