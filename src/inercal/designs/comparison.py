@@ -18,7 +18,7 @@ _PART = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PlanFigures:
-    """What a plan of positions is worth.
+    """Worth of a plan of positions.
 
     Attributes
     ----------

@@ -203,7 +203,7 @@ class _State:
 
 
 def _state(W: Array, p: int, weights: Array | None, chosen: Indices) -> _State:
-    """What the exchanges of a design need."""
+    """Quantities that the exchanges of a design use."""
     d = W.shape[-1]
     taken = W[chosen].reshape(-1, d)
     M = taken.T @ taken + np.diag(np.repeat([0.0, 1.0], [p, d - p]))

@@ -84,7 +84,7 @@ def needs_unit(name: str) -> bool:
 
 
 def misfit(name: str, unit: Unit, increment: bool = False) -> str | None:
-    """What is wrong with that unit for that channel, as "found ..., expected ..."; None if it fits."""
+    """The misfit of a unit and a channel, as "found ..., expected ..."; None if the unit fits."""
     dimensions, gained = _dimensions(name)
     allowed = dimensions if not increment else () if gained is None else (gained,)
     if unit.dimension in allowed:

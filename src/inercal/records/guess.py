@@ -39,7 +39,7 @@ class _Guess:
 
 @dataclass(frozen=True)
 class _File:
-    """What was guessed about one file, or about the columns of one clock in it."""
+    """Guess about one file, or about the columns of one clock in it."""
 
     path: Path
     guesses: Mapping[str, _Guess]
@@ -132,7 +132,7 @@ def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
 
 
 def _held(samples: Sequence[Sample]) -> str:
-    """What a file holds, in words."""
+    """The contents of a file in words."""
     return "; ".join(
         counted_names(sample.names, 8) or f"{sample.values.shape[1]} columns" for sample in samples
     )
@@ -191,7 +191,7 @@ def _is_clock(values: Array) -> bool:
 
 
 def _origin(sample: Sample, index: int) -> Origin:
-    """How a map names a column."""
+    """The name of a column in a map."""
     if sample.names:
         return sample.names[index] if sample.names.count(sample.names[index]) == 1 else index
     return (sample.variable, index) if sample.variable else index

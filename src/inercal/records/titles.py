@@ -1,4 +1,4 @@
-"""What the title of a column says: which channel is in it, and in which unit."""
+"""Titles of columns: the channel and the unit that a title names."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from inercal.rigs.distribution import Distribution
 
 
 class Scope(enum.Enum):
-    """How long an error keeps its value: until it is drawn anew."""
+    """Time over which an error keeps its value, until it is drawn anew."""
 
     SAMPLE = "sample"
     POSITION = "position"

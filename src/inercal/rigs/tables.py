@@ -17,7 +17,7 @@ from inercal.rigs.distribution import Distribution
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a table may err: name of the factor, axis, scope where nothing else is said, and what it is.
+    """Elementary error of a table: name of the factor, axis, default scope, and meaning.
 
     ``optional`` ones are there only where a distribution is given for them by name.
     """

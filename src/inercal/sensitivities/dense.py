@@ -265,7 +265,7 @@ def _congruent(W: Array, M: Array) -> Array:
 
 
 def _scatter(F: Array, element: Random) -> Array:
-    """What the parts of an error make of second moments F: sum of var A^T F A."""
+    """Second moments F carried through the parts of an error: sum of var A^T F A."""
     total = np.zeros_like(F)
     for variance, A in zip(element.variances, element.parts, strict=True):
         total += variance * _congruent(F, A)

@@ -38,7 +38,7 @@ FIXED, JOINT, ERROR = 0, 1, 2
 def spread(
     f_bb: float, f_cc: float, f_bc: float, v1: float, v2: float, slope: float
 ) -> tuple[float, float, float]:
-    """What the parts of an error make of second moments F in its plane: sum of var A^T F A (bb, cc, bc).
+    """Second moments F in the plane of an error, carried through its parts: sum of var A^T F A (bb, cc, bc).
 
     A^T of J + slope is -(J - slope): for A F A^T give -slope.
     """

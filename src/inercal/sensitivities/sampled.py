@@ -152,7 +152,7 @@ def _parts(
 
 
 def _method(samples: int, sampling: Sampling) -> dict[str, object]:
-    """How the indices were estimated."""
+    """Settings of the sampled estimation of the indices."""
     return {
         "name": "sampled",
         "sampling": sampling,

@@ -72,7 +72,7 @@ def _freed() -> Array:
 
 
 def _left() -> list[float]:
-    """What mechanical compensation leaves by a gyro that errs by 0.2 deg/s, over what a low pass leaves [%]."""
+    """Error left by mechanical compensation with a gyro that errs by 0.2 deg/s, over that of a low pass [%]."""
     shares = []
     for rate in _RATES:
         t = np.arange(0.0, 4.0, 1e-3)

@@ -48,7 +48,8 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a case found: ``values`` (n,) in so many ``seconds``; without any, why (``error``, one line)."""
+    """Outcome of a case: ``values`` (n,) and the ``seconds`` they took; ``error`` says in one line why there are
+    none."""
 
     values: Array
     seconds: float = 0.0

@@ -174,7 +174,7 @@ _HOT = 74.0 ** np.arange(3, -1, -1)
 
 
 def _sweep() -> Array:
-    """What each power does at 74 degC, as found."""
+    """Contribution of each power at 74 degC."""
     found = {curve.name: curve.cubic for curve in fit_recording(record_of("thermal"), 0.0).curves}
     return np.stack([found[name].coefficients[::-1] * _HOT for name in _SWEEP])
 

@@ -62,7 +62,7 @@ def _random_walk() -> Array:
 
 
 def _level_axis() -> list[float]:
-    """What two turns that leave z horizontal let be known of its scale error, over the prior."""
+    """Uncertainty of the scale error of z after two turns that leave z horizontal, over its prior."""
     asked = replace(_study(), plan=path("paper two turns"))
     told = problem(asked)
     found = bounds(motion(path("paper two turns"), told.world), told)
@@ -72,7 +72,7 @@ def _level_axis() -> list[float]:
 
 @cache
 def _found(kind: FilterKind) -> Filtered:
-    """What an estimator makes of the recording that ships."""
+    """Result of an estimator on the recording that ships."""
     settings = _study()
     return estimate(recording_of(record_of("selfcal"), settings), problem(settings), kind, history=False)
 
@@ -89,7 +89,7 @@ def _probability() -> list[float]:
 
 
 def _surprise() -> list[float]:
-    """How far the mean NIS is off what it should be, in standard errors."""
+    """Distance of the mean NIS from its expected value, in standard errors."""
     found = _found("error-state")
     return [nis(found.nis, found.dims).excess]
 

@@ -55,7 +55,7 @@ def _together() -> Array:
 
 
 def _key_factors() -> list[int]:
-    """How many of the paper's six key factors are among the first six by the mean over the accelerations."""
+    """Number of the paper's six key factors that are among the first six by the mean over the accelerations."""
     mean = averages.mean(_full_circle()).first.mean(axis=0)
     return [len(set(np.argsort(-mean)[:6].tolist()) & set(_columns(_OUTER + _INNER)))]
 

@@ -1,4 +1,4 @@
-"""What all formats of named arrays share: from the arrays of an open file to the columns wanted."""
+"""Named arrays, as all formats of arrays share them: from the arrays of an open file to the columns wanted."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Contents:
 
     @property
     def words(self) -> str:
-        """What the file holds, in words."""
+        """The contents of the file in words."""
         if self.described:
             return self.described
         if self.tabular:
@@ -142,7 +142,7 @@ def guarded(path: Path, name: str) -> Iterator[None]:
 
 
 def reason(error: Exception) -> str:
-    """What an error of a library says, on one line."""
+    """The message of a library error on one line."""
     return " ".join(str(error).split())[:200] or type(error).__name__
 
 

@@ -55,7 +55,7 @@ class _Bag:
 
     @property
     def words(self) -> str:
-        """What the bag holds, in words."""
+        """The contents of the bag in words."""
         return f"the topics {', '.join(f'{name} ({topic.kind})' for name, topic in self.topics.items())}"
 
     def place(self, name: str) -> tuple[str, str] | None:

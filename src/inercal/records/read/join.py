@@ -147,7 +147,7 @@ def _seconds(file: FileTable) -> Array:
 
 
 def conversion(channel: Channel, interval: float = 0.0) -> tuple[tuple[float, ...], Unit]:
-    """What raw values of a channel are multiplied by, one after the other, and the unit they then have.
+    """Factors of the raw values of a channel, applied one after the other, and the unit that results.
 
     The time becomes seconds, increments over an ``interval`` [s] become rates; other units are kept.
     """

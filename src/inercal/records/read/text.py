@@ -161,7 +161,7 @@ def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
 
 
 def contents(layout: Layout) -> str:
-    """What the file holds, in words."""
+    """The contents of the file in words."""
     return (
         f"columns {', '.join(layout.header)}" if layout.header else f"{layout.width} columns without a header"
     )
@@ -228,7 +228,7 @@ def _labels(block: Block, layout: Layout, index: int) -> list[str]:
 def _findings(
     flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, width: int
 ) -> tuple[Finding, ...]:
-    """What to say of rows that could not be read, and of a file that ends too soon."""
+    """Findings on rows that cannot be read, and on a file that ends too soon."""
     none = np.empty(0, np.int64)
     bad = np.concatenate([none, *(flaw.bad for flaw in flaws)])
     findings = []
