@@ -80,34 +80,34 @@ def _dotted(location: tuple[Any, ...]) -> str:
 
 def _sentence(model: type[BaseModel], first: Any) -> str:
     """One sentence for one pydantic error."""
-    key, found = _dotted(first["loc"]), first.get("input")
+    key, value = _dotted(first["loc"]), first.get("input")
     match first["type"]:
         case "extra_forbidden":
-            known = _known_keys(model, first["loc"][:-1])
-            near = difflib.get_close_matches(str(first["loc"][-1])[:80], known, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(known)}"
+            keys = _known_keys(model, first["loc"][:-1])
+            near = difflib.get_close_matches(str(first["loc"][-1])[:80], keys, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(keys)}"
             return f"{key}: unknown key, {hint}"
         case "missing":
             return f"{key}: missing, expected a value"
         case "literal_error":
-            return f"{key}: found {shown(found)}, expected {first['ctx']['expected']}"
+            return f"{key}: found {shown(value)}, expected {first['ctx']['expected']}"
         case "model_type" | "dict_type":
-            return f"{key}: found {shown(found)}, expected a table"
+            return f"{key}: found {shown(value)}, expected a table"
         case "list_type" | "tuple_type":
-            return f"{key}: found {shown(found)}, expected a list in brackets"
+            return f"{key}: found {shown(value)}, expected a list in brackets"
         case "too_short":
-            return f"{key}: found {shown(found)}, expected {first['ctx']['min_length']} or more in it"
+            return f"{key}: found {shown(value)}, expected {first['ctx']['min_length']} or more in it"
         case "string_too_short":
-            return f"{key}: found {shown(found)}, expected a text that is not empty"
+            return f"{key}: found {shown(value)}, expected a text that is not empty"
         case "int_type" | "int_from_float":
-            return f"{key}: found {shown(found)}, expected a whole number"
+            return f"{key}: found {shown(value)}, expected a whole number"
         case "bool_type":
-            return f"{key}: found {shown(found)}, expected true or false"
+            return f"{key}: found {shown(value)}, expected true or false"
         case "string_type":
-            return f"{key}: found {shown(found)}, expected a text in quotes"
+            return f"{key}: found {shown(value)}, expected a text in quotes"
         case _:
             words = first["msg"].removeprefix("Value error, ").removeprefix("Input ").rstrip(".")
-            return f"{key}: found {shown(found)}, {words.replace('should be', 'expected')}"
+            return f"{key}: found {shown(value)}, {words.replace('should be', 'expected')}"
 
 
 def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
@@ -128,4 +128,4 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     """The model inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _model_in(part))), None)
+    return next((model for part in get_args(annotation) if (model := _model_in(part))), None)

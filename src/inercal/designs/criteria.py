@@ -75,8 +75,8 @@ def covariance(plan: Candidates) -> Array:
     ValueError
         The plan leaves a combination of coefficients unidentified; the message names it.
     """
-    known, p = information_svd(plan), len(plan.names)
-    if known.rank < len(known.names):
-        unknown = "; ".join(in_words(v[:p], plan.names) for v in known.null_vectors)
+    information, p = information_svd(plan), len(plan.names)
+    if information.rank < len(information.names):
+        unknown = "; ".join(in_words(v[:p], plan.names) for v in information.null_vectors)
         raise ValueError(f"the {len(plan)} positions do not identify {unknown}")
-    return known.unit_covariance[:p, :p]
+    return information.unit_covariance[:p, :p]

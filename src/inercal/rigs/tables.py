@@ -115,9 +115,9 @@ def turntable(
         An unknown kind, or a factor the table does not have.
     """
     given, scope_of = dict(errors or {}), dict(scopes or {})
-    known = {slot.name for slot in slots(kind)}
+    factors = {slot.name for slot in slots(kind)}
     for name in (*given, *scope_of):
-        if name not in known:
+        if name not in factors:
             raise KeyError(name)
     elements: list[Element] = []
     if any(base):

@@ -51,9 +51,9 @@ def read(
         stream = blocks(file, path)
         head = next(stream)
         layout = find_layout(head.lines, options, path)
-        found = locate(channels, layout, head.lines, path)
-        numbers = {channel.name: index for channel, index in found.items() if channel.name != "label"}
-        label = next((index for channel, index in found.items() if channel.name == "label"), None)
+        located = locate(channels, layout, head.lines, path)
+        numbers = {channel.name: index for channel, index in located.items() if channel.name != "label"}
+        label = next((index for channel, index in located.items() if channel.name == "label"), None)
         if not numbers:
             return [Table((), {}, contents(layout), 0)]
 
@@ -84,7 +84,7 @@ def read(
     count = len(next(iter(values.values())))
     findings = _findings(flaws, tuple(numbers), block, layout.width)
     findings += tuple(too_long(name, "line", lines) for name, lines in rounded.items() if lines)
-    return [Table(tuple(found), values, contents(layout), count, tuple(labels), findings)]
+    return [Table(tuple(located), values, contents(layout), count, tuple(labels), findings)]
 
 
 def header(path: Path) -> tuple[Channel, ...]:
@@ -194,11 +194,11 @@ def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
         if not layout.is_row(line):
             continue
         fields = layout.fields(line)
-        found = [None] if fields is None else [layout.number(fields[index]) for index in indices]
-        if None in found:
+        numbers = [None] if fields is None else [layout.number(fields[index]) for index in indices]
+        if None in numbers:
             bad.append(number)
         if fields is not None:
-            rows[len(lines)] = [math.nan if value is None else value for value in found]
+            rows[len(lines)] = [math.nan if value is None else value for value in numbers]
         lines.append(number)
     rows = rows[: len(lines)]
     place, badly = np.array(lines, np.int64), np.array(bad, np.int64)
