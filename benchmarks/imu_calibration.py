@@ -20,8 +20,8 @@ from measure import Row, Spread, alone, in_turn, named, of_processes, row
 
 from inercal.examples import EXAMPLES, FOLDER
 from inercal.geometry import kernels
-from inercal.imu.multiposition import _turns
-from inercal.imu.multiposition import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.calibration import _turns
+from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
 from inercal.imu.turns import carried, carried_with_derivatives
 from inercal.records.maps import read_map
 from inercal.records.read import read

@@ -30,7 +30,7 @@ from inercal.aoa.fusion import smoother
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.simulate import simulate
 from inercal.geometry.site import Site
-from inercal.imu.multiposition import calibrate_multiposition
+from inercal.imu.multiposition.calibration import calibrate_multiposition
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses
 from inercal.imu.simulate import simulate as simulate_imu

@@ -18,9 +18,9 @@ from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.aided.campaign import LATITUDE, PROGRAM, draw_truth, one_calibration
 from inercal.imu.aided.figures import pictures
-from inercal.imu.aided.settings import AidedSettings, mounting_of, mountings
 from inercal.imu.aided.simulate import simulate
 from inercal.imu.aided.walk import whiten
+from inercal.imu.aided_settings import AidedSettings, mounting_of, mountings
 from inercal.imu.settings import ImuSettings
 from inercal.records.column import Column
 from inercal.records.record import Record

@@ -10,8 +10,8 @@ from inercal.errors import InputError
 from inercal.findings import Status
 from inercal.geometry.rotations import conjugate, exp, rotate
 from inercal.geometry.site import GravityInput, Site
-from inercal.imu.multiposition import calibrate_multiposition as calibrate
-from inercal.imu.poses import sweep
+from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.poses import sweep
 from inercal.imu.recording import prepare
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate

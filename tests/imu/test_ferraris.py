@@ -20,8 +20,8 @@ from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.campaign import one_calibration
 from inercal.imu.ferraris.method import NAMES, Inputs, coefficients, derivatives
-from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.simulate import true_values
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.units import parse_unit

@@ -10,8 +10,8 @@ from scipy.io import loadmat
 from inercal.findings import Status
 from inercal.geometry.rotations import conjugate, exp
 from inercal.geometry.site import GravityInput, Site
-from inercal.imu.figures import pictures
-from inercal.imu.multiposition import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.figures import pictures
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, simulate
 from inercal.inputs import Source

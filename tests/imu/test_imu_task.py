@@ -7,7 +7,7 @@ from recordings import shipped
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import AidedCalibration
 from inercal.imu.ferraris.calibration import FerrarisCalibration
-from inercal.imu.multiposition import Calibration
+from inercal.imu.multiposition.calibration import Calibration
 from inercal.imu.task import calibrate
 
 

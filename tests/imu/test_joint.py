@@ -7,8 +7,8 @@ import pytest
 from recordings import arrays, record_of
 
 from inercal.geometry.site import GravityInput, Site
-from inercal.imu.gyro import _excess
-from inercal.imu.multiposition import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.gyro import _excess
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
 
@@ -66,7 +66,7 @@ def test_the_gain_of_a_pose_is_what_moving_it_does(record, axis):
     spoiled[dwell.start : dwell.stop] += model.gain @ error
     moved = calibrate(record_of(t, spoiled, gyro), SETTINGS)
     assert moved.poses.dwells == poses.dwells
-    from inercal.imu.joint import join
+    from inercal.imu.multiposition.joint import join
 
     joint = join(poses.accelerometer, base.gyro)
     predicted = joint.by_force[:, 3 * k : 3 * k + 3] @ error

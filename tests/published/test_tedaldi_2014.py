@@ -15,8 +15,8 @@ from recordings import shipped
 
 from inercal.convert.other_tools import to_tool
 from inercal.findings import Status
-from inercal.imu.multiposition import calibrate_multiposition as calibrate
-from inercal.imu.poses import choose, sweep
+from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.imu.multiposition.poses import choose, sweep
 from inercal.imu.recording import prepare
 
 IMU_TK = {

@@ -21,10 +21,11 @@ from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import turntable
 from inercal.sensitivities import averages, exact, local, sampled
-from inercal.turntable import planning, regression
+from inercal.turntable import regression
 from inercal.turntable.model import stated_values, table_model
+from inercal.turntable.positions import planning
+from inercal.turntable.positions.tolerance import shifts, sphere_moments
 from inercal.turntable.settings import Constraint, Design, Instrument, TurntableSettings
-from inercal.turntable.tolerance import shifts, sphere_moments
 from inercal.units import parse_unit
 
 ARCMIN = np.radians(1.0 / 60.0)

@@ -15,8 +15,8 @@ from inercal.report.sensitivity import _even_grid, _map, interactions, maps
 from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.plans import grid, listed, named
 from inercal.rigs.tables import turntable
-from inercal.turntable.analysis import analyse
 from inercal.turntable.figures import sensitivity_page
+from inercal.turntable.sensitivity.analysis import analyse
 from inercal.turntable.settings import Analysis, Design, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)

@@ -58,7 +58,13 @@ def test_others_settings_do_not_matter():
 
 
 def test_nothing_heavy_is_imported_before_it_is_needed():
-    names = ("report.html", "report.inspection", "report.style", "imu.figures", "turntable.figures")
+    names = (
+        "report.html",
+        "report.inspection",
+        "report.style",
+        "imu.multiposition.figures",
+        "turntable.figures",
+    )
     modules = ", ".join(f"inercal.{name}" for name in names)
     code = f"import sys, {modules}; print({{'matplotlib', 'jinja2', 'pyplot'}} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

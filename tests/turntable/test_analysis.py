@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from inercal.errors import StudyError
 from inercal.estimate.files import plain_objects
 from inercal.studies.turntable import turntable_study
-from inercal.turntable.analysis import analyse, result, table
-from inercal.turntable.maps import write_maps
+from inercal.turntable.sensitivity.analysis import analyse, result, table
+from inercal.turntable.sensitivity.maps import write_maps
 
 FACTORS = [
     "dphi_y1", "dalpha_x1", "dalpha_z1", "deps_x", "deps_y", "dphi_z2",

@@ -25,7 +25,7 @@ from inercal.geometry.site import GravityInput, Site
 from inercal.records.column import Column
 from inercal.rigs.chain import Scope
 from inercal.rigs.plans import grid, listed, named
-from inercal.turntable.simulate import simulate
+from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 

@@ -12,7 +12,7 @@ from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, listed
 from inercal.rigs.tables import turntable
 from inercal.turntable.model import table_model
-from inercal.turntable.planning import design
+from inercal.turntable.positions.planning import design
 from inercal.turntable.regression import fit
 from inercal.turntable.settings import Design
 from inercal.turntable.task import calibrate, simulate

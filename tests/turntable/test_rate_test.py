@@ -21,8 +21,8 @@ from inercal.rigs.outputs import rate_reference
 from inercal.rigs.plans import named
 from inercal.rigs.tables import turntable
 from inercal.turntable.figures import rate_pictures
-from inercal.turntable.rate import RateDwells, arc, gyro_input, sensed
-from inercal.turntable.rate_fit import approaches, levels
+from inercal.turntable.rate.fit import approaches, levels
+from inercal.turntable.rate.stays import RateDwells, arc, gyro_input, sensed
 from inercal.turntable.settings import Design, Instrument, RateTest, TurntableSettings
 from inercal.turntable.task import calibrate, simulate
 from inercal.units import parse_unit

@@ -11,8 +11,8 @@ from inercal.errors import RecordError
 from inercal.inputs import Source
 from inercal.records.column import Column
 from inercal.records.record import Record
+from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.readings import readings
-from inercal.turntable.simulate import simulate
 from inercal.units import parse_unit
 
 JOINTS = ("phi1", "phi2")

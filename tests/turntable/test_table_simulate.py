@@ -19,7 +19,7 @@ from turntable_studies import (
 )
 
 from inercal.rigs.chain import Scope
-from inercal.turntable.simulate import simulate, truth
+from inercal.turntable.positions.simulate import simulate, truth
 
 
 def column(record, name):

@@ -12,16 +12,16 @@ from inercal.rigs.chain import Scope
 from inercal.rigs.distribution import normal
 from inercal.rigs.plans import grid
 from inercal.turntable.model import table_model
-from inercal.turntable.regression import fit
-from inercal.turntable.simulate import simulate
-from inercal.turntable.task import calibrate
-from inercal.turntable.tolerance import (
+from inercal.turntable.positions.simulate import simulate
+from inercal.turntable.positions.tolerance import (
     alternatives,
     coefficient_shares,
     drift_shares,
     shifts,
     sphere_moments,
 )
+from inercal.turntable.regression import fit
+from inercal.turntable.task import calibrate
 
 NOISE = 0.01 * DEG_H
 

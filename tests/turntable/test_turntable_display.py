@@ -11,7 +11,7 @@ from inercal.findings import Status
 from inercal.instruments.by_angle import CHANNELS, channel_model
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.display import displayed, tolerances
-from inercal.turntable.outcome import unit_of_term
+from inercal.turntable.positions.outcome import unit_of_term
 from inercal.units import parse_unit
 
 

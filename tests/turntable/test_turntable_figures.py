@@ -17,9 +17,9 @@ from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import turntable
 from inercal.turntable.display import displayed, shown_unit
 from inercal.turntable.figures import design_page, pictures
-from inercal.turntable.planning import design
+from inercal.turntable.positions.planning import design
+from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.settings import Design, Instrument, TurntableSettings
-from inercal.turntable.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 

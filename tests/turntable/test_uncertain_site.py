@@ -9,7 +9,7 @@ from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study, table
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.rigs.plans import grid
-from inercal.turntable.planning import design
+from inercal.turntable.positions.planning import design
 from inercal.turntable.settings import Design, RateTest
 from inercal.turntable.task import calibrate, simulate
 

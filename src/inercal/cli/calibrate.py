@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.imu.multiposition import Calibration
+    from inercal.imu.multiposition.calibration import Calibration
     from inercal.records.record import Record
     from inercal.report.html import Picture
 
@@ -103,7 +103,7 @@ def _imu_pictures(found: Calibration | FerrarisCalibration | AidedCalibration) -
 
             return of_aided(found)
         case _:
-            from inercal.imu.figures import pictures
+            from inercal.imu.multiposition.figures import pictures
 
             return pictures(found)
 

@@ -19,7 +19,7 @@ def sensitivity(
     """Say which error of a turntable matters."""
     from inercal.records.read import source_of
     from inercal.studies.load import files_of, load_turntable_study
-    from inercal.turntable.analysis import analyse, result, table
+    from inercal.turntable.sensitivity.analysis import analyse, result, table
 
     output.check((*WHOLE, ".nc", ".npz"), (study,))
     clock = time.perf_counter()
@@ -48,7 +48,7 @@ def sensitivity(
         return sensitivity_page(analysed, settings, estimate)
 
     def maps(path: Path) -> None:
-        from inercal.turntable.maps import write_maps
+        from inercal.turntable.sensitivity.maps import write_maps
 
         write_maps(analysed, path)
 

@@ -1,1 +1,1 @@
-"""Multi-position calibration of an IMU held in the hand: no table, and every number with its uncertainty."""
+"""Calibration of an IMU by hand, by six positions, on a table, and over temperature; each method has a room."""

@@ -7,7 +7,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
-from inercal.imu.multiposition import calibrate_multiposition
+from inercal.imu.multiposition.calibration import calibrate_multiposition
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
 

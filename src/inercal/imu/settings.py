@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from inercal.geometry.site import Site
-from inercal.imu.aided.settings import AidedSettings
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.aided_settings import AidedSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.units import Quantity
 
 COMMAND = "calibrate imu"

@@ -7,15 +7,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from inercal.findings import Finding
-from inercal.imu.aided.settings import AidedSettings
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.aided_settings import AidedSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.imu.multiposition import Calibration
+    from inercal.imu.multiposition.calibration import Calibration
 
     Calibrated = Calibration | FerrarisCalibration | AidedCalibration
 
@@ -37,7 +37,7 @@ def calibrate(
 
     Returns
     -------
-    `inercal.imu.multiposition.Calibration`, or that of the method asked for
+    `inercal.imu.multiposition.calibration.Calibration`, or that of the method asked for
         An estimate and the evidence behind it; nothing is raised for a poor fit.
 
     Raises
@@ -61,7 +61,7 @@ def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], 
 
             return calibrate_aided(record, settings, settings.method, progress)
         case None:
-            from inercal.imu.multiposition import calibrate_multiposition
+            from inercal.imu.multiposition.calibration import calibrate_multiposition
 
             return calibrate_multiposition(record, settings, progress)
 

@@ -10,8 +10,8 @@ from pydantic import Field, StrictBool, model_validator
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
-from inercal.imu.aided.settings import AidedSettings
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.aided_settings import AidedSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
 from inercal.studies.common import (
     Conditions,

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 from inercal._toml import Strict
 from inercal.errors import QuantityError
 from inercal.imu.ferraris.names import NAMES
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.studies.fields import QuantityText, refusal
 from inercal.units import Quantity, parse_quantity, shown
 

@@ -10,8 +10,8 @@ from inercal.geometry.site import Site
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
+from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.settings import Design, Instrument, TurntableSettings
-from inercal.turntable.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 

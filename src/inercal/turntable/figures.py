@@ -18,17 +18,17 @@ from inercal.report.rates import residuals_by_rate
 from inercal.report.style import COLOURS, INK, QUIET, WIDTH, figure, plain_unit, svg
 from inercal.rigs.chain import Error
 from inercal.rigs.outputs import gravity_reference
-from inercal.turntable.analysis import result as analysis_result
 from inercal.turntable.display import shown_unit
 from inercal.turntable.regression import Regression
+from inercal.turntable.sensitivity.analysis import result as analysis_result
 from inercal.turntable.weights import weights
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.turntable.analysis import Analysed
-    from inercal.turntable.planning import Designed
-    from inercal.turntable.rate_calibration import RateCalibration
+    from inercal.turntable.positions.planning import Designed
+    from inercal.turntable.rate.calibration import RateCalibration
     from inercal.turntable.readings import Readings
+    from inercal.turntable.sensitivity.analysis import Analysed
     from inercal.turntable.settings import TurntableSettings
     from inercal.turntable.task import Calibration
 

@@ -12,14 +12,14 @@ from inercal.errors import StudyError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
-from inercal.turntable.fitting import Fitting, fit_readings
-from inercal.turntable.outcome import assemble
-from inercal.turntable.planning import design as design
-from inercal.turntable.rate_calibration import RateCalibration, calibrate_rates
-from inercal.turntable.rate_simulate import simulate_rate_test
+from inercal.turntable.positions.fit import Fitting, fit_readings
+from inercal.turntable.positions.outcome import assemble
+from inercal.turntable.positions.planning import design as design
+from inercal.turntable.positions.simulate import simulate as simulate_positions
+from inercal.turntable.rate.calibration import RateCalibration, calibrate_rates
+from inercal.turntable.rate.simulate import simulate_rate_test
 from inercal.turntable.readings import Readings, readings
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.simulate import simulate as simulate_positions
 
 
 @dataclass(frozen=True, eq=False)

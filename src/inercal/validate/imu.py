@@ -15,8 +15,8 @@ from inercal.convert.other_tools import from_tool, to_tool
 from inercal.estimate.result import Estimate
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import NAMES
-from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.simulate import Session, draw_full_truth, quiet, simulate_session, true_values
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
 from inercal.imu.task import calibrate
 from inercal.imu.temperature.sweep import fit_recording

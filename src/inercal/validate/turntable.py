@@ -18,7 +18,7 @@ from inercal.rigs.tables import turntable
 from inercal.sensitivities import averages, exact
 from inercal.sensitivities.indices import Indices
 from inercal.turntable.campaign import TABLE, one_turntable_calibration, settings_of
-from inercal.turntable.simulate import simulate
+from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 from inercal.validate.case import Case

@@ -18,10 +18,10 @@ from inercal.imu.aided.fit import Fit, fit
 from inercal.imu.aided.misfit import knocks
 from inercal.imu.aided.model import side_of, unknowns
 from inercal.imu.aided.outcome import assemble, without_fit
-from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, tells, travel
 from inercal.imu.aided.table import Motion, motion_of, shifted, times
 from inercal.imu.aided.walk import whiten
+from inercal.imu.aided_settings import AidedSettings
 from inercal.imu.settings import ImuSettings
 from inercal.records.places import counted
 from inercal.records.record import Record

@@ -9,8 +9,8 @@ from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.aided.simulate import Program, Truth, simulate
+from inercal.imu.aided_settings import AidedSettings
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.triad import TriadModel
 from inercal.rigs.distribution import normal

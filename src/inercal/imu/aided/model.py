@@ -20,8 +20,8 @@ from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.aided.blocks import Blocks, Reference
-from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.aided.table import Motion, error_nodes
+from inercal.imu.aided_settings import AidedSettings
 
 Indices = NDArray[np.int64]
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.imu.aided.blocks import Blocks, small_turn
-from inercal.imu.aided.settings import mountings
 from inercal.imu.aided.table import Motion
+from inercal.imu.aided_settings import mountings
 
 MISFIT = 0.35
 """Part of the output's variation that a sound table leaves unexplained at most; misalignments leave some 0.05."""

@@ -15,7 +15,6 @@ from inercal.imu.ferraris.outcome import assemble, without_sections
 from inercal.imu.ferraris.readings import Readings, read_sections
 from inercal.imu.ferraris.scatter import Scatter, judge
 from inercal.imu.ferraris.sections import Sections, find_sections
-from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.transitions import misses
 from inercal.imu.ferraris.uncertainty import propagation
 from inercal.imu.ferraris.verdict import (
@@ -25,6 +24,7 @@ from inercal.imu.ferraris.verdict import (
     unused_labels,
     wrong_axes,
 )
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.settings import ImuSettings
 from inercal.records.column import Triad
 from inercal.records.record import Record

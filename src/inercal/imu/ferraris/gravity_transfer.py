@@ -19,7 +19,7 @@ from inercal.imu.ferraris.method import Inputs, Matrices, matrices
 from inercal.imu.ferraris.motions import part
 from inercal.imu.ferraris.names import POSITIONS
 from inercal.imu.ferraris.segments import followed
-from inercal.imu.gyro import first_guess
+from inercal.imu.multiposition.gyro import first_guess
 from inercal.imu.recording import clipped_rows
 from inercal.imu.turns import Turns, carried_with_derivatives, cut_turns
 from inercal.instruments.triad import TriadModel

@@ -17,9 +17,9 @@ from inercal.imu.ferraris.method import NAMES, coefficients
 from inercal.imu.ferraris.names import NAMES as SECTIONS
 from inercal.imu.ferraris.names import POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_covariance, type_a, type_b
 from inercal.imu.ferraris.verdict import too_few, verdict
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad

@@ -14,7 +14,7 @@ from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Inputs
 from inercal.imu.ferraris.names import POSITIONS, TURNS
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.recording import LOST, clipped_rows, coarse_steps
 from inercal.noise.dwell_means import AllanFit, fit_pooled
 from inercal.records.column import Triad

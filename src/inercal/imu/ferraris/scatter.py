@@ -16,7 +16,7 @@ from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 
 EXCESS = 0.05
 """Probability below which the scatter of the positions is not put down to what is stated."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError, StudyError
 from inercal.imu.ferraris.detection import detect
 from inercal.imu.ferraris.names import NAMES, TURNS
-from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.imu.ferraris.which_turn import Choice, choose
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.records.column import Triad
 from inercal.records.places import counted, counted_names, places
 from inercal.records.record import Record

@@ -15,8 +15,8 @@ from inercal.imu.ferraris.names import NAMES, POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.scatter import Scatter
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.settings import FerrarisSettings
-from inercal.imu.verdict import WORST_MISS, unit_words
+from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.imu.multiposition.verdict import WORST_MISS, unit_words
 from inercal.records.column import Triad
 from inercal.records.places import counted_names
 

@@ -14,7 +14,7 @@ from inercal.imu.ferraris.detection import Detected
 from inercal.imu.ferraris.gravity_transfer import Carried, carry
 from inercal.imu.ferraris.motions import Motion
 from inercal.imu.ferraris.names import POSITIONS, TURNS
-from inercal.imu.ferraris.settings import FerrarisSettings
+from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.records.column import Triad
 
 NEAR = 0.25

@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal._files import write_bytes
 from inercal.arrays import Array
-from inercal.turntable.analysis import Analysed
+from inercal.turntable.sensitivity.analysis import Analysed
 
 #: name -> dimensions and what it is
 _MAPS: dict[str, tuple[tuple[str, ...], str]] = {

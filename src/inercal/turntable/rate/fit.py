@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.turntable.noise import scatter
-from inercal.turntable.rate import Effect, Input
+from inercal.turntable.rate.stays import Effect, Input
 from inercal.turntable.regression import FLOOR, Solution, solve
 from inercal.turntable.weights import Weights
 

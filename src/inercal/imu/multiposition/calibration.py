@@ -12,16 +12,13 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import Finding
-from inercal.imu.drivers import drivers_of
-from inercal.imu.earth_rate import earth_rate_at
-from inercal.imu.gyro import GyroFit, first_guess, fit_gyro
-from inercal.imu.joint import Scatter, force_error, join
-from inercal.imu.outcome import assemble, without_fit
-from inercal.imu.poses import Poses, choose, sweep
-from inercal.imu.recording import LOST, Recording, clipped_rows, prepare
-from inercal.imu.settings import ImuSettings
-from inercal.imu.turns import Turns, cut_turns
-from inercal.imu.verdict import (
+from inercal.imu.multiposition.drivers import drivers_of
+from inercal.imu.multiposition.earth_rate import earth_rate_at
+from inercal.imu.multiposition.gyro import GyroFit, first_guess, fit_gyro
+from inercal.imu.multiposition.joint import Scatter, force_error, join
+from inercal.imu.multiposition.outcome import assemble, without_fit
+from inercal.imu.multiposition.poses import Poses, choose, sweep
+from inercal.imu.multiposition.verdict import (
     EXCESS,
     WORST_MISS,
     axis_findings,
@@ -29,6 +26,9 @@ from inercal.imu.verdict import (
     rms_miss,
     scatter_findings,
 )
+from inercal.imu.recording import LOST, Recording, clipped_rows, prepare
+from inercal.imu.settings import ImuSettings
+from inercal.imu.turns import Turns, cut_turns
 from inercal.instruments.triad import TriadModel
 from inercal.records.places import counted
 from inercal.records.record import Record

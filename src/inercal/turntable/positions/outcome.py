@@ -19,12 +19,12 @@ from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-from inercal.turntable.fitting import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.model import FRAME, orthonormal
+from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
+from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression, worst_rank
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.weights import weights
 
 COMMAND = "calibrate turntable"

@@ -20,12 +20,12 @@ from inercal.errors import StudyError
 from inercal.findings import Finding
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
-from inercal.turntable.fitting import choose_terms, earth_rate_of, rate_terms
 from inercal.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
-from inercal.turntable.outcome import RULED, unit_of_term
+from inercal.turntable.positions.fit import choose_terms, earth_rate_of, rate_terms
+from inercal.turntable.positions.outcome import RULED, unit_of_term
+from inercal.turntable.positions.tolerance import drift_shares, sphere_rows
 from inercal.turntable.regression import fit, full_inputs, known, worst_rank
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.tolerance import drift_shares, sphere_rows
 from inercal.turntable.weights import least_noise, weights
 from inercal.units import Unit
 
@@ -41,7 +41,7 @@ class Judged:
     """A plan and what it is worth.
 
     ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``model`` with the terms that ``figures.u``
-    is of; ``drift_shares`` of the table's errors, as in `inercal.turntable.tolerance.drift_shares`.
+    is of; ``drift_shares`` of the table's errors, as in `inercal.turntable.positions.tolerance.drift_shares`.
     """
 
     plan: Plan

@@ -11,9 +11,9 @@ from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.turntable.model import channels_of, stated_values
-from inercal.turntable.rate import arc, over_turn, sensed
-from inercal.turntable.rate_calibration import check_rate_test
-from inercal.turntable.rate_fit import approaches
+from inercal.turntable.rate.calibration import check_rate_test
+from inercal.turntable.rate.fit import approaches
+from inercal.turntable.rate.stays import arc, over_turn, sensed
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import parse_unit
 

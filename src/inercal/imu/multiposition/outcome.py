@@ -12,11 +12,11 @@ from inercal.estimate.budget import combine, common
 from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.findings import Finding, Status
-from inercal.imu.joint import Joint, Scatter, noise_covariance, type_a, type_b
-from inercal.imu.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
+from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
+from inercal.imu.multiposition.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
+from inercal.imu.multiposition.verdict import rms_miss, spread_words, verdict
 from inercal.imu.recording import Recording
 from inercal.imu.settings import COMMAND, ImuSettings
-from inercal.imu.verdict import rms_miss, spread_words, verdict
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
 from inercal.records.places import counted

@@ -16,9 +16,9 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.model import FRAME
-from inercal.turntable.outcome import COMMAND, WORST_CONDITION, of_site, unit_of_term
-from inercal.turntable.rate import Input, RateDwells
-from inercal.turntable.rate_fit import RateFit, approaches
+from inercal.turntable.positions.outcome import COMMAND, WORST_CONDITION, of_site, unit_of_term
+from inercal.turntable.rate.fit import RateFit, approaches
+from inercal.turntable.rate.stays import Input, RateDwells
 from inercal.turntable.settings import RateTest, TurntableSettings
 
 SEEN = 5.0

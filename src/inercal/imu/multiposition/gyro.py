@@ -19,8 +19,8 @@ from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import NonlinearFit, solve
-from inercal.imu.drivers import Drivers
-from inercal.imu.earth_rate import EarthRate, UnknownRates, unknown_rates, vertical_output
+from inercal.imu.multiposition.drivers import Drivers
+from inercal.imu.multiposition.earth_rate import EarthRate, UnknownRates, unknown_rates, vertical_output
 from inercal.imu.turns import Turns, carried, carried_with_derivatives, thin
 from inercal.instruments.terms import GYRO_TRIAD
 from inercal.instruments.triad import TriadModel

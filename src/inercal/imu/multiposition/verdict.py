@@ -10,11 +10,11 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.findings import Finding, Status
-from inercal.imu.accelerometer import AccelerometerFit
-from inercal.imu.drivers import Drivers
-from inercal.imu.gyro import GyroFit, first_guess, regress_static
-from inercal.imu.joint import Scatter
-from inercal.imu.poses import Poses
+from inercal.imu.multiposition.accelerometer import AccelerometerFit
+from inercal.imu.multiposition.drivers import Drivers
+from inercal.imu.multiposition.gyro import GyroFit, first_guess, regress_static
+from inercal.imu.multiposition.joint import Scatter
+from inercal.imu.multiposition.poses import Poses
 from inercal.imu.recording import Recording
 from inercal.imu.turns import Turns
 from inercal.instruments.triad import TriadModel
@@ -108,7 +108,7 @@ def verdict(
         term = known.leading_term()
         value = float(acc.fit.x[known.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
-        # poses that leave a null space never come so far: see `inercal.imu.poses`
+        # poses that leave a null space never come so far: see `inercal.imu.multiposition.poses`
         return (
             Status.ILL_CONDITIONED,
             f"the {len(poses.dwells)} poses hardly fix {term} ({number}; weak "

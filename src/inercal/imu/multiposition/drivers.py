@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.imu.poses import Poses
+from inercal.imu.multiposition.poses import Poses
 from inercal.imu.recording import Recording
 from inercal.imu.settings import ImuSettings
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.imu.accelerometer import AccelerometerFit
-from inercal.imu.poses import Poses, dwells_at
-from inercal.imu.verdict import WORST_CONDITION, curing_pose, pose_words
+from inercal.imu.multiposition.accelerometer import AccelerometerFit
+from inercal.imu.multiposition.poses import Poses, dwells_at
+from inercal.imu.multiposition.verdict import WORST_CONDITION, curing_pose, pose_words
 from inercal.records.places import counted
 from inercal.report.figures import budget, correlation
 from inercal.report.html import Picture
@@ -29,8 +29,8 @@ from inercal.report.style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from inercal.imu.gyro import GyroFit
-    from inercal.imu.multiposition import Calibration
+    from inercal.imu.multiposition.calibration import Calibration
+    from inercal.imu.multiposition.gyro import GyroFit
 
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}

@@ -16,8 +16,8 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
-from inercal.imu.accelerometer import AccelerometerFit
-from inercal.imu.gyro import GyroFit
+from inercal.imu.multiposition.accelerometer import AccelerometerFit
+from inercal.imu.multiposition.gyro import GyroFit
 from inercal.instruments.terms import ACCELEROMETER_TRIAD
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.imu.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
+from inercal.imu.multiposition.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
 from inercal.imu.recording import Recording
 from inercal.records.dwells import Dwell, static_intervals
 

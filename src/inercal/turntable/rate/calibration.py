@@ -15,10 +15,10 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
-from inercal.turntable.outcome import SURPRISE
-from inercal.turntable.rate import Input, RateDwells, gyro_input, rate_dwells, turning_axis
-from inercal.turntable.rate_fit import RateFit, fit_rates, separable
-from inercal.turntable.rate_outcome import assemble, unobservable
+from inercal.turntable.positions.outcome import SURPRISE
+from inercal.turntable.rate.fit import RateFit, fit_rates, separable
+from inercal.turntable.rate.outcome import assemble, unobservable
+from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwells, turning_axis
 from inercal.turntable.settings import TurntableSettings
 
 ACROSS = 0.1
@@ -46,7 +46,7 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
     Parameters
     ----------
     record : Record
-        As `inercal.turntable.rate.rate_dwells` reads it.
+        As `inercal.turntable.rate.stays.rate_dwells` reads it.
     settings : TurntableSettings
         With a ``rate_test``, and an instrument of kind gyro.
 

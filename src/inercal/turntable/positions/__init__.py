@@ -1,0 +1,1 @@
+"""Calibration from positions of a table: its design, simulation, fit and result."""

@@ -1,0 +1,1 @@
+"""Rate test of gyros: the table turns at constant rates."""
