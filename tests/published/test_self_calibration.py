@@ -15,10 +15,10 @@ from inercal.geometry.rotations import boxminus, boxplus
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.campaign import campaign
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.filters.filter_result import Start, problem
 from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.monte_carlo import campaign
 from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion, path
