@@ -158,7 +158,7 @@ WITHIN = {
         "layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task figures"
     ),
     "selfcal": (
-        "platform display settings filters before diagnosis find_base campaign reading result task figures"
+        "platform display settings filters before diagnosis find_base monte_carlo reading result task figures"
     ),
 }
 

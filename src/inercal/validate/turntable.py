@@ -17,11 +17,11 @@ from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
 from inercal.sensitivities import averages, exact
 from inercal.sensitivities.indices import Indices
-from inercal.turntable.campaign import TABLE, one_turntable_calibration, settings_of
 from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 from inercal.validate.case import Case
+from inercal.validate.gyrowheel import TABLE, one_turntable_calibration, settings_of
 
 _ARCMIN = np.radians(1.0 / 60.0)
 _CHAIN = turntable(TABLE, uniform(2.0 * _ARCMIN))

@@ -1,4 +1,4 @@
-"""One simulated calibration on a table, for campaigns that ask whether the stated uncertainties are true."""
+"""The gyrowheel on a table of the validation: its study, and one simulated calibration against the truth."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def drawn_instrument(rng: np.random.Generator) -> dict[str, float]:
 
 
 def settings_of(coefficients: dict[str, float], noise: float | None, latitude: float) -> TurntableSettings:
-    """A study of the campaign; ``noise`` [deg/h]."""
+    """A study of the test; ``noise`` [deg/h]."""
     unit = parse_unit("deg/h")
     return TurntableSettings(
         site=Site(9.8, (), latitude, LATITUDE_U),
