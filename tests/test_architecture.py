@@ -148,11 +148,12 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "imu": (
-        "recording turns aided_settings ferraris_settings settings simulate multiposition ferraris aided temperature "
-        "campaign task"
+        "limits recording turns aided_settings ferraris_settings settings simulate multiposition ferraris aided "
+        "temperature campaign task"
     ),
     "turntable": (
-        "settings model weights noise regression readings display sensitivity positions rate task campaign figures"
+        "limits settings model weights noise regression readings display sensitivity positions rate task campaign "
+        "figures"
     ),
     "aoa": (
         "layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task figures"
@@ -195,6 +196,21 @@ def test_rooms_within_a_system_stand_on_each_other(system):
         if other in of and order.index(of[other]) > order.index(inside)
     ]
     assert up == []
+
+
+def test_methods_of_an_imu_do_not_know_each_other():
+    methods = {f"inercal.imu.{method}" for method in ("multiposition", "ferraris", "aided", "temperature")}
+
+    def method_of(module):
+        return methods & {".".join(module.split(".")[:3])}
+
+    crossed = [
+        f"{module} imports {other}"
+        for module in MODULES
+        for other in all_imports(module)
+        if len(method_of(module) | method_of(other)) > 1
+    ]
+    assert crossed == []
 
 
 def test_the_package_itself_computes_nothing():

@@ -5,8 +5,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from inercal.geometry.rotations import exp, to_matrix
-from inercal.imu.multiposition.gyro import first_guess, unpack
-from inercal.imu.turns import attitudes, carried, carried_with_derivatives, cut_turns, increments, thin
+from inercal.imu.multiposition.gyro import unpack
+from inercal.imu.turns import (
+    attitudes,
+    carried,
+    carried_with_derivatives,
+    cut_turns,
+    first_guess,
+    increments,
+    thin,
+)
 from inercal.instruments.triad import TriadModel
 
 RNG = np.random.default_rng(11)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inercal.errors import InputError
-from inercal.imu.recording import MOVING
+from inercal.imu.limits import LIMITS
 from inercal.noise.dwell_means import overlapping_variance, running_sums
 from inercal.records.dwells import static_intervals, windowed_variance
 from inercal.stream.lines import Lines
@@ -65,7 +65,7 @@ def test_rest_and_moments_are_those_of_the_recording():
     known = np.arange(len(x)) >= FIRST + len(start) - 1
     np.testing.assert_allclose(found["restlessness"][known], ratio[known], rtol=1e-8)
     assert np.isnan(found["restlessness"][~known]).all()
-    np.testing.assert_array_equal(found["rest"][known], ratio[known] <= MOVING)
+    np.testing.assert_array_equal(found["rest"][known], ratio[known] <= LIMITS.moving_variance)
     for i, name in enumerate(HEADER.split(",")[1:]):
         windows = np.lib.stride_tricks.sliding_window_view(used[:, i], WINDOW)
         rows = slice(FIRST + WINDOW - 1, None)
@@ -80,8 +80,8 @@ def test_static_intervals_are_those_of_the_recording():
     found = watch(text(x))
     still = found["rest"] == 1
     size = np.linalg.norm([1.0, 1.0, 4.0])
-    calm = [windowed_variance(x[:, :3], WINDOW) < MOVING * 1e-4 * size]
-    calm += [windowed_variance(x[:, [4, 3, 5]], WINDOW) < MOVING * 1e-6 * size]
+    calm = [windowed_variance(x[:, :3], WINDOW) < LIMITS.moving_variance * 1e-4 * size]
+    calm += [windowed_variance(x[:, [4, 3, 5]], WINDOW) < LIMITS.moving_variance * 1e-6 * size]
     batch = static_intervals(np.all(calm, axis=0), np.empty(0, np.int64), 20)
     live = static_intervals(still, np.empty(0, np.int64), 20)
     assert len(live) == len(batch) == 3

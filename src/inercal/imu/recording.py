@@ -9,21 +9,14 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
+from inercal.imu.limits import LIMITS
+from inercal.instruments.triad import TriadModel
 from inercal.noise.dwell_means import AllanFit
 from inercal.noise.dwell_means import fit as fit_allan
 from inercal.records.checks.values import saturated
 from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
 from inercal.records.record import Record
-
-MOVING = 30.0
-"""Variance over that at rest from which the instrument certainly moves."""
-
-SHORTEST_START = 5.0
-"""Shortest initial static period [s]."""
-
-LOST = 3.5
-"""Longest step of time in a motion, in sample intervals: two lost samples hardly matter to its integral."""
 
 
 @dataclass(frozen=True)
@@ -170,38 +163,41 @@ def _initial(
     if np.count_nonzero(known) < 2 * window:
         raise RecordError(
             where,
-            f"found {len(t)} samples, expected a recording that starts with at least {SHORTEST_START:g} s at rest",
+            f"found {len(t)} samples, expected a recording that starts with at least {LIMITS.initial_rest:g} s at rest",
         )
     first = int(np.argmax(known))
     # the calmest twentieth of the record tells what rest looks like before anything else is known
     calm = float(np.quantile(variance[known], 0.05))
-    restless = np.flatnonzero(variance[first:] > MOVING * max(calm, 1e-300)) + first
+    restless = np.flatnonzero(variance[first:] > LIMITS.moving_variance * max(calm, 1e-300)) + first
     moves = int(restless[0] - window // 2) if len(restless) else len(t)
     broken = int(next(iter(cuts[cuts > first]), len(t)))
     stop = max(min(moves, broken), 0)
     still = float(t[max(stop - 1, 0)] - t[0])
     event = "the instrument moves" if moves <= broken else "the time axis breaks"
     if static_start is None:
-        if still < SHORTEST_START:
+        if still < LIMITS.initial_rest:
             raise RecordError(
                 where,
-                f"{event} {still:.1f} s after the start, expected at least {SHORTEST_START:g} s at rest",
+                f"{event} {still:.1f} s after the start, expected at least {LIMITS.initial_rest:g} s at rest",
             )
         return Dwell(0, stop)
-    if t[-1] - t[0] < SHORTEST_START:
+    if t[-1] - t[0] < LIMITS.initial_rest:
         raise RecordError(
-            where, f"lasts {t[-1] - t[0]:.1f} s, expected at least {SHORTEST_START:g} s at rest and turns"
+            where,
+            f"lasts {t[-1] - t[0]:.1f} s, expected at least {LIMITS.initial_rest:g} s at rest and turns",
         )
-    if not SHORTEST_START <= static_start <= t[-1] - t[0]:
+    if not LIMITS.initial_rest <= static_start <= t[-1] - t[0]:
         raise StudyError(
             "imu.static_start",
-            f"found {static_start:g} s, expected {SHORTEST_START:g} s to the length of the record, "
+            f"found {static_start:g} s, expected {LIMITS.initial_rest:g} s to the length of the record, "
             f"{t[-1] - t[0]:.1f} s",
         )
     stated = int(np.argmax(t > t[0] + static_start)) or len(t)
     inside = variance[: max(stated - window // 2, 0)]
     inside = inside[np.isfinite(inside)]
-    if stop < stated - window and (not len(inside) or np.max(inside) > MOVING * np.median(inside)):
+    if stop < stated - window and (
+        not len(inside) or np.max(inside) > LIMITS.moving_variance * np.median(inside)
+    ):
         raise StudyError(
             "imu.static_start",
             f"found {static_start:g} s, expected a still period: {event} after {still:.1f} s",
@@ -215,3 +211,17 @@ def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
     for values in gyro.values.T:
         clipped[saturated(values)] = True
     return clipped
+
+
+def unit_words(triad: Triad, model: TriadModel) -> str:
+    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
+    if triad.unit.dimension in ("count", "voltage"):
+        return ""
+    nominal = 1.0 / triad.unit.factor
+    ratio = float(np.median(model.scale) / nominal)
+    if 0.5 < ratio < 2.0:
+        return ""
+    return (
+        f"the scale factors of {triad.sensor} are {ratio:.3g} times those of outputs in {triad.unit.symbol}: check "
+        f"the unit{' and the time stamps' if triad.sensor == 'gyro' else ''} in the map or header"
+    )

@@ -173,3 +173,44 @@ def carried_with_derivatives(
     start = verticals[turns.first]
     RT = np.swapaxes(R[-1], -1, -2)
     return np.einsum("mij,mj->mi", RT, start), RT @ skew(start) @ moved, RT
+
+
+def first_guess(
+    turns: Turns, verticals: Array, bias: Array, axes: Array | None = None
+) -> tuple[float, float]:
+    """Scale [output per rad/s] common to the axes that best carries the verticals, and the miss it leaves.
+
+    Parameters
+    ----------
+    turns : Turns
+    verticals : (n, 3)
+        Unit vectors in the poses.
+    bias : (3,)
+        Mean output at rest.
+    axes : (3, 3), optional
+        Signed permutation from the frame to the gyro's channels; identity if absent.
+
+    Returns
+    -------
+    scale : float
+    miss : float
+        Root-mean-square angle [rad] between carried and measured verticals.
+
+    Notes
+    -----
+    A hand turns an instrument by 0.1 to 7 rad between poses, so the integral of the output bounds the scale;
+    steps of 8 % are well inside the catch of the fit that follows.
+    """
+    coarse = thin(turns, max(1, len(turns.intervals) // 80))
+    raw = coarse.outputs - coarse.intervals[..., None] * bias
+    swept = max(float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0))), 1e-300)
+    channels = np.eye(3) if axes is None else axes
+    no_drift = np.zeros((3, coarse.drivers.shape[2]))
+    best = (1.0, np.inf)
+    for scale in swept / np.geomspace(0.1, 12.0, 62):
+        model = TriadModel(np.full(3, scale), channels, bias)
+        miss = carried(coarse, verticals, model, no_drift) - verticals[coarse.last]
+        size = float(np.sqrt(np.mean(np.sum(miss**2, axis=-1))))
+        if size < best[1]:
+            best = (float(scale), size)
+    return best

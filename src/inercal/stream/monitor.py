@@ -16,7 +16,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import RecordError
-from inercal.imu.recording import MOVING, SHORTEST_START
+from inercal.imu.limits import LIMITS
 from inercal.noise.running import Octaves, Window, cascade, empty_octaves, empty_window, slide
 from inercal.records.clocks import usable_interval
 from inercal.records.column import Column
@@ -98,7 +98,10 @@ class Monitor:
     @property
     def settings(self) -> Mapping[str, object]:
         """The interval of the lines, and the limits."""
-        return {"every": self._every, "limits": np.array([MOVING, SHORTEST_START, _FIRST_STAMPS, _FEWEST])}
+        return {
+            "every": self._every,
+            "limits": np.array([LIMITS.moving_variance, LIMITS.initial_rest, _FIRST_STAMPS, _FEWEST]),
+        }
 
     def initial(self) -> MonitorState:
         """Nothing known."""
@@ -152,7 +155,7 @@ class Monitor:
         sizes = [math.hypot(*(variance[i] for i in group)) for group in self._groups]
         if not state.started:
             state = self._started(state, x, t, sizes)
-        elif _restlessness(state, sizes) <= MOVING:
+        elif _restlessness(state, sizes) <= LIMITS.moving_variance:
             if math.isnan(state.still):
                 state = state._replace(still=t - (len(window.samples) - 1) * state.interval)
             cascade(x, *state.octaves)
@@ -166,7 +169,7 @@ class Monitor:
         if full:
             state.extremes[:] = np.minimum(state.extremes[0], sizes), np.maximum(state.extremes[1], sizes)
             least, largest = state.extremes
-            if np.any((least > 0.0) & (largest > MOVING * least)):
+            if np.any((least > 0.0) & (largest > LIMITS.moving_variance * least)):
                 state.window.clear()
                 return _ended(state)
         start, begun = state.start, t if math.isnan(state.begun) else state.begun
@@ -175,7 +178,7 @@ class Monitor:
         start[1] += step / start[0]
         start[2] += step * (x - start[1])
         cascade(x, *state.octaves)
-        if not full or t - begun < SHORTEST_START:
+        if not full or t - begun < LIMITS.initial_rest:
             return state._replace(begun=begun)
         variance = start[2] / (start[0] - 1.0)
         quiet = np.array([np.linalg.norm(variance[group]) for group in self._groups])

@@ -13,14 +13,8 @@ from inercal.findings import Finding
 from inercal.instruments.by_angle import CHANNELS
 from inercal.records.places import counted, places
 from inercal.records.record import Record
+from inercal.turntable.limits import LIMITS
 from inercal.units import Unit
-
-STILL = np.radians(3.0 / 60.0)
-"""Angle [rad] within which rows are one position: above the noise of an encoder, below any step of a plan."""
-
-SHORT = 0.5
-"""A stay of less than this part of the usual one is left out, where dwells are found by angle: the table on its way, or
-a stop, which is named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +119,7 @@ def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int
     known = np.flatnonzero(np.isfinite(number) & np.isfinite(angles).all(axis=1))
     parts = _stretches(known, np.diff(number[known]) != 0.0)
     for part in parts:
-        if np.abs(_apart(angles[part], angles[part[0]])).max() > STILL:
+        if np.abs(_apart(angles[part], angles[part[0]])).max() > LIMITS.position_angle:
             raise RecordError(
                 where,
                 f"the angles change within position {number[part[0]]:g}, expected one attitude for each number",
@@ -150,22 +144,22 @@ def _by_angle(angles: Array) -> tuple[list[NDArray[np.int64]], list[NDArray[np.i
         return [], []
     lengths = np.sort([len(part) for part in parts])
     usual = lengths[np.searchsorted(np.cumsum(lengths), 0.5 * len(known))]
-    long = [part for part in parts if len(part) >= SHORT * usual]
-    return long, [part for part in parts if len(part) < SHORT * usual and _at_rest(angles[part])]
+    long = [part for part in parts if len(part) >= LIMITS.stay_length * usual]
+    return long, [part for part in parts if len(part) < LIMITS.stay_length * usual and _at_rest(angles[part])]
 
 
 def _at_rest(angles: Array) -> bool:
     """Whether most of three rows or more stand still: those of a turn take all the room that a position has, which puts
     their median a quarter of it from the middle one."""
     away = np.abs(_apart(angles, angles[len(angles) // 2]))
-    return len(angles) > 2 and bool(np.median(away, axis=0).max() < 0.15 * STILL)
+    return len(angles) > 2 and bool(np.median(away, axis=0).max() < 0.15 * LIMITS.position_angle)
 
 
 def _departure(angles: Array, start: int) -> int:
     """First row after ``start`` that is not in its position."""
     stop, size = start, 64
     while stop < len(angles):
-        away = np.abs(_apart(angles[stop : stop + size], angles[start])).max(axis=1) > STILL
+        away = np.abs(_apart(angles[stop : stop + size], angles[start])).max(axis=1) > LIMITS.position_angle
         if away.any():
             return stop + int(np.argmax(away))
         stop, size = stop + size, 4 * size

@@ -12,22 +12,13 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.geometry.rotations import skew
-from inercal.imu.aided.stamps import forward
-from inercal.imu.aided.table import Motion
+from inercal.imu.aided.table import Motion, forward
+from inercal.imu.limits import LIMITS
 from inercal.records.checks.values import saturated
 from inercal.records.column import Triad
 
-LENGTH = 0.25
-"""Length of a block [s]: far shorter than turns and the wander of a bias, longer than the memory of filters."""
-
-MOST = 4000
-"""Blocks at most; a long record has longer ones."""
-
 EDGE = 0.05
 """Half the time [s] over which the rate at the end of a block is taken."""
-
-FEWEST = 20
-"""Blocks without which nothing is fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +71,7 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     if not np.isfinite(interval):
         raise RecordError(triad.source.path, f"{triad.sensor} has no increasing time stamps")
     t = triad.t
-    length = max(LENGTH, (t[-1] - t[0]) / MOST, 2.0 * motion.step)
+    length = max(LIMITS.block, (t[-1] - t[0]) / LIMITS.most_blocks, 2.0 * motion.step)
     s = max(1, round(length / interval))
     n = len(t) // s
     steps = np.clip(np.diff(t), 0.0, 1.5 * interval)
@@ -101,7 +92,7 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     inside = (nodes[:, 0] >= motion.t[0] - motion.step) & (nodes[:, -1] <= motion.t[-1] + motion.step)
     clipped = {axis: int(np.sum(at & inside)) for axis, at in in_blocks.items() if np.any(at & inside)}
     kept &= inside & ~np.any(list(in_blocks.values()), axis=0)
-    if np.count_nonzero(kept) < FEWEST:
+    if np.count_nonzero(kept) < LIMITS.fewest_blocks:
         raise RecordError(
             triad.source.path,
             f"found {np.count_nonzero(kept) * s * interval:.3g} s of {triad.sensor} within the time of the table's "

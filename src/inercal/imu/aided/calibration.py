@@ -22,12 +22,10 @@ from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, 
 from inercal.imu.aided.table import Motion, motion_of, shifted, times
 from inercal.imu.aided.walk import whiten
 from inercal.imu.aided_settings import AidedSettings
+from inercal.imu.limits import LIMITS
 from inercal.imu.settings import ImuSettings
 from inercal.records.places import counted
 from inercal.records.record import Record
-
-LEAST_TRAVEL = np.radians(10.0)
-"""Travel of a table's axes [rad] below which nothing is to be calibrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +95,7 @@ def calibrate_aided(
                 wrong.append(f"{sensor} leaves {100.0 * found.miss:.0f} %")
             scales[sensor] = found.scale / (settings.site.gravity if sensor == "acc" else 1.0)
     bad = None
-    if travel(motion) < LEAST_TRAVEL:
+    if travel(motion) < LIMITS.table_travel:
         said_of_it = (
             f"the table turns by {np.degrees(travel(motion)):.2g} deg only: turn each axis of the instrument up and "
             "down (and check whether the angles are in deg or rad)"

@@ -8,10 +8,8 @@ from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
 from inercal.imu.aided.fit import Fit, Sensor
+from inercal.imu.limits import LIMITS
 from inercal.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
-
-NOTHING = 1e-6
-"""Share of a variance below which a prior that is only there for order is left out of the budget."""
 
 _LETTERS = {"acc": ("K0", "K1", "M"), "gyro": ("D_F", "S", "T")}
 
@@ -126,7 +124,7 @@ def type_b(
         redrawn = name not in known.stated or (len(places) > 1 and name != "earth rate")
         source = TypeB(name, u, known.units[name], gain[:, places] / known.sd[places] / u, redrawn)
         # priors of gains, arms and shifts are only there for order, unless the test says nothing of these
-        if name in known.stated or np.any(np.diag(source.covariance) > NOTHING * variance):
+        if name in known.stated or np.any(np.diag(source.covariance) > LIMITS.prior_share * variance):
             sources.append(source)
     return sources
 

@@ -11,18 +11,9 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.imu.aided.walk import whiten
+from inercal.imu.limits import LIMITS
 
 Flags = NDArray[np.bool_]
-
-EXCESS = 10.0
-"""Twice the gain of the log likelihood beyond which an output shifts more in turns than at rest (chi-square of 1, p =
-2e-3)."""
-
-TOGETHER = 13.0
-"""The same of the three outputs of a triad together (chi-square of 3, p = 5e-3)."""
-
-SLIGHT = 2.0
-"""Gain below which it is not counted."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +116,7 @@ def levels(
     apart = likely(quiet, wide)
     larger = wide[int(np.argmax(apart))]
     gain = 2.0 * float(apart.max() - one.max())
-    if gain < SLIGHT or larger <= quiet:
+    if gain < LIMITS.counted_gain or larger <= quiet:
         return same, same
     at_rest = likely(grid, larger)
     walk, walk_dof = _mean(grid, at_rest)
@@ -136,8 +127,8 @@ def levels(
 
 def chosen(triad: Sequence[tuple[Levels, Levels]]) -> list[Levels]:
     """Levels of the sensors of a triad, with another K in turns only where the data are certain of it."""
-    together = sum(apart.excess for _, apart in triad) > TOGETHER
-    return [apart if together or apart.excess > EXCESS else same for same, apart in triad]
+    together = sum(apart.excess for _, apart in triad) > LIMITS.turning_walk_gain_of_triad
+    return [apart if together or apart.excess > LIMITS.turning_walk_gain else same for same, apart in triad]
 
 
 def _mean(grid: Array, likelihood: Array) -> tuple[float, float]:

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.imu.aided.blocks import FEWEST
 from inercal.imu.aided.faults import Fault
 from inercal.imu.aided.fit import Fit, noise_of
 from inercal.imu.aided.walk import whiten
+from inercal.imu.limits import LIMITS
 
 SIGNIFICANCE = 1e-6
 """Probability of a fall of the sum of squares by chance, below which a fault is named."""
@@ -211,7 +211,7 @@ def knocks(fit: Fit) -> dict[str, NDArray[np.bool_]]:
         least = LEAST_KNOCK * variation(blocks.y)
         far = np.zeros(len(size), dtype=bool)
         for kind in (blocks.resting, ~blocks.resting):
-            if np.count_nonzero(kind) >= FEWEST:
+            if np.count_nonzero(kind) >= LIMITS.fewest_blocks:
                 far |= kind & (size > max(KNOCK * np.median(size[kind]) / 0.6745, least, 0.2 * np.max(size)))
         triad = blocks.triad.sensor
         found[triad] = found.get(triad, False) | far

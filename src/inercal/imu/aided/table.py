@@ -12,29 +12,11 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.findings import Finding
-from inercal.imu.aided.stamps import forward
+from inercal.imu.limits import LIMITS
 from inercal.records.column import Column
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.rigs.chain import Chain, Error, Scope
-
-STILL = np.radians(0.1)
-"""Speed of an axis [rad/s] below which the table rests."""
-
-WINDOW = 0.5
-"""Time [s] over which that speed is taken, so that the noise of encoders does not show as speed."""
-
-SHORTEST = 1.0
-"""Shortest rest [s]."""
-
-FASTEST = np.radians(3000.0)
-"""Speed [rad/s] that no table has: the angle jumps."""
-
-LEAST_GLITCH = np.radians(0.3)
-"""Distance [rad] of an angle from its neighbours below which it is kept."""
-
-GLITCH = 15.0
-"""The same over the median distance of the forty around."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +64,13 @@ class Motion:
 
     def rests(self) -> Array:
         """Begin and end (k, 2) [s] of the rests."""
-        half = 0.5 * WINDOW
+        half = 0.5 * LIMITS.speed_window
         moved = self.at(self.t + half) - self.at(self.t - half)
-        still = np.all(np.abs(moved) < STILL * WINDOW, axis=1)
+        still = np.all(np.abs(moved) < LIMITS.rest_speed * LIMITS.speed_window, axis=1)
         edges = np.diff(still.astype(np.int8), prepend=0, append=0)
         starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
         spans = np.column_stack([self.t[starts], self.t[stops]])
-        return spans[spans[:, 1] - spans[:, 0] >= SHORTEST]
+        return spans[spans[:, 1] - spans[:, 0] >= LIMITS.shortest_rest]
 
 
 def motion_of(record: Record, chain: Chain) -> Motion:
@@ -129,7 +111,7 @@ def motion_of(record: Record, chain: Chain) -> Motion:
     t, angles = (np.delete(x, np.concatenate(wrong), axis=0) for x in (t, angles))
     speed = np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None]
     row, joint = np.unravel_index(int(np.argmax(speed)), speed.shape)
-    if speed[row, joint] > FASTEST:
+    if speed[row, joint] > LIMITS.table_speed:
         jump = np.degrees(angles[row + 1, joint] - angles[row, joint])
         raise RecordError(
             path,
@@ -137,6 +119,32 @@ def motion_of(record: Record, chain: Chain) -> Motion:
             "passes through, as its encoders give them",
         )
     return Motion(chain, t, angles, path, said)
+
+
+def forward(t: Array, name: str, path: str) -> NDArray[np.int64]:
+    """Rows of stamps ``t`` (n,) [s] that are numbers and do not run backward; equal ones stay.
+
+    Of two stamps in the wrong order the first is stray if the second goes with the one before both, else the second.
+
+    Raises
+    ------
+    RecordError
+        The clock falls back; ``name`` says what it belongs to, ``path`` where it was read.
+    """
+    rows = np.flatnonzero(np.isfinite(t))
+    for _ in range(LIMITS.stray_stamps + 1):
+        stamps = t[rows]
+        back = np.flatnonzero(np.diff(stamps) < 0.0)
+        if not back.size:
+            return rows
+        ahead = stamps[back + 1] >= stamps[np.maximum(back - 1, 0)]
+        rows = np.delete(rows, np.where(ahead | (back == 0), back, back + 1))
+    row = int(back[0])
+    raise RecordError(
+        path,
+        f"the clock of {name} falls back from {stamps[row]:.6g} s to {stamps[row + 1]:.6g} s, expected one that goes "
+        "forward",
+    )
 
 
 def _at(t: Array, column: Column) -> Array:
@@ -150,9 +158,11 @@ def _glitches(angle: Array) -> NDArray[np.int64]:
     middle = angle[2:-2]
     off = np.abs(middle - (4.0 * (angle[1:-3] + angle[3:-1]) - angle[:-4] - angle[4:]) / 6.0)
     step = np.abs(angle[3:-1] - angle[1:-3])
-    rows = np.flatnonzero((off > LEAST_GLITCH) & (step < 0.5 * off)) + 2
+    rows = np.flatnonzero((off > LIMITS.glitch_angle) & (step < 0.5 * off)) + 2
     near = [slice(max(row - 22, 0), row + 19) for row in rows]
-    far = [off[row - 2] > GLITCH * np.median(off[at]) for row, at in zip(rows, near, strict=True)]
+    far = [
+        off[row - 2] > LIMITS.glitch_ratio * np.median(off[at]) for row, at in zip(rows, near, strict=True)
+    ]
     peak = [off[row - 2] >= np.max(off[max(row - 4, 0) : row + 1]) for row in rows]
     return np.asarray(rows[np.logical_and(far, peak)], dtype=np.int64)
 

@@ -11,30 +11,8 @@ from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.aided.misfit import Misfit, variation
+from inercal.imu.limits import LIMITS
 from inercal.records.places import counted, counted_names
-
-WORST_CONDITION = 50.0
-"""Condition of what the data tell of a triad's gains, beyond which it is called ill-conditioned; good tests have 1
-to 5."""
-
-HARDLY = 0.1
-"""Standard uncertainty of a scale factor over its value, or of a misalignment [rad], beyond which the data say next to
-nothing of it."""
-
-GROSS_SHIFT = 5.0
-"""Shift of a coefficient, in its standard uncertainties, by a fault, beyond which nothing can be used."""
-
-GROSS_PART = 1e-3
-"""Part of the outputs' variation that such a fault makes at least: below that, the uncertainties allow for it."""
-
-GROSS_WANDER = 0.01
-"""Shift of an output by one turn, over the variation of its triad, beyond which nothing can be used."""
-
-GROSS_NOISE = 0.1
-"""Residuals in turns over the variation of the triad, beyond which nothing can be used."""
-
-DRIFT = 10.8
-"""Twice the gain of the log likelihood beyond which a bias wanders for certain (chi-square of 1, p = 0.001)."""
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 _INPUT = {"acc": "specific force", "gyro": "rate"}
@@ -55,7 +33,7 @@ def verdict(
     triads = tuple(fit.known)
     limit = np.array(list(u.values()))
     for fault in faults:
-        if fault.part > GROSS_PART and np.any(np.abs(fault.shift) > GROSS_SHIFT * limit):
+        if fault.part > LIMITS.fault_part and np.any(np.abs(fault.shift) > LIMITS.fault_shift * limit):
             return Status.INCONSISTENT, fault.message
     for triad in triads:
         wrong = _unit_words(fit, triad)
@@ -64,10 +42,10 @@ def verdict(
     for sensor, name in zip(fit.sensors, _sensor_names(fit), strict=True):
         left, size = _in_turns(sensor), variation(sensor.side.blocks.y)
         noise = sensor.noise.resting / np.sqrt(np.median(sensor.side.blocks.length))
-        shifts = sensor.noise.excess > 0.0 and _shift(sensor) > GROSS_WANDER * size
-        if faults and (shifts or left > max(GROSS_NOISE * size, GROSS_SHIFT * noise)):
+        shifts = sensor.noise.excess > 0.0 and _shift(sensor) > LIMITS.turning_shift * size
+        if faults and (shifts or left > max(LIMITS.turning_residual * size, LIMITS.fault_shift * noise)):
             return Status.INCONSISTENT, faults[0].message
-        if shifts or left > max(GROSS_NOISE * size, GROSS_SHIFT * noise):
+        if shifts or left > max(LIMITS.turning_residual * size, LIMITS.fault_shift * noise):
             part = 100.0 * (_shift(sensor) if shifts else left) / size
             return (
                 Status.INCONSISTENT,
@@ -77,7 +55,7 @@ def verdict(
             )
     for triad in triads:
         known = fit.known[triad]
-        weak = [name for name in known.names if _relative(name, values, u) > HARDLY]
+        weak = [name for name in known.names if _relative(name, values, u) > LIMITS.unknown_coefficient_u]
         if weak:
             return (
                 Status.UNOBSERVABLE,
@@ -85,7 +63,7 @@ def verdict(
             )
     for triad in triads:
         known = fit.known[triad]
-        if known.condition > WORST_CONDITION:
+        if known.condition > LIMITS.condition:
             term = known.leading_term()
             return (
                 Status.ILL_CONDITIONED,
@@ -215,7 +193,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
         moved = [
             f"{axis} {sensor.noise.walk * np.sqrt(np.ptp(sensor.side.blocks.middle)):.2g}"
             for axis, sensor in zip("xyz", sensors, strict=True)
-            if sensor.noise.drift > DRIFT
+            if sensor.noise.drift > LIMITS.wander_gain
         ]
         if moved:
             name = "K0" if triad == "acc" else "D_F"

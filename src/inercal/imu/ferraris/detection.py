@@ -14,17 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.imu.ferraris.motions import UPRIGHT, Level, Motion, motions, part
+from inercal.imu.ferraris.motions import Level, Motion, motions, part
 from inercal.imu.ferraris.names import POSITIONS, UP
+from inercal.imu.limits import LIMITS
 from inercal.imu.recording import on_other_clock
 from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, static_intervals, window_samples, windowed_variance
-
-STILL = 8.0
-"""Variance over that of the calm parts below which the instrument is held still."""
-
-CALM = 0.2
-"""Quantile of the windowed variance that stands for rest: holds are more than a fifth of such a recording."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +58,11 @@ def _holds(acc: Triad, gyro: Triad) -> tuple[Dwell, ...]:
 def _calm(variance: Array) -> NDArray[np.bool_]:
     """Where the variance is near that of the calm parts."""
     known = variance[np.isfinite(variance)]
-    return variance <= STILL * float(np.quantile(known, CALM)) if known.size else np.isfinite(variance)
+    return (
+        variance <= LIMITS.hold_variance * float(np.quantile(known, LIMITS.calm_quantile))
+        if known.size
+        else np.isfinite(variance)
+    )
 
 
 def _positions(acc: Triad, holds: tuple[Dwell, ...], level: Level) -> dict[str, tuple[int, int]]:
@@ -75,7 +74,7 @@ def _positions(acc: Triad, holds: tuple[Dwell, ...], level: Level) -> dict[str, 
     found: dict[str, tuple[int, int]] = {}
     for k in range(0, 6, 2):
         up, down = (
-            _long_enough([h for h, c in zip(holds, cosines[:, n], strict=True) if c > UPRIGHT])
+            _long_enough([h for h, c in zip(holds, cosines[:, n], strict=True) if c > LIMITS.upright_cosine])
             for n in (k, k + 1)
         )
         chosen = [max(each, key=lambda hold: hold.samples) for each in (up, down) if each]

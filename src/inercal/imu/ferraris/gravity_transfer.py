@@ -10,6 +10,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.nonlinear import NonlinearFit, solve
@@ -18,18 +19,11 @@ from inercal.imu.ferraris.detection import Detected
 from inercal.imu.ferraris.method import Inputs, Matrices, matrices
 from inercal.imu.ferraris.motions import part
 from inercal.imu.ferraris.names import POSITIONS
-from inercal.imu.ferraris.segments import followed
-from inercal.imu.multiposition.gyro import first_guess
+from inercal.imu.limits import LIMITS
 from inercal.imu.recording import clipped_rows
-from inercal.imu.turns import Turns, carried_with_derivatives, cut_turns
+from inercal.imu.turns import Turns, carried_with_derivatives, cut_turns, first_guess
 from inercal.instruments.triad import TriadModel
 from inercal.records.column import Triad
-
-TURNED = 0.3
-"""Least change of the vertical [rad] on a way that tells something."""
-
-FEWEST = 3
-"""Ways without which nothing is said."""
 
 MISALIGNMENT = 0.03
 """Prior standard deviation of each misalignment of either triad [rad]."""
@@ -61,9 +55,12 @@ def carry(acc: Triad, gyro: Triad, found: Detected) -> Carried:
     spans, clipped = [], clipped_rows(gyro)
     for k, (here, there) in enumerate(itertools.pairwise(found.holds)):
         start, stop = (int(np.searchsorted(gyro.t, acc.t[row])) for row in (here.stop - 1, there.start))
-        if followed(gyro, clipped, start, stop):
+        if is_recorded(gyro, clipped, start, stop):
             spans.append((k, start, stop))
-    if sum(float(angle_between(f[k], f[k + 1])) > TURNED for k, _, _ in spans) < FEWEST:
+    if (
+        sum(float(angle_between(f[k], f[k + 1])) > LIMITS.transfer_tilt for k, _, _ in spans)
+        < LIMITS.fewest_transfers
+    ):
         return nothing
     force = model.correct(acc.values)
     if gyro.t is not acc.t:
@@ -153,3 +150,15 @@ class _Problem:
         first, last = self.ways.first, self.ways.last
         of_gyro = np.concatenate([by[:, :, 3:6], self.sign * by[:, :, 6:12]], axis=2)
         return end - up[last], np.concatenate([of_gyro, through @ by_up[first] - by_up[last]], axis=2)
+
+
+def is_recorded(gyro: Triad, clipped: NDArray[np.bool_], start: int, stop: int) -> bool:
+    """True if the gyro recorded a whole transfer, from sample ``start`` to ``stop``.
+
+    ``clipped`` (n,) are the rows in which the gyro saturates.
+    """
+    part = slice(start, stop + 1)
+    steps = np.diff(gyro.t[part])
+    whole = start < stop and bool(np.all((steps > 0.0) & (steps <= LIMITS.motion_gap / gyro.rate)))
+    sound = bool(np.isfinite(gyro.values[part]).all()) and not clipped[part].any()
+    return whole and sound and LIMITS.shortest_transfer < float(steps.sum()) < LIMITS.longest_transfer

@@ -13,29 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
+from inercal.imu.limits import LIMITS
 from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, static_intervals
-
-UPRIGHT = 0.9
-"""Cosine of the largest angle (26 deg) from upright."""
-
-DOMINANT = 0.9
-"""Least part of the integrated rotation that is about the axis of a turn."""
-
-SLOW = 0.03
-"""Rate in a pause, as a part of the largest of the motion around it."""
-
-STILLER = 0.005
-"""That in the rests between which a pause may hold a small motion."""
-
-PAUSE = 0.2
-"""Shortest pause [s] within a motion."""
-
-SMOOTH = 0.1
-"""Length of the mean [s] by which a rate is judged slow."""
-
-LONGEST_RUN = 40
-"""Motions in a row of which runs are candidates; more are no turn but shaking."""
 
 _NO_CUTS: NDArray[np.int64] = np.array([], dtype=np.int64)
 
@@ -80,7 +60,7 @@ class Motion:
         """The axis that it is about, if any."""
         axis = int(np.argmax(np.abs(self.rotation)))
         size = float(np.linalg.norm(self.rotation))
-        return axis if abs(self.rotation[axis]) > DOMINANT * size > 0.0 else None
+        return axis if abs(self.rotation[axis]) > LIMITS.axis_share * size > 0.0 else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +104,7 @@ def motions(
     resting = np.zeros(len(acc.t), dtype=bool)
     for hold in holds:
         resting[hold.start : hold.stop] = True
-    smooth = max(3, round(SMOOTH * gyro.rate))
+    smooth = max(3, round(LIMITS.rate_window * gyro.rate))
     still = [part(gyro, acc, hold.start, hold.stop)[1] - bias for hold in holds]
     noise = 4.0 * float(np.median([np.sqrt(np.mean(_smoothed(rate, smooth) ** 2)) for rate in still]))
     run: list[Motion] = []
@@ -145,7 +125,7 @@ def motions(
                 run = []
                 continue
             run = [*(earlier.with_next(own) for earlier in run), own]
-            run = run[-LONGEST_RUN:]
+            run = run[-LIMITS.motions_in_a_row :]
             yield from (each for each in run if each.axis is not None)
 
 
@@ -154,7 +134,11 @@ def _motion(
 ) -> Motion | None:
     """A motion, or none where it is not known or takes the vertical elsewhere."""
     t, output = part(gyro, acc, span.start, span.stop)
-    if len(t) < 3 or not np.isfinite(output).all() or (len(ups) == 2 and ups[0] @ ups[1] < UPRIGHT):
+    if (
+        len(t) < 3
+        or not np.isfinite(output).all()
+        or (len(ups) == 2 and ups[0] @ ups[1] < LIMITS.upright_cosine)
+    ):
         return None
     integral = np.asarray(np.trapezoid(output, t, axis=0), dtype=np.float64)
     length = float(t[-1] - t[0])
@@ -183,8 +167,8 @@ def _edges(
         return [stretch.start, stretch.stop], []
     rate = _smoothed(output - bias, smooth)
     largest = float(np.max(rate, initial=0.0, where=np.isfinite(rate)))
-    shortest = max(3, round(PAUSE * gyro.rate))
-    slow, still = (rate < max(share * largest, noise) for share in (SLOW, STILLER))
+    shortest = max(3, round(LIMITS.shortest_pause * gyro.rate))
+    slow, still = (rate < max(share * largest, noise) for share in (LIMITS.pause_rate, LIMITS.rest_rate))
     rests = static_intervals(still, _NO_CUTS, shortest)
     pauses = []
     for pause in static_intervals(slow, _NO_CUTS, shortest):

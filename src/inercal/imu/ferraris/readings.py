@@ -15,18 +15,10 @@ from inercal.imu.ferraris.method import Inputs
 from inercal.imu.ferraris.names import POSITIONS, TURNS
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.recording import LOST, clipped_rows, coarse_steps
+from inercal.imu.limits import LIMITS
+from inercal.imu.recording import clipped_rows, coarse_steps
 from inercal.noise.dwell_means import AllanFit, fit_pooled
 from inercal.records.column import Triad
-
-RESTLESS = 30.0
-"""Variance in a position over the median of all from which the instrument certainly moves."""
-
-CUT = 0.03
-"""Rate at an end of a turn, as a part of its largest, from which it was not at rest there."""
-
-MIDST = 0.3
-"""Part of the largest rate at an end from which the angle is not known at all."""
 
 _EDGE = 5
 
@@ -62,7 +54,7 @@ def read_sections(
     rate = np.array([part.mean(axis=0) for part in at_rest["gyro"]])
     weights = counts / counts.sum()
     bias = weights @ rate
-    clipped, longest = clipped_rows(gyro), LOST / gyro.rate
+    clipped, longest = clipped_rows(gyro), LIMITS.motion_gap / gyro.rate
     turned, durations, swing, findings = [], [], [], list(_moving(at_rest))
     for axis, name in enumerate(TURNS):
         t, output = gyro.t[sections.gyro[name]], gyro.values[sections.gyro[name]]
@@ -121,7 +113,7 @@ def _moving(at_rest: dict[str, list[Array]]) -> Iterator[Finding]:
         sizes = np.array([np.linalg.norm(np.var(part, axis=0)) for part in parts])
         usual = float(np.median(sizes))
         for name, size in zip(POSITIONS, sizes, strict=True):
-            if size > RESTLESS * usual > 0.0:
+            if size > LIMITS.position_variance * usual > 0.0:
                 yield Finding(
                     "poor_section",
                     f"the instrument moves in section {name}: {sensor} varies {math.sqrt(size / usual):.0f} times as "
@@ -143,9 +135,9 @@ def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) ->
         )
     largest = float(np.max(np.abs(rate)))
     edges = [float(np.max(np.abs(part.mean(axis=0)))) for part in (rate[:_EDGE], rate[-_EDGE:])]
-    if max(edges) > CUT * largest:
+    if max(edges) > LIMITS.cut_rate * largest:
         end = "beginning" if edges[0] == max(edges) else "end"
-        code = "poor_section" if max(edges) > MIDST * largest else "turn_cut"
+        code = "poor_section" if max(edges) > LIMITS.lost_rate * largest else "turn_cut"
         part = f"{100 * max(edges) / largest:.0f} % of its largest rate"
         said = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
         yield Finding(code, said, where)

@@ -17,9 +17,7 @@ from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris_settings import FerrarisSettings
-
-EXCESS = 0.05
-"""Probability below which the scatter of the positions is not put down to what is stated."""
+from inercal.imu.limits import LIMITS
 
 DOF = 6
 """Equations left over in the positions of either sensor."""
@@ -128,4 +126,4 @@ def _beyond_chance(ratio: float, dof: float) -> bool:
     from scipy.special import chdtrc, fdtrc
 
     p = chdtrc(DOF, DOF * ratio) if np.isinf(dof) else fdtrc(DOF, dof, ratio)
-    return bool(p < EXCESS)
+    return bool(p < LIMITS.scatter_probability)

@@ -12,16 +12,14 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.geometry.rotations import angle_between
+from inercal.imu.ferraris.gravity_transfer import is_recorded
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import POSITIONS
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.segments import followed
+from inercal.imu.limits import LIMITS
 from inercal.imu.recording import clipped_rows
 from inercal.imu.turns import carried, cut_turns
 from inercal.records.column import Triad
-
-FEWEST = 2
-"""Ways between positions without which nothing is said."""
 
 
 def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tuple[float, float] | None:
@@ -37,9 +35,9 @@ def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tupl
     spans, clipped = [], clipped_rows(gyro)
     for k, (here, there) in enumerate(itertools.pairwise(order)):
         start, stop = int(sections.gyro[here][-1]), int(sections.gyro[there][0])
-        if followed(gyro, clipped, start, stop):
+        if is_recorded(gyro, clipped, start, stop):
             spans.append((k, start, stop))
-    if len(spans) < FEWEST:
+    if len(spans) < LIMITS.fewest_transitions:
         return None
     turns = cut_turns(gyro.t, gyro.values, np.zeros_like(gyro.values), spans)
     model, none = found.gyro, np.zeros((3, 3))

@@ -16,15 +16,10 @@ from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.scatter import Scatter
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.multiposition.verdict import WORST_MISS, unit_words
+from inercal.imu.limits import LIMITS
+from inercal.imu.recording import unit_words
 from inercal.records.column import Triad
 from inercal.records.places import counted_names
-
-FAINT = 0.3
-"""Least part of the largest response of an output that a position or turn has to show."""
-
-LARGEST_TILT = math.radians(10.0)
-"""Scatter of the positions [rad] beyond which the sections can hardly be what they are said to be."""
 
 
 def too_few(sections: Sections) -> str:
@@ -73,8 +68,8 @@ def contradictions(
             f"gyro_{axis} runs against the other two in the turns: check its sign in the map, or whether {axis}_rot "
             "was turned the other way",
         )
-    elif misses is not None and misses[0] > WORST_MISS:
-        if misses[1] < min(WORST_MISS, 0.5 * misses[0]):
+    elif misses is not None and misses[0] > LIMITS.vertical_miss:
+        if misses[1] < min(LIMITS.vertical_miss, 0.5 * misses[0]):
             yield Finding(
                 "sign_suspect",
                 f"the motion between the positions shows that the turns were made against the stated sense: state "
@@ -100,7 +95,7 @@ def wrong_axes(x: Inputs, weights: Array) -> Iterator[Finding]:
             what = f"the positions {axis}_p and {axis}_a" if sensor == "acc" else f"the turn {axis}_rot"
             shows = "show" if sensor == "acc" else "shows"
             seen = int(np.argmax(np.abs(by_axis[:, j])))
-            if abs(by_axis[seen, j]) < FAINT:
+            if abs(by_axis[seen, j]) < LIMITS.faint_response:
                 yield Finding(
                     "contradiction", f"{what} {shows} hardly on any axis of {sensor}: check the sections"
                 )
@@ -156,7 +151,7 @@ def verdict(
     poor = [*(finding for finding in readings.findings if finding.code != "turn_cut"), *against]
     if poor:
         return Status.INCONSISTENT, poor[0].message
-    if scatter.tilt > LARGEST_TILT and not math.isinf(scatter.tilt_dof):
+    if scatter.tilt > LIMITS.position_tilt and not math.isinf(scatter.tilt_dof):
         worst = int(np.argmax(np.max(np.abs(scatter.left["acc"]), axis=1)))
         pair = f"{POSITIONS[2 * worst]} and {POSITIONS[2 * worst + 1]}"
         return Status.INCONSISTENT, (

@@ -15,32 +15,8 @@ from inercal.imu.ferraris.gravity_transfer import Carried, carry
 from inercal.imu.ferraris.motions import Motion
 from inercal.imu.ferraris.names import POSITIONS, TURNS
 from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.imu.limits import LIMITS
 from inercal.records.column import Triad
-
-NEAR = 0.25
-"""Largest deviation of a turn of physical outputs from the stated angle, as a part of it."""
-
-SMALLEST = 0.7
-"""Least size of the largest motion about an axis, over that of the others, that can be its turn of counts."""
-
-UNSEEN = 1e-3
-"""Standard uncertainty of a scale factor by a turn, as a part of it, that stands for all but its angle."""
-
-UNLIKELY = 5.0
-"""Deviation over its standard uncertainty beyond which a motion was not the turn."""
-
-CLOSER = 16.0
-"""Difference of the squares of such deviations from which the larger is not chosen."""
-
-BLUNT = 0.05
-"""Standard uncertainty of a carried scale factor, as a part of it, from which it tells nothing."""
-
-SLIGHT = 1e-3
-"""Difference of two motions, as a part of the turn, that needs no words."""
-
-GRAVE = 1e-2
-"""Difference of two motions, as a part of the turn, from which a result should not be used."""
-
 
 ASK = "label it, or state it under imu.ferraris.sections"
 
@@ -70,38 +46,42 @@ def choose(acc: Triad, gyro: Triad, found: Detected, options: FerrarisSettings) 
     for axis, motions in about.items():
         gains = np.array([_gain(m, axis, known, options.turn) for m in motions])
         off, u = np.abs(gains), math.inf
-        if known is not None and known.u[axis] < BLUNT:
+        if known is not None and known.u[axis] < LIMITS.transfer_scale_u:
             off = off / known.scale[axis] - 1.0
-            u = math.hypot(options.turn_u / options.turn, UNSEEN, float(known.u[axis]))
+            u = math.hypot(options.turn_u / options.turn, LIMITS.turn_scale_u, float(known.u[axis]))
         elif gyro.unit.dimension == "rate":
             off = off * gyro.unit.factor - 1.0
         else:
             own = _largest({axis: motions})
-            off = off * abs(options.turn) / own - 1.0 if own > SMALLEST * _largest(about) else np.inf * off
-        rows = [k for k in range(len(motions)) if abs(off[k]) < NEAR]
+            off = (
+                off * abs(options.turn) / own - 1.0
+                if own > LIMITS.turn_size * _largest(about)
+                else np.inf * off
+            )
+        rows = [k for k in range(len(motions)) if abs(off[k]) < LIMITS.turn_deviation]
         if not rows:
             continue
         least = float(np.min(np.abs(off[rows]))) / u
-        rows = [k for k in rows if (off[k] / u) ** 2 <= least**2 + CLOSER]
+        rows = [k for k in rows if (off[k] / u) ** 2 <= least**2 + LIMITS.turn_chi2]
         rows = [k for k in rows if gains[k] > 0.0] or rows
         best = min(rows, key=lambda k: (not motions[k].single, abs(off[k]), motions[k].stop))
         other = max(rows, key=lambda k: abs(gains[k] - gains[best]))
         turns[axis], where = motions[best], _where(acc, motions[best])
         apart = abs(abs(float(gains[other] / gains[best])) - 1.0)
         doubt[axis] = apart * abs(options.turn)
-        if least > UNLIKELY:
+        if least > LIMITS.turn_sigmas:
             by = math.degrees(abs(options.turn) * (1.0 + float(off[best])))
             message = (
                 f"gravity, carried through the motion between the rests, says that the turn {TURNS[axis]} found was "
                 f"by {by:.1f} deg, not by {math.degrees(abs(options.turn)):g} deg: {ASK}, and check imu.ferraris.turn"
             )
             said.append((True, Finding("contradiction", message, where)))
-        if apart > max(SLIGHT, abs(options.turn_u / options.turn)):
+        if apart > max(LIMITS.slight_turn_difference, abs(options.turn_u / options.turn)):
             message = (
                 f"which motion is the turn {TURNS[axis]} is not certain: the one taken and the one from "
                 f"{_where(acc, motions[other])} differ by {100 * apart:.2g} %: {ASK}"
             )
-            said.append((apart > GRAVE, Finding("turn_doubtful", message, where)))
+            said.append((apart > LIMITS.grave_turn_difference, Finding("turn_doubtful", message, where)))
         if math.isinf(u):
             untold.append(TURNS[axis])
     if untold:

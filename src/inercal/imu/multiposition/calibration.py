@@ -12,32 +12,20 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import Finding
+from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.drivers import drivers_of
 from inercal.imu.multiposition.earth_rate import earth_rate_at
-from inercal.imu.multiposition.gyro import GyroFit, first_guess, fit_gyro
+from inercal.imu.multiposition.gyro import GyroFit, fit_gyro
 from inercal.imu.multiposition.joint import Scatter, force_error, join
 from inercal.imu.multiposition.outcome import assemble, without_fit
 from inercal.imu.multiposition.poses import Poses, choose, sweep
-from inercal.imu.multiposition.verdict import (
-    EXCESS,
-    WORST_MISS,
-    axis_findings,
-    gyro_findings,
-    rms_miss,
-    scatter_findings,
-)
-from inercal.imu.recording import LOST, Recording, clipped_rows, prepare
+from inercal.imu.multiposition.verdict import axis_findings, gyro_findings, rms_miss, scatter_findings
+from inercal.imu.recording import Recording, clipped_rows, prepare
 from inercal.imu.settings import ImuSettings
-from inercal.imu.turns import Turns, cut_turns
+from inercal.imu.turns import Turns, cut_turns, first_guess
 from inercal.instruments.triad import TriadModel
 from inercal.records.places import counted
 from inercal.records.record import Record
-
-WORST_START = 0.5
-"""Miss [rad] of the first guess beyond which no fit is tried: large misalignments leave 0.3."""
-
-FEWEST_TURNS = 7
-"""Turns without which the gyro is not fitted: two equations each, for twelve parameters."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +88,7 @@ def _scatter(poses: Poses) -> Scatter:
     fit, noise = poses.accelerometer.fit, float(np.mean(poses.noise_variance))
     own = fit.chi2 / fit.dof
     ratio = own / noise if noise > 0 else np.inf
-    if noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < EXCESS:
+    if noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < LIMITS.scatter_probability:
         return Scatter(float(np.sqrt(own)), fit.dof, True, float(np.sqrt(ratio)))
     return Scatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
 
@@ -128,7 +116,7 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
     """The turns between neighbouring poses that can be integrated, and what is said of the others."""
     gyro = recording.gyro
     assert gyro is not None
-    longest = LOST / gyro.rate
+    longest = LIMITS.motion_gap / gyro.rate
     clipped = clipped_rows(gyro)
     spans, left_out = [], []
     for k, (here, there) in enumerate(itertools.pairwise(poses.dwells)):
@@ -146,11 +134,11 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
             continue
         where = f"t {gyro.t[start]:.2f} to {gyro.t[stop]:.2f} s"
         left_out.append(Finding("skipped_turn", f"a turn is left out: {why}", where))
-    if len(spans) < FEWEST_TURNS:
+    if len(spans) < LIMITS.fewest_turns:
         left_out.append(
             Finding(
                 "gyro_missing",
-                f"found {counted(len(spans), 'turn')} between poses, expected at least {FEWEST_TURNS}: "
+                f"found {counted(len(spans), 'turn')} between poses, expected at least {LIMITS.fewest_turns}: "
                 "the gyro is not calibrated",
             )
         )
@@ -182,10 +170,10 @@ def _calibrate_gyro(
     start = TriadModel(np.full(3, scale), np.eye(3), means[0])
     error, earth = force_error(acc), earth_rate_at(settings.site)
     gyro = None
-    if miss < WORST_START:
+    if miss < LIMITS.first_guess_miss:
         gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, drivers, earth)
         miss = rms_miss(gyro)
-    if gyro is None or not gyro.converged or miss > WORST_MISS:
+    if gyro is None or not gyro.converged or miss > LIMITS.vertical_miss:
         said = (
             f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
             "carried through the turns): check the gyro's signs and order of axes; it is not calibrated"

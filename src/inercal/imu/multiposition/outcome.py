@@ -12,8 +12,9 @@ from inercal.estimate.budget import combine, common
 from inercal.estimate.conditions import conditions
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.findings import Finding, Status
+from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
-from inercal.imu.multiposition.poses import FEWEST, MULTIPLES, Poses, distinct, dwells_at
+from inercal.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
 from inercal.imu.multiposition.verdict import rms_miss, spread_words, verdict
 from inercal.imu.recording import Recording
 from inercal.imu.settings import COMMAND, ImuSettings
@@ -185,12 +186,12 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
     found = {m: distinct(dwells_at(recording, m, False), y, window) for m in MULTIPLES}
     best = max(found, key=lambda m: len(found[m]))
     dwells = found[best]
-    if len(dwells) < FEWEST:
+    if len(dwells) < LIMITS.fewest_poses:
         status = Status.TOO_FEW_INTERVALS
         message = (
             f"found {counted(len(dwells), 'static interval')} of at least {window / recording.accelerometer.rate:.1f} "
-            f"s at a threshold of {best:g} times the variance at rest, expected at least {FEWEST}: hold the "
-            "instrument still for 3 s or more in 12 to 40 different poses, each side up and the edges between"
+            f"s at a threshold of {best:g} times the variance at rest, expected at least {LIMITS.fewest_poses}: hold "
+            "the instrument still for 3 s or more in 12 to 40 different poses, each side up and the edges between"
         )
     else:
         status = Status.UNOBSERVABLE

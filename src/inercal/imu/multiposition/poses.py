@@ -12,18 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
 from inercal.imu.recording import Recording
 from inercal.records.dwells import Dwell, static_intervals
 
 MULTIPLES = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 28.0, 40.0)
 """Thresholds tried, as multiples of the variance of the initial static period."""
-
-FEWEST = PARAMETERS + 1
-"""Poses without which nothing can be said: as many as parameters fit without residual and prove nothing."""
-
-SAME_POSE = 5e-3
-"""Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ def distinct(dwells: tuple[Dwell, ...], y: Array, window: int) -> tuple[Dwell, .
     """Intervals of different poses: of a pose that was only jolted, the longer interval stands.
 
     Two intervals less than a ``window`` of samples apart whose mean outputs ``y`` (n, 3) differ by less than
-    `SAME_POSE` of the range of all are one pose, and would not be independent.
+    `LIMITS.same_pose` of the range of all are one pose, and would not be independent.
     """
     if not dwells:
         return ()
@@ -73,7 +68,9 @@ def distinct(dwells: tuple[Dwell, ...], y: Array, window: int) -> tuple[Dwell, .
     size = 0.5 * float(np.max(np.ptp(means, axis=0)))
     kept, last = [dwells[0]], means[0]
     for dwell, mean in zip(dwells[1:], means[1:], strict=True):
-        jolted = dwell.start - kept[-1].stop < window and np.linalg.norm(mean - last) < SAME_POSE * size
+        jolted = (
+            dwell.start - kept[-1].stop < window and np.linalg.norm(mean - last) < LIMITS.same_pose * size
+        )
         if not jolted:
             kept.append(dwell)
         elif dwell.samples > kept[-1].samples:
@@ -90,7 +87,7 @@ def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
     for with_gyro in (True, False) if recording.gyro is not None else (False,):
         for multiple in MULTIPLES:
             dwells = distinct(dwells_at(recording, multiple, with_gyro), y, recording.window)
-            if len(dwells) < FEWEST or dwells in seen:
+            if len(dwells) < LIMITS.fewest_poses or dwells in seen:
                 continue
             seen.add(dwells)
             means = np.array([dwell.of(y).mean(axis=0) for dwell in dwells])

@@ -10,30 +10,15 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.findings import Finding, Status
+from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.drivers import Drivers
-from inercal.imu.multiposition.gyro import GyroFit, first_guess, regress_static
+from inercal.imu.multiposition.gyro import GyroFit, regress_static
 from inercal.imu.multiposition.joint import Scatter
 from inercal.imu.multiposition.poses import Poses
-from inercal.imu.recording import Recording
-from inercal.imu.turns import Turns
-from inercal.instruments.triad import TriadModel
-from inercal.records.column import Triad
+from inercal.imu.recording import Recording, unit_words
+from inercal.imu.turns import Turns, first_guess
 from inercal.records.places import counted
-
-WORST_CONDITION = 50.0
-"""Condition of the scaled Jacobian beyond which a fit is called ill-conditioned; good sets of poses have 2
-to 20."""
-
-WORST_MISS = 0.2
-"""Root-mean-square angle [rad] between carried and measured verticals beyond which gyro and accelerometers
-contradict each other."""
-
-EXCESS = 0.05
-"""Probability below which the scatter of the poses is not put down to the sensors' noise."""
-
-SIGNIFICANCE = 1e-3
-"""Probability below which chance is ruled out as the cause of what a finding says."""
 
 
 def pose_words(direction: Array) -> str:
@@ -74,20 +59,6 @@ def rms_miss(gyro: GyroFit) -> float:
     return float(np.sqrt(np.mean(np.sum(gyro.miss**2, axis=1))))
 
 
-def unit_words(triad: Triad, model: TriadModel) -> str:
-    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
-    if triad.unit.dimension in ("count", "voltage"):
-        return ""
-    nominal = 1.0 / triad.unit.factor
-    ratio = float(np.median(model.scale) / nominal)
-    if 0.5 < ratio < 2.0:
-        return ""
-    return (
-        f"the scale factors of {triad.sensor} are {ratio:.3g} times those of outputs in {triad.unit.symbol}: check "
-        f"the unit{' and the time stamps' if triad.sensor == 'gyro' else ''} in the map or header"
-    )
-
-
 def verdict(
     recording: Recording,
     poses: Poses,
@@ -104,7 +75,7 @@ def verdict(
         if wrong:
             return Status.INCONSISTENT, wrong
     known = acc.fit.identifiability
-    if known.condition > WORST_CONDITION:
+    if known.condition > LIMITS.condition:
         term = known.leading_term()
         value = float(acc.fit.x[known.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
@@ -127,7 +98,7 @@ def verdict(
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
     known = gyro.geometry
-    if known.condition > WORST_CONDITION:
+    if known.condition > LIMITS.condition:
         term = known.leading_term()
         return (
             Status.UNOBSERVABLE if known.rank < len(known.names) else Status.ILL_CONDITIONED,
@@ -178,7 +149,7 @@ def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recor
         return
     if "D_R_x" not in drivers.names:
         p, fitted = _f_test(means, drivers.at_rest, poses.times[:, None])
-        if p < SIGNIFICANCE:
+        if p < LIMITS.driver_probability:
             total = fitted[-1] * np.ptp(poses.times)
             words = ", ".join(f"{axis} {d:+.3g}" for axis, d in zip("xyz", total, strict=True))
             yield Finding(
@@ -190,7 +161,7 @@ def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recor
     if "G_xx" in drivers.names or len(f) < 8:
         return
     p, fitted = _f_test(means, drivers.at_rest, f)
-    if p < SIGNIFICANCE:
+    if p < LIMITS.driver_probability:
         size = float(np.max(np.linalg.norm(fitted[-3:], axis=0)) * np.mean(np.linalg.norm(f, axis=1)))
         yield Finding(
             "g_sensitivity",
@@ -208,7 +179,7 @@ def axis_findings(turns: Turns, verticals: Array, bias: Array) -> Iterator[Findi
             axes[range(3), order] = signs
             tried.append((first_guess(turns, verticals, bias, axes)[1], order, signs))
     miss, order, signs = min(tried)
-    if miss > WORST_MISS or (order == (0, 1, 2) and min(signs) > 0):
+    if miss > LIMITS.vertical_miss or (order == (0, 1, 2) and min(signs) > 0):
         return
     measured = ", ".join(
         f"gyro_{name} seems to measure {'+' if sign > 0 else '-'}{'xyz'[axis]}"

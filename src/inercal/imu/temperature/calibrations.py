@@ -11,20 +11,11 @@ from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.findings import Finding, Status
+from inercal.imu.limits import LIMITS
 from inercal.imu.temperature.cubic import Cubic, fit_points
-from inercal.imu.temperature.model import (
-    LEAST_SPAN,
-    REFERENCE,
-    Curve,
-    TemperatureModel,
-    assemble,
-    no_span,
-)
+from inercal.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span
 from inercal.inputs import Source
 from inercal.units import parse_quantity
-
-FEWEST = 3
-"""Calibrations without which no curve is fitted."""
 
 
 def fit_calibrations(
@@ -52,8 +43,11 @@ def fit_calibrations(
         Too few, a status other than ok, a calibration without a temperature or a standard uncertainty, or one with
         other coefficients.
     """
-    if len(estimates) < FEWEST:
-        raise InputError(files[0].path, f"found {len(estimates)}, expected at least {FEWEST} calibrations")
+    if len(estimates) < LIMITS.fewest_calibrations:
+        raise InputError(
+            files[0].path,
+            f"found {len(estimates)}, expected at least {LIMITS.fewest_calibrations} calibrations",
+        )
     for number, file in enumerate(files):
         if file.sha256 and file.sha256 in (other.sha256 for other in files[:number]):
             raise InputError(file.path, "holds the same as a file before it, expected each calibration once")
@@ -72,7 +66,7 @@ def fit_calibrations(
                 f"{unsure[0]}: states no standard uncertainty above zero, expected that of the value",
             )
     T = np.array([_temperature(estimate, file) for estimate, file in zip(estimates, files, strict=True)])
-    if np.ptp(T) < LEAST_SPAN:
+    if np.ptp(T) < LIMITS.temperature_span:
         return TemperatureModel(no_span(float(T.min()), float(T.max()), files, ()))
     distinct = len(np.unique(np.round(T / 0.5)))
     terms = min(4, distinct - 1)

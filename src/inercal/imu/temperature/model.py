@@ -15,6 +15,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
 from inercal.findings import Finding, Status
+from inercal.imu.limits import LIMITS
 from inercal.imu.temperature.cubic import Cubic
 from inercal.inputs import Source
 
@@ -22,9 +23,6 @@ COMMAND = "temperature"
 
 REFERENCE = 25.0
 """T0 [degC], the temperature at which data sheets state coefficients."""
-
-LEAST_SPAN = 5.0
-"""Range of temperature [K] below which nothing is fitted."""
 
 MODEL = (
     "y = c + T1 d + T2 d^2 + T3 d^3, d = T - T0; hyst: output on rising less that on falling temperature, its mean "
@@ -157,7 +155,8 @@ def no_span(low: float, high: float, inputs: Sequence[Source], findings: Sequenc
     return without_parameters(
         COMMAND,
         Status.UNOBSERVABLE,
-        f"the temperature goes from {low:.1f} to {high:.1f} degC, expected a range of at least {LEAST_SPAN:g} K",
+        f"the temperature goes from {low:.1f} to {high:.1f} degC, expected a range of at least "
+        f"{LIMITS.temperature_span:g} K",
         findings=tuple(findings),
         model=MODEL,
         inputs=tuple(inputs),

@@ -15,20 +15,16 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import RecordError
+from inercal.imu.limits import LIMITS
 from inercal.imu.temperature.cubic import PARTS, fit_sweep
-from inercal.imu.temperature.model import LEAST_SPAN, REFERENCE, Curve, TemperatureModel, assemble, no_span
+from inercal.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span
 from inercal.records.checks.values import is_dead
 from inercal.records.column import Column
 from inercal.records.places import counted
 from inercal.records.record import Record
 
 _MEASURED = re.compile(r"acc_[xyz]|gyro_[xyz]|a[1-9]\d*|gyro(_roll|_yaw)?")
-_NEITHER = 0.05
-
 _MEDIAN_OF_A_SQUARE = 0.455  # of a standard normal variable
-
-_RISK = 0.01
-"""Probability at which chance alone makes passes of any of the channels differ."""
 
 
 def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureModel:
@@ -58,13 +54,15 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
     if len(known) < 2 * PARTS:
         raise RecordError(where, f"found {counted(len(known), 'temperature')}, expected at least {2 * PARTS}")
     low, high = float(known.min()), float(known.max())
-    if high - low < LEAST_SPAN:
+    if high - low < LIMITS.temperature_span:
         return TemperatureModel(no_span(low, high, record.sources, record.findings))
     live = [channel for channel in channels if not is_dead(channel.values)]
     if not live:
         names = ", ".join(channel.name for channel in channels)
         raise RecordError(where, f"{names}: never changing, expected a live sensor")
-    curves = tuple(_curve(channel, temperature, reference, _RISK / len(live)) for channel in live)
+    curves = tuple(
+        _curve(channel, temperature, reference, LIMITS.hysteresis_probability / len(live)) for channel in live
+    )
     what = f"{counted(len(curves), 'channel')} at rest"
     estimate = assemble(
         curves, reference, record.sources, record.findings, {"reference_degC": reference}, what
@@ -143,5 +141,5 @@ def _part_means(values: Array) -> Array:
 def branches(temperature: Array) -> Array:
     """+1/2 where it gets warmer, -1/2 where it gets colder, 0 where it does hardly either (n,)."""
     slope = np.gradient(_part_means(temperature))
-    sign = np.where(np.abs(slope) > _NEITHER * np.max(np.abs(slope)), np.sign(slope), 0.0)
+    sign = np.where(np.abs(slope) > LIMITS.flat_temperature * np.max(np.abs(slope)), np.sign(slope), 0.0)
     return np.repeat(0.5 * sign, [len(part) for part in np.array_split(temperature, PARTS)])

@@ -19,6 +19,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
@@ -28,15 +29,6 @@ from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.weights import weights
 
 COMMAND = "calibrate turntable"
-
-WORST_CONDITION = 100.0
-"""Condition number of the unit-length columns beyond which a combination of terms counts as weakly known."""
-
-SURPRISE = 1e-4
-"""Probability of a misfit as large by chance, below which the readings contradict what is stated of them."""
-
-RULED = 2.0
-"""Ratio of u to what it would be at an exact site from which the site is named."""
 
 MODELS = {
     "gyrowheel": (
@@ -173,13 +165,13 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
     fit = fitting.fit
     assert fit is not None
     worst = max(fitting.known, key=lambda each: each.identifiability.condition).identifiability
-    if worst.condition > WORST_CONDITION:
+    if worst.condition > LIMITS.condition:
         return Status.ILL_CONDITIONED, (
             f"the {len(found.y)} positions fix {worst.weakest()} only weakly (condition number "
             f"{worst.condition:.0f} of the scaled columns): add positions that change it"
         )
     stated = np.isinf(fit.noise_dof).all()
-    if stated and fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < SURPRISE:
+    if stated and fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < LIMITS.misfit_probability:
         return Status.INCONSISTENT, (
             f"the readings miss the model by {np.sqrt(fit.chi2 / fit.dof):.2g} times what the stated noise and table "
             f"errors explain, most at {_farthest(found, fit)}: check it, both of these, signs and units, or fit more "
@@ -223,7 +215,7 @@ def _too_large(fit: Regression) -> list[Finding]:
 def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collection[str]) -> list[Finding]:
     """What is to be said where u of terms ``names`` is more of the ``sources`` of the site than of all else."""
     site = [item for item in budget if item.source in sources]
-    most = 1.0 - 1.0 / RULED**2  # of a variance
+    most = 1.0 - 1.0 / LIMITS.site_ratio**2  # of a variance
     ruled = [name for name in names if sum(item.share.get(name, 0.0) for item in site) > most]
     if not ruled:
         return []

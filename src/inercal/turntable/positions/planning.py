@@ -20,9 +20,10 @@ from inercal.errors import StudyError
 from inercal.findings import Finding
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
 from inercal.turntable.positions.fit import choose_terms, earth_rate_of, rate_terms
-from inercal.turntable.positions.outcome import RULED, unit_of_term
+from inercal.turntable.positions.outcome import unit_of_term
 from inercal.turntable.positions.tolerance import drift_shares, sphere_rows
 from inercal.turntable.regression import fit, full_inputs, known, worst_rank
 from inercal.turntable.settings import TurntableSettings
@@ -212,7 +213,7 @@ def _of_site(judged: Judged, settings: TurntableSettings) -> list[Finding]:
     acting, _ = judged.model.beside(judged.plan.angles, _expected(settings, judged.model))
     rms = judged.figures.rms_prediction
     best = _figures(judged.plan, settings, replace(judged.model, references=())).rms_prediction
-    if not RULED * best < rms < math.inf:
+    if not LIMITS.site_ratio * best < rms < math.inf:
         return []
     unit = settings.instrument.unit
     said = (

@@ -12,12 +12,10 @@ from inercal.instruments.by_angle import channel_model
 from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.rigs.chain import Scope
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import parse_unit
-
-MOST_ROWS = 10_000_000
-"""Samples that fit into memory with all errors of the table."""
 
 
 def truth(settings: TurntableSettings) -> tuple[TableModel, Array]:
@@ -53,10 +51,10 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
     instrument, plan = settings.instrument, settings.plan
     n = len(plan)
     per_dwell = instrument.samples
-    if n * per_dwell > MOST_ROWS:
+    if n * per_dwell > LIMITS.most_samples:
         raise StudyError(
             "instrument.sample_rate",
-            f"found {n * per_dwell:.4g} samples in all, expected at most {MOST_ROWS:.0e}",
+            f"found {n * per_dwell:.4g} samples in all, expected at most {LIMITS.most_samples:.0e}",
         )
     errors = np.repeat(model.chain.draw(rng, n)[:, None, :], per_dwell, axis=1)
     for k, error in enumerate(model.chain.errors):

@@ -15,14 +15,11 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
-from inercal.turntable.positions.outcome import SURPRISE
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
 from inercal.turntable.rate.outcome import assemble, unobservable
 from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwells, turning_axis
 from inercal.turntable.settings import TurntableSettings
-
-ACROSS = 0.1
-"""Cosine of turning axis and gyro axis below which a gyro takes no part in the test."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +67,7 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
     along = turning_axis(chain, test.joint, found.angles)
     taken = []
     for channel in found.channels:
-        if np.abs(along[:, "xyz".index(channel[-1])]).min() > ACROSS:
+        if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine:
             taken.append(channel)
         else:
             said = f"{channel} lies across the turning axis {test.joint} and is left out"
@@ -141,7 +138,7 @@ def _excess(fit: RateFit) -> list[Finding]:
     """A finding where the readings scatter about the fit by more than what is stated of them."""
     from scipy.special import chdtrc
 
-    if fit.dof < 1 or np.isfinite(fit.noise_dof) or chdtrc(fit.dof, fit.chi2) >= SURPRISE:
+    if fit.dof < 1 or np.isfinite(fit.noise_dof) or chdtrc(fit.dof, fit.chi2) >= LIMITS.misfit_probability:
         return []
     said = (
         f"gyro_{fit.axis} misses the fit by {np.sqrt(fit.chi2 / fit.dof):.1f} times what the stated noise and the "

@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.noise import scatter
 from inercal.turntable.rate.stays import Effect, Input
 from inercal.turntable.regression import FLOOR, Solution, solve
 from inercal.turntable.weights import Weights
-
-SAME = 1e-3
-"""Rates apart by less than this part of themselves are one rate."""
 
 ROUNDS = 3
 """Fits that are made: the effect of the table depends on the scale factor, and hardly changes after the first."""
@@ -97,7 +95,9 @@ def levels(rate: Array) -> list[NDArray[np.int64]]:
     """Stays (indices, in the order taken) at each distinct rate, lowest first."""
     order = np.argsort(rate, kind="stable")
     steps = np.diff(rate[order])
-    apart = steps > SAME * np.maximum(np.abs(rate[order])[1:], 1e-3 * np.abs(rate).max(initial=0.0))
+    apart = steps > LIMITS.same_rate * np.maximum(
+        np.abs(rate[order])[1:], 1e-3 * np.abs(rate).max(initial=0.0)
+    )
     return [np.sort(part) for part in np.split(order, np.flatnonzero(apart) + 1)]
 
 
@@ -106,7 +106,7 @@ def approaches(rate: Array) -> NDArray[np.int64]:
     level = np.empty(len(rate))
     for same in levels(rate):
         level[same] = rate[same].mean()
-    smallest = SAME * 1e-3 * np.abs(level).max(initial=0.0)
+    smallest = LIMITS.same_rate * 1e-3 * np.abs(level).max(initial=0.0)
     steps = np.diff(level, prepend=0.0)
     found = np.where(np.abs(steps) <= smallest, 0, np.sign(steps)).astype(np.int64)
     for k in range(1, len(found)):

@@ -15,14 +15,12 @@ from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME
-from inercal.turntable.positions.outcome import COMMAND, WORST_CONDITION, of_site, unit_of_term
+from inercal.turntable.positions.outcome import COMMAND, of_site, unit_of_term
 from inercal.turntable.rate.fit import RateFit, approaches
 from inercal.turntable.rate.stays import Input, RateDwells
 from inercal.turntable.settings import RateTest, TurntableSettings
-
-SEEN = 5.0
-"""Standard uncertainties that a scale factor is above zero, lest the output has nothing to do with the rate."""
 
 MODEL = (
     "y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3), x the rate about the gyro's axis: the table's rate times the "
@@ -58,10 +56,10 @@ def assemble(
     message = f"{counted(len(names), 'term')} from {counted(len(found.rate), 'stay')} at rates"
     for fit in fits:
         k = names.index(f"S_{fit.axis}")
-        if abs(values[k]) < SEEN * u[k]:
+        if abs(values[k]) < LIMITS.scale_sigmas * u[k]:
             status = Status.INCONSISTENT
             message = f"the output of gyro_{fit.axis} does not follow the rate: check channel, axis and units"
-    if status is Status.OK and known.condition > WORST_CONDITION:
+    if status is Status.OK and known.condition > LIMITS.condition:
         status = Status.ILL_CONDITIONED
         weak = f"{known.weakest()} only weakly (condition number {known.condition:.0f})"
         message = f"the rates fix {weak}: spread them wider"

@@ -22,7 +22,7 @@ from inercal.instruments.by_angle import CHANNELS
 from inercal.records.record import Record
 from inercal.rigs.chain import Chain, Joint
 from inercal.rigs.outputs import rate_reference
-from inercal.turntable.readings import STILL
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import Unit
 
@@ -106,7 +106,7 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
     standing = [k for k, name in enumerate(joints) if name != joint]
     for rows in groups:
         moved = np.abs(np.sin(0.5 * (table[rows][:, standing] - table[rows[0], standing])))
-        if np.any(moved > 0.5 * STILL):
+        if np.any(moved > 0.5 * LIMITS.position_angle):
             raise RecordError(
                 where, f"an axis moves within a stay (row {rows[0] + 1}), expected only {joint} to turn"
             )

@@ -1,0 +1,43 @@
+"""Limits by which calibrations on a turntable judge a record and a fit; the book prints them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds of positions and rate tests; ``LIMITS`` are the ones in force."""
+
+    position_angle: float = math.radians(3.0 / 60.0)
+    """Angle [rad] within which rows are one position: above the noise of an encoder, below any step of a plan."""
+
+    stay_length: float = 0.5
+    """Length of a stay, as a part of the usual one, below which it is left out where stays are found by angle: the
+    table is on its way, or makes a stop that a finding names."""
+
+    most_samples: int = 10_000_000
+    """Samples of a simulation that fit into memory with all errors of the table."""
+
+    condition: float = 100.0
+    """Condition number of the unit-length columns beyond which a combination of terms counts as weakly known."""
+
+    misfit_probability: float = 1e-4
+    """Probability of a misfit by chance below which the readings contradict the stated noise and errors."""
+
+    site_ratio: float = 2.0
+    """Ratio of u to its value at an exact site beyond which a finding names the site."""
+
+    same_rate: float = 1e-3
+    """Relative difference below which two rates are one rate."""
+
+    turning_cosine: float = 0.1
+    """Cosine of turning axis and gyro axis below which a gyro takes no part in a rate test."""
+
+    scale_sigmas: float = 5.0
+    """Scale factor, over its standard uncertainty, below which an output does not follow the rate."""
+
+
+LIMITS = Limits()
+"""The limits in force."""
