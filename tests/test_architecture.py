@@ -149,10 +149,10 @@ def test_no_circles():
 WITHIN = {
     "imu": (
         "limits recording turns aided_settings ferraris_settings settings simulate multiposition ferraris aided "
-        "temperature campaign task"
+        "temperature task"
     ),
     "turntable": (
-        "limits settings model weights noise regression readings display sensitivity positions rate task campaign "
+        "limits settings model weights noise regression readings display sensitivity positions rate task "
         "figures"
     ),
     "aoa": (
