@@ -94,8 +94,8 @@ def _one(rng: np.random.Generator, noise: float, known: bool) -> dict[str, Array
     """A simulated calibration with that noise [deg/h], of which it is told if ``known``."""
     real = settings_of(drawn_instrument(rng), noise, rng.normal(LATITUDE, LATITUDE_U))
     record = simulate(real, rng)
-    told = settings_of({}, noise if known else None, LATITUDE)
-    estimate = calibrate(record, told).estimate
+    settings = settings_of({}, noise if known else None, LATITUDE)
+    estimate = calibrate(record, settings).estimate
     true = real.instrument.coefficients
     return {
         "error": estimate.values - np.array([true[name] for name in estimate.names]),
