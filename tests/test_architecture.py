@@ -148,10 +148,11 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "aoa": (
-        "layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task figures"
+        "limits layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task "
+        "figures"
     ),
     "selfcal": (
-        "platform display settings filters before diagnosis find_base campaign reading result task figures"
+        "limits platform display settings filters before diagnosis find_base campaign reading result task figures"
     ),
 }
 
