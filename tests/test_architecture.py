@@ -156,10 +156,11 @@ WITHIN = {
         "figures"
     ),
     "aoa": (
-        "layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task figures"
+        "limits layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task "
+        "figures"
     ),
     "selfcal": (
-        "platform display settings filters before diagnosis find_base monte_carlo reading result task figures"
+        "limits platform display settings filters before diagnosis find_base monte_carlo reading result task figures"
     ),
 }
 
