@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = [
     {"arrays", "errors", "inputs"},
     {"findings", "units"},
-    {"_jit", "_files", "_toml"},
+    {"_jit", "_files", "_toml", "keys"},
     {"geometry"},
     {"instruments"},
     {"records"},

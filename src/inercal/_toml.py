@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -13,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inercal._files import read_bytes
 from inercal.errors import InputError
+from inercal.keys import keys_of
 from inercal.units import shown
 
 
@@ -111,21 +113,25 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
 
 
 def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
-    """Keys of the (nested) model at that path."""
+    """Keys of the (nested) table at that path."""
+    table: type[Any] = model
     for part in path:
-        info = model.model_fields.get(str(part)) or next(
-            (field for field in model.model_fields.values() if field.alias == part), None
+        fields: dict[str, Any] = getattr(table, "model_fields", {})
+        info = fields.get(str(part)) or next(
+            (field for field in fields.values() if field.alias == part), None
         )
-        inner = None if info is None else _model_in(info.annotation)
+        inner = None if info is None else _table_in(info.annotation)
         if inner is None:
             # a table of tables keyed by the user's own names: the model is one level up
             continue
-        model = inner
-    return [field.alias or name for name, field in model.model_fields.items()]
+        table = inner
+    if is_dataclass(table):
+        return [key.name or field.name for field, key in keys_of(table)]
+    return [field.alias or name for name, field in table.model_fields.items()]
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The model inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _table_in(annotation: Any) -> type[Any] | None:
+    """The model or settings inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
-    return next((model for part in get_args(annotation) if (model := _model_in(part))), None)
+    return next((table for part in get_args(annotation) if (table := _table_in(part))), None)
