@@ -7,11 +7,15 @@ page of a short name in a docstring, such as `Estimate`.
 
 from __future__ import annotations
 
+import ast
 import inspect
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import groupby
+from importlib import import_module
+from itertools import groupby, pairwise
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -272,6 +276,43 @@ def _terms(found: Iterable[Any]) -> str:
     )
 
 
+# limits ---------------------------------------------------------------------------------------------------------------
+
+
+def limits() -> str:
+    """The limits of every system that has them, a table for each."""
+    import inercal
+
+    parts = []
+    for path in sorted(Path(inercal.__file__).parent.glob("*/limits.py")):
+        module = import_module(f"inercal.{path.parent.name}.limits")
+        meanings = _meanings(path.read_text(encoding="utf-8"), type(module.LIMITS).__name__)
+        rows = [(code(name), *_value(value, meanings[name])) for name, value in vars(module.LIMITS).items()]
+        parts.append(f"## {path.parent.name}\n\n" + table(("limit", "value", "meaning"), rows))
+    return "\n\n".join(parts)
+
+
+def _meanings(source: str, name: str) -> dict[str, str]:
+    """The docstring below each field of a class."""
+    body = next(each.body for each in ast.parse(source).body if getattr(each, "name", "") == name)
+    return {
+        field.target.id: inspect.cleandoc(text.value.value).replace("\n", " ")
+        for field, text in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)
+    }
+
+
+def _value(value: float, meaning: str) -> tuple[str, str]:
+    """A limit with its unit, taken from the brackets of its meaning; angles in degrees if these are round."""
+    unit = re.search(r" \[(.+?)\]", meaning)
+    if unit is None:
+        return f"{value:g}", meaning
+    degrees = math.degrees(value)
+    whole = unit[1].startswith("rad") and abs(degrees - round(degrees, 2)) < 1e-9
+    shown = f"{degrees:.6g} {unit[1].replace('rad', 'deg')}" if whole else f"{value:g} {unit[1]}"
+    return shown, meaning.replace(unit[0], "", 1)
+
+
 # Python ---------------------------------------------------------------------------------------------------------------
 
 
@@ -296,7 +337,19 @@ def words() -> str:
 
 PARTS: dict[str, Callable[..., str]] = {
     each.__name__: each
-    for each in (commands, study, maps, status, findings, terms, model_terms, noise_terms, public, words)
+    for each in (
+        commands,
+        study,
+        maps,
+        status,
+        findings,
+        terms,
+        model_terms,
+        noise_terms,
+        limits,
+        public,
+        words,
+    )
 }
 
 

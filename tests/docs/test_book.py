@@ -14,8 +14,10 @@ import pytest
 
 from inercal.cli.tree import COMMANDS
 from inercal.findings import CODES
+from inercal.imu import limits as imu
 from inercal.instruments.terms import NOISE_TERMS, TERMS
 from inercal.records.channels import _EXAMPLES
+from inercal.turntable import limits as turntable
 
 ROOT = Path(__file__).parents[2]
 VOID = {"area", "base", "br", "col", "embed", "hr", "img", "input", "link", "meta", "source", "track", "wbr"}
@@ -162,15 +164,16 @@ def test_every_formula_is_set(pages):
             assert formula.count("{") == formula.count("}"), f"{name}: {formula!r}"
 
 
-def test_the_reference_has_every_command_term_code_and_channel(book):
+def test_the_reference_has_every_command_term_code_channel_and_limit(book):
     text = {
         page: (book / "reference" / f"{page}.html").read_text(encoding="utf-8")
-        for page in ("commands", "results", "records")
+        for page in ("commands", "results", "records", "limits")
     }
     wanted = {
         "commands": [f"<h2>{' '.join(words).strip()}<" for words in COMMANDS],
         "results": [f">{name}</span>" for name in [*TERMS, *NOISE_TERMS, *CODES]],
         "records": [f">{name}</span>" for name in _EXAMPLES if not re.fullmatch(r"a[34]", name)],
+        "limits": [f">{name}</span>" for name in (*vars(imu.LIMITS), *vars(turntable.LIMITS))],
     }
     for page, names in wanted.items():
         assert [name for name in names if name not in text[page]] == [], page

@@ -41,7 +41,7 @@ class Limits:
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
 
     first_guess_miss: float = 0.5
-    """Miss [rad] of the first guess of the gyro beyond which no fit is tried; large misalignments leave 0.3."""
+    """Miss [rad] of the first guess of the gyro beyond which no fit is tried; large misalignments leave 0.3 rad."""
 
     fewest_turns: int = 7
     """Turns that a fit of the gyro needs: each gives two equations for twelve parameters."""
@@ -187,7 +187,7 @@ class Limits:
     # aided by a table: verdict
 
     unknown_coefficient_u: float = 0.1
-    """Relative standard uncertainty of a scale factor, or standard uncertainty of a misalignment [rad], beyond which
+    """Relative standard uncertainty of a scale factor, or standard uncertainty of a misalignment in rad, beyond which
     the data say next to nothing of it."""
 
     fault_shift: float = 5.0
