@@ -11,6 +11,9 @@ from inercal.imu.aided.settings import AidedSettings
 from inercal.imu.ferraris.settings import FerrarisSettings
 from inercal.units import Quantity
 
+MASKED = ("saturation",)
+"""Codes of a recording's findings whose samples no fit uses: turns in which a sensor saturates are left out."""
+
 COMMAND = "calibrate imu"
 """The command behind every method of this room, as its results have it."""
 

@@ -21,7 +21,7 @@ from inercal.aoa.diagnosis.plausibility import SOUND, implausible
 from inercal.aoa.diagnosis.small import FittedError, candidates, fitted, likeliest
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import STATES, AoaSettings
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
 _ALIKE = 0.5
@@ -86,7 +86,8 @@ def _livelier(settings: AoaSettings, snap: float) -> AoaSettings:
 def _of_snap(settings: AoaSettings, snap: float) -> Finding:
     """``unmodelled``: a larger snap makes a recording fit."""
     text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
-    return Finding("unmodelled", f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]')
+    more = f'write snap = "{snap:.3g} rad^2/s^7" under [estimator]'
+    return Finding("unmodelled", f"{text}: {more}", harm=EVERYTHING)
 
 
 def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
@@ -105,7 +106,7 @@ def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
         f"the recording shows {_BESIDE[enough]}, which {stated} states leave out: their angle is wrong by more than it "
         f"claims, write states = 19{at_least} under [estimator]"
     )
-    return [Finding("unmodelled", text)]
+    return [Finding("unmodelled", text, harm=EVERYTHING)]
 
 
 def _errors(part: Recording, settings: AoaSettings, now: Judged) -> list[Finding]:
@@ -138,7 +139,8 @@ def _in_words(best: FittedError, alike: list[FittedError], settings: AoaSettings
     }
     others = "; ".join(_short(each, settings) for each in alike[:_SHOWN])
     also = f"; as well possible: {others}" if others else ""
-    return Finding(code.get(kind, "unmodelled"), f"{_short(best, settings)}: {_advice(best, settings)}{also}")
+    text = f"{_short(best, settings)}: {_advice(best, settings)}{also}"
+    return Finding(code.get(kind, "unmodelled"), text, harm=EVERYTHING)
 
 
 def _short(found: FittedError, settings: AoaSettings) -> str:
@@ -198,11 +200,11 @@ def _contradiction(part: Recording, settings: AoaSettings, now: Judged) -> Findi
             acc[:, k] = np.nan
             if judge(replace(part, acc=acc), settings).fits:
                 text = f"{name} contradicts the others, which fit without it: check its channel, axis and position"
-                return Finding("contradiction", text)
+                return Finding("contradiction", text, harm=EVERYTHING)
     worst = (*names, "gyro")[int(np.argmax(now.by_sensor))]
     motion = "" if part.spatial else ", or the model rolls or yaws, which only gyro_roll and gyro_yaw tell"
     text = (
         f"the sensors contradict each other, {worst} most, and no single error explains it: check the study's axes, "
         f"positions and noise{motion}"
     )
-    return Finding("contradiction", text)
+    return Finding("contradiction", text, harm=EVERYTHING)

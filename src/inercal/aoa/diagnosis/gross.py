@@ -21,7 +21,7 @@ from inercal.aoa.paper.delay import aligned, relative_delay
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
 Change = Callable[[Recording, AoaSettings], tuple[Recording, AoaSettings]]
@@ -124,10 +124,10 @@ def _of_gyro() -> Iterator[Fault]:
         return lambda recording, settings: (replace(recording, gyro=factor * recording.gyro), settings)
 
     text = "gyro looks reversed, it is positive nose-up: write sign = -1 for it in the map"
-    yield Fault(Finding("sign_suspect", text), times(-1.0))
+    yield Fault(Finding("sign_suspect", text, harm=EVERYTHING), times(-1.0))
     for factor, (looks, taken) in _GYRO_UNITS.items():
         text = f"gyro looks to be in {looks}, taken for {taken}: correct its unit in the header or the map"
-        yield Fault(Finding("unit_suspect", text), times(factor))
+        yield Fault(Finding("unit_suspect", text, harm=EVERYTHING), times(factor))
 
 
 def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Fault]:
@@ -142,7 +142,7 @@ def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iter
                 f"gyro comes {1e3 * abs(shift):.2g} ms {how} than the accelerometers and the study say: write "
                 f'gyro_delay = "{value}" or "estimate" under [timing]'
             )
-            yield Fault(Finding("command_shift", text), lambda r, s: (aligned(r, shift), s))
+            yield Fault(Finding("command_shift", text, harm=EVERYTHING), lambda r, s: (aligned(r, shift), s))
     if _follows(recording, shown, settings.noise.gyro):
         return
     text = (
@@ -150,7 +150,9 @@ def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iter
         "channel or on another clock"
     )
     none = np.full_like(recording.gyro, np.nan)
-    yield Fault(Finding("channel_swap", text), lambda r, s: (replace(r, gyro=none), s), last=True)
+    yield Fault(
+        Finding("channel_swap", text, harm=EVERYTHING), lambda r, s: (replace(r, gyro=none), s), last=True
+    )
 
 
 def _of_turns() -> Iterator[Fault]:
@@ -164,12 +166,14 @@ def _of_turns() -> Iterator[Fault]:
 
     for name, signs in (("gyro_roll", (-1.0, 1.0)), ("gyro_yaw", (1.0, -1.0))):
         text = f"{name} looks reversed, it is right-handed about {'x forward' if signs[0] < 0.0 else 'z up'}: write "
-        yield Fault(Finding("sign_suspect", f"{text}sign = -1 for it in the map"), times(signs))
+        yield Fault(
+            Finding("sign_suspect", f"{text}sign = -1 for it in the map", harm=EVERYTHING), times(signs)
+        )
     text = "gyro_roll and gyro_yaw look exchanged: exchange their columns in the map"
-    yield Fault(Finding("channel_swap", text), times((1.0, 1.0), (1, 0)))
+    yield Fault(Finding("channel_swap", text, harm=EVERYTHING), times((1.0, 1.0), (1, 0)))
     for factor, (looks, taken) in list(_GYRO_UNITS.items())[:2]:
         text = f"gyro_roll and gyro_yaw look to be in {looks}, taken for {taken}: correct their unit"
-        yield Fault(Finding("unit_suspect", text), times((factor, factor)))
+        yield Fault(Finding("unit_suspect", text, harm=EVERYTHING), times((factor, factor)))
 
 
 def _scaled(columns: list[int], factor: float) -> Change:
@@ -192,7 +196,7 @@ def _reversed(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
         other = f'angle = "{math.degrees(angle) + 180.0:.4g} deg"' if axis is None else f'"{opposite[axis]}"'
         what = other if axis is None else f"axis = {other}"
         text = f"{name} looks reversed: write sign = -1 for it in the map, or {what} in the study"
-        yield Fault(Finding("sign_suspect", text), _scaled([k], -1.0))
+        yield Fault(Finding("sign_suspect", text, harm=EVERYTHING), _scaled([k], -1.0))
 
 
 def _orders(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
@@ -215,7 +219,7 @@ def _orders(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
             # the column of b holds what belongs to a
             what = ", ".join(f"{names[b]} looks like {names[a]}" for a, b in moved)
         text = f"{what}: correct their columns in the map, or their axes and positions in the study"
-        yield Fault(Finding("channel_swap", text), _ordered(there, order))
+        yield Fault(Finding("channel_swap", text, harm=EVERYTHING), _ordered(there, order))
 
 
 def _ordered(there: list[int], order: tuple[int, ...]) -> Change:
@@ -236,7 +240,7 @@ def _units(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
         look, their = ("looks", "its") if len(columns) == 1 else ("look", "their")
         for factor, (looks, taken) in _ACCELEROMETER_UNITS.items():
             text = f"{names} {look} to be in {looks}, taken for {taken}: correct {their} unit in the header or the map"
-            yield Fault(Finding("unit_suspect", text), _scaled(columns, factor))
+            yield Fault(Finding("unit_suspect", text, harm=EVERYTHING), _scaled(columns, factor))
 
 
 def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
@@ -265,11 +269,11 @@ def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
             f"the positions r of the accelerometers look to be in {looks}, taken for {taken}: write them with their "
             f'unit, for {layout.names[example]} "{then}" in the place of "{now}"'
         )
-        yield Fault(Finding("unit_suspect", text), times(factor, factor))
+        yield Fault(Finding("unit_suspect", text, harm=EVERYTHING), times(factor, factor))
     text = "the positions r of all accelerometers look reversed, they are positive ahead of the pivot"
-    yield Fault(Finding("sign_suspect", text), times(-1.0))
+    yield Fault(Finding("sign_suspect", text, harm=EVERYTHING), times(-1.0))
     for k in there:
         if layout.r[k] != 0.0:
             text = f'the position r of {layout.names[k]} looks reversed: write r = "{-layout.r[k]:g} m"'
             signs = np.where(np.arange(len(layout.r)) == k, -1.0, 1.0)
-            yield Fault(Finding("sign_suspect", text), times(signs))
+            yield Fault(Finding("sign_suspect", text, harm=EVERYTHING), times(signs))

@@ -153,4 +153,4 @@ def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
         f"theta is about {middle:.0f} deg, the model on its back: exchange or reverse the accelerometers across it, or "
         'state roll = "180 deg" under [model] if it was mounted so'
     )
-    return [Finding("not_stated", text)]
+    return [Finding("not_stated", text, harm=("theta",))]

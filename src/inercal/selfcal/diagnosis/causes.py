@@ -17,7 +17,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis, surprising, whiteness
 from inercal.estimate.result import rounded
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.earth import EARTH_RATE
 from inercal.records.places import counted, places
 from inercal.selfcal.before.observability import UNOBSERVABLE
@@ -207,7 +207,7 @@ def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Pro
         f"{counted(len(rows), 'reading')} far from what the filter expects, of {', '.join(sorted(channels))}"
     )
     cost = left_out + 2.0 * len(rows) * math.log(2.0 * len(recording.t) / RISK)
-    finding = Finding("outlier", text, places("row", rows + 2))
+    finding = Finding("outlier", text, places("row", rows + 2), EVERYTHING)
     return [Proposal(finding, replace(recording, acc=acc, th=th), cost)]
 
 
@@ -236,7 +236,7 @@ def _in_words(error: Found, case: Case) -> Finding:
         rows, dt = float(values[0]), float(np.median(case[0].dt))
         how = "later" if rows > 0.0 else "earlier"
         text = f"the platform acts {1e3 * abs(rows) * dt:.3g} ms {how} than its commands are logged"
-        return Finding("command_shift", text)
+        return Finding("command_shift", text, harm=EVERYTHING)
     if cause.kind in _CONSTANT:
         what, dimension, advice = _CONSTANT[cause.kind]
         unit, size = shown_unit(dimension)
@@ -245,11 +245,12 @@ def _in_words(error: Found, case: Case) -> Finding:
             for name, value, each in zip(cause.names, values, u, strict=True)
             if abs(value) > 3.0 * each
         ] or [f"{', '.join(cause.names)} together"]
-        return Finding("unmodelled", f"{what}, which the model leaves out: {', '.join(seen)}; {advice}")
+        text = f"{what}, which the model leaves out: {', '.join(seen)}; {advice}"
+        return Finding("unmodelled", text, harm=EVERYTHING)
     amplitude = math.degrees(float(np.hypot(*values))) * 3600.0
     _, order, _, joint = cause.kind.split()
     text = f"{joint} errs periodically with its angle: {amplitude:.2g} arcsec, {counted(int(order), 'period')} a turn"
-    return Finding("unmodelled", text)
+    return Finding("unmodelled", text, harm=EVERYTHING)
 
 
 def _latitude(error: Found, case: Case) -> Finding:
@@ -264,13 +265,14 @@ def _latitude(error: Found, case: Case) -> Finding:
         f"the earth rate seen is that of latitude {math.degrees(seen):.2f} +- {math.degrees(u):.1g} deg, stated is "
         f"{math.degrees(stated):.2f} deg: check latitude and heading"
     )
-    return Finding("site_suspect", text)
+    return Finding("site_suspect", text, harm=EVERYTHING)
 
 
 def _scatter(case: Case, now: Filtered) -> list[Finding]:
     """Innovations larger or smaller than the stated noise has them, or correlated in time."""
     if not now.converged:
-        return [Finding("contradiction", f"the error-state filter fails on this recording: {now.message}")]
+        text = f"the error-state filter fails on this recording: {now.message}"
+        return [Finding("contradiction", text, harm=EVERYTHING)]
     z = regular(case[0], now)
     findings, wide = [], False
     for sensor, columns in zip(SENSORS, (z[:, :3], z[:, 3:]), strict=True):
@@ -283,7 +285,7 @@ def _scatter(case: Case, now: Filtered) -> list[Finding]:
             wide = True
             if _even(columns, mean) and whiteness(columns) > RISK:
                 text = f"{sensor}: noise is {factor:.3g} times what is stated, evenly over the recording"
-                findings.append(Finding("excess_scatter", text))
+                findings.append(Finding("excess_scatter", text, harm=EVERYTHING))
         elif mean < 1.0 - 5.0 * error and factor * WORTH < 1.0:
             text = f"{sensor}: noise is only {factor:.2g} of what is stated; the uncertainties are too large"
             findings.append(Finding("low_scatter", text))
@@ -323,7 +325,8 @@ def _restless(case: Case) -> Finding | None:
                 sorted((fitting[0], fitting[-1])),
             )
             more = f" ({_short(span[0])} to {_short(span[1])})" if len(fitting) > 1 else ""
-            return Finding(code, text + more)
+            harm = EVERYTHING if code == "excess_scatter" else ()
+            return Finding(code, text + more, harm=harm)
     return None
 
 
@@ -352,7 +355,10 @@ def _unexplained(z: Array) -> Finding:
         f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1{_correlated(z)})"
     )
     return Finding(
-        "contradiction", f"{text}, and no fault that is looked for explains them", places("row", worst + 2)
+        "contradiction",
+        f"{text}, and no fault that is looked for explains them",
+        places("row", worst + 2),
+        EVERYTHING,
     )
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.rotations import boxminus, conjugate, rotate
 from inercal.records.places import counted, places
 from inercal.selfcal.filters.filter_result import Problem
@@ -133,7 +133,9 @@ def _accelerometer_axes(recording: Recording, turn: Turning) -> Iterator[Proposa
     for i in sensors:
         right[:, order[i]] = signs[i] * recording.acc[:, i]
     code = "sign_suspect" if order == sensors else "channel_swap"
-    yield Proposal(Finding(code, ", ".join(said)), replace(recording, acc=right), _cost(len(ways) - 1))
+    yield Proposal(
+        Finding(code, ", ".join(said), harm=EVERYTHING), replace(recording, acc=right), _cost(len(ways) - 1)
+    )
 
 
 def _shifts(recording: Recording, turn: Turning) -> Iterator[Proposal]:
@@ -167,7 +169,7 @@ def _shifted(recording: Recording, shift: int, first: int, cost: float) -> Propo
     how = "later" if shift > 0 else "earlier"
     text = f"commands are logged {counted(abs(shift), 'row')} {how} than the platform acts on them"
     where = places("row", np.arange(first, last + 1) + 1) if first else ""
-    return Proposal(Finding("command_shift", text, where), replace(recording, rate=rate), cost)
+    return Proposal(Finding("command_shift", text, where, EVERYTHING), replace(recording, rate=rate), cost)
 
 
 def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Proposal]:
@@ -183,7 +185,9 @@ def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Propos
     text = f"accelerometers are logged {counted(abs(shift), 'row')} {how}, against angles and commands"
     left_out = int(np.isfinite(recording.acc).sum() - np.isfinite(moved[shift]).sum())
     cost = _cost(len(SHIFTS), left_out)
-    yield Proposal(Finding("command_shift", text), replace(recording, acc=moved[shift]), cost)
+    yield Proposal(
+        Finding("command_shift", text, harm=EVERYTHING), replace(recording, acc=moved[shift]), cost
+    )
 
 
 def _by_rows(values: Array, shift: int) -> Array:
@@ -217,7 +221,7 @@ def _frozen(recording: Recording) -> Iterator[Proposal]:
             text = f"{which} repeat{'' if len(columns) > 1 else 's'} one reading in {counted(len(rows) + 1, 'row')}"
             cost = _cost(2.5 * n * n, len(rows) * len(columns))
             without = replace(recording, acc=known[:, :3], th=known[:, 3:])
-            yield Proposal(Finding("dead_channel", text, places("row", rows + 1)), without, cost)
+            yield Proposal(Finding("dead_channel", text, places("row", rows + 1), EVERYTHING), without, cost)
 
 
 def _stuck(recording: Recording, turn: Turning) -> Iterator[Proposal]:
@@ -230,16 +234,16 @@ def _stuck(recording: Recording, turn: Turning) -> Iterator[Proposal]:
             rows = np.arange(start + 1, end + 1)
             degrees = math.degrees(float(turn.sent[start:end, joint].sum()))
             text = f"{name} stands still while it is told to turn by {degrees:.3g} deg"
-            found = Finding("stuck_encoder", text, places("row", rows + 1))
+            found = Finding("stuck_encoder", text, places("row", rows + 1), EVERYTHING)
             yield _without_angles(recording, rows, found, 3.0 * n * n)
-            later = Finding("stuck_encoder", f"{text}, and is wrong from then on", found.where)
+            later = Finding("stuck_encoder", f"{text}, and is wrong from then on", found.where, EVERYTHING)
             yield _without_angles(recording, np.arange(start + 1, n), later, 3.0 * n)
         # at rest only the noise tells: the longest run, as a coarse encoder has many
         start, end = max(_runs(turn.moved[:, joint] == 0.0), key=lambda run: run[1] - run[0], default=(0, 0))
         if end - start >= _SAME and not still[start:end].any():
             rows = np.arange(start + 1, end + 1)
             text = f"{name} repeats one reading in {counted(len(rows) + 1, 'row')}"
-            found = Finding("stuck_encoder", text, places("row", rows + 1))
+            found = Finding("stuck_encoder", text, places("row", rows + 1), EVERYTHING)
             yield _without_angles(recording, rows, found, 3.0 * n * n)
 
 

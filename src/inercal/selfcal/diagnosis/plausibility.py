@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.errors import RecordError
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.plan import Plan
@@ -147,7 +147,7 @@ def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: s
         if _misfit(motion.turned(tried), commanded, noise) < FIT:
             code = "sign_suspect" if other.axes == settings.gimbals.axes else "channel_swap"
             text = f"th: the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
-            return [Finding(code, f"{text} of the rig, not with those of the study")]
+            return [Finding(code, f"{text} of the rig, not with those of the study", harm=EVERYTHING)]
     for order in itertools.permutations(range(3)):
         exchanged = replace(motion, th=motion.th[:, order])
         if _misfit(exchanged.turned(world), commanded, noise) < FIT:
@@ -156,11 +156,12 @@ def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: s
                 for k, axis in enumerate("xyz")
                 if order[k] != k
             )
-            return [Finding("channel_swap", f"th: {names}, as the rates have it")]
+            return [Finding("channel_swap", f"th: {names}, as the rates have it", harm=EVERYTHING)]
     return _exchanged(sensor, commanded, turned, noise) or [
         Finding(
             "contradiction",
             f"th: the angles do not follow the rates {sensor}_x..z, off by {100.0 * misfit:.3g} % of the motion",
+            harm=EVERYTHING,
         )
     ]
 
@@ -197,7 +198,7 @@ def _accelerometers(
         ):
             return []
         text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
-        return [Finding("unit_suspect", text)]
+        return [Finding("unit_suspect", text, harm=EVERYTHING)]
     force = rotate(conjugate(gimbals(recording.th[whole], world)[0]), world.up)
     noise = 2.0 * settings.noise.accelerometer
     misfit = _misfit(acc, force, noise)
@@ -207,6 +208,7 @@ def _accelerometers(
         Finding(
             "contradiction",
             f"acc: specific force does not follow the angles, off by {100.0 * misfit:.3g} % of gravity",
+            harm=EVERYTHING,
         )
     ]
 
@@ -236,7 +238,7 @@ def _exchanged(sensor: str, found: Array, expected: Array, noise: float) -> list
         if "xyz"[k] != axis or sign < 0.0
     )
     code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
-    return [Finding(code, f"{sensor}: {words}, as the angles have it")]
+    return [Finding(code, f"{sensor}: {words}, as the angles have it", harm=EVERYTHING)]
 
 
 def off_the_path(
@@ -265,5 +267,6 @@ def off_the_path(
             f"{JOINTS[joint]} leaves the study's path at {t[first]:.6g} s; the angles are up to "
             f"{math.degrees(away.max()):.3g} deg away from it"
         )
-        findings.append(Finding("contradiction", text, f"row {rows[first] + 1}"))
+        # the angles that were recorded count, not those of the plan
+        findings.append(Finding("contradiction", text, f"row {rows[first] + 1}", harm=()))
     return findings
