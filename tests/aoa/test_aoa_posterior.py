@@ -17,8 +17,9 @@ from inercal.aoa.result.outcome import assemble, assemble_paper
 from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import InputError, StudyError
+from inercal.estimate.basis import Basis
 from inercal.estimate.files import save
-from inercal.estimate.result import without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 
@@ -183,8 +184,11 @@ def test_other_results_are_refused(saved, tmp_path):
     _, settings, found = saved
     made = simulate(settings, np.random.default_rng(1)).recording
     for result, words in (
-        (without_parameters("selfcal", Status.OK, ""), "a result of selfcal"),
-        (without_parameters("aoa", Status.INCONSISTENT, "mean NIS 9"), r"ended inconsistent \(mean NIS 9\)"),
+        (Estimate.without(Basis("selfcal"), Status.OK, ""), "a result of selfcal"),
+        (
+            Estimate.without(Basis("aoa"), Status.INCONSISTENT, "mean NIS 9"),
+            r"ended inconsistent \(mean NIS 9\)",
+        ),
         (assemble_paper(made, settings, of_fusion(found, 19), [], None), "holds no coefficients"),
     ):
         save(result, tmp_path / "other.json")
@@ -288,8 +292,8 @@ def test_a_turntable_puts_scales_and_axes_right(tmp_path):
 def test_corrections_are_handed_on_from_run_to_run(tmp_path):
     settings = study(motion=STILL)
     after = put_right(
-        without_parameters(
-            "aoa", Status.OK, "", result={"corrections": {"a1": {"scale": 1.002, "angle_rad": 1e-3}}}
+        Estimate.without(
+            Basis("aoa"), Status.OK, "", result={"corrections": {"a1": {"scale": 1.002, "angle_rad": 1e-3}}}
         ),
         settings,
     )

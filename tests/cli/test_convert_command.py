@@ -27,7 +27,7 @@ def calibration(status=Status.OK):
     """A calibration of counts, each coefficient known to a millionth."""
     return Estimate(
         "calibrate imu", NAMES, ("1",) * 21, VALUES, np.diag((1e-6 * VALUES) ** 2), np.full(21, 30.0),
-        np.full(21, 2.0), status, "made", result={"unit": {"acc": "count", "gyro": "count"}},
+        status, "made", result={"unit": {"acc": "count", "gyro": "count"}},
     )  # fmt: skip
 
 
@@ -222,7 +222,7 @@ def test_a_gyro_that_is_not_calibrated_is_said(folder, capsys):
     save(
         Estimate(
             "calibrate imu", tuple(np.array(NAMES)[acc].tolist()), ("1",) * 9, VALUES[acc],
-            whole.covariance[np.ix_(acc, acc)], whole.dof[acc], whole.k[acc], Status.OK, "made",
+            whole.covariance[np.ix_(acc, acc)], whole.dof[acc], Status.OK, "made",
             result={"unit": {"acc": "count"}},
         ),
         "acc.json",

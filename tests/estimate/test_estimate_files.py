@@ -27,7 +27,6 @@ def example(**more):
         "values": np.array([1e-3, 1.0]),
         "covariance": np.array([[4e-8, 1e-9], [1e-9, 9e-8]]),
         "dof": np.array([12.0, np.inf]),
-        "k": np.array([2.2, 2.0]),
         "status": Status.OK,
         "message": "fine",
         "findings": (Finding("gap", "t: 1 gap", "rows 5-6"),),
@@ -72,7 +71,6 @@ def estimates(draw):
         values=array(finite | st.just(math.nan), p),
         covariance=root @ root.T,
         dof=array(st.floats(1e-3, allow_nan=False), p),
-        k=array(st.floats(1e-3, 1e6) | st.just(math.nan), p),
         status=draw(st.sampled_from(Status)),
         message=draw(st.text()),
         findings=tuple(
@@ -127,7 +125,7 @@ def test_keys_of_the_contract():
     assert list(data["status"]) == ["code", "message"]
     assert [list(p) for p in data["parameters"]] == [["name", "value", "u", "U", "k", "dof", "unit"]] * 2
     assert list(data["covariance"]) == ["names", "matrix"]
-    assert list(data["findings"][0]) == ["code", "message", "where"]
+    assert list(data["findings"][0]) == ["code", "message", "where", "harm"]
     assert list(data["budget"][0]) == ["source", "type", "u", "unit", "share"]
     assert list(data["inputs"][0]) == ["path", "sha256"]
 

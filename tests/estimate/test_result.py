@@ -23,7 +23,6 @@ def estimate(values=(1.0, 2.0), covariance=((0.04, 0.01), (0.01, 0.09)), dof=(5.
         values=np.array(values, dtype=float),
         covariance=np.array(covariance, dtype=float),
         dof=np.array(dof, dtype=float),
-        k=np.array([coverage_factor(nu) for nu in dof]),
         **settings,
     )
 
@@ -60,7 +59,7 @@ def test_intervals_hold_what_they_claim():
     x = rng.normal(10.0, 3.0, (runs, 5))
     for level in (0.5, 0.9, 0.99):
         intervals = (
-            Parameter("x", mean, s / np.sqrt(5), 2.0, 4.0, "m").interval(level)
+            Parameter("x", mean, s / np.sqrt(5), 4.0, "m").interval(level)
             for mean, s in zip(x.mean(axis=1), x.std(axis=1, ddof=1), strict=True)
         )
         held = sum(low <= 10.0 <= high for low, high in intervals)
@@ -180,11 +179,16 @@ def test_raise_for_status(status):
     with pytest.raises(CalibrationError, match=f"{status.value}: poses are missing") as caught:
         result.raise_for_status()
     assert caught.value.estimate is result
+    if status is Status.SUSPECT:
+        assert result.raise_for_status(suspect=True) is result
+    else:
+        with pytest.raises(CalibrationError):
+            result.raise_for_status(suspect=True)
 
 
 def test_every_status_says_what_it_means():
     assert {status.value for status in Status} == {
-        "ok", "ill_conditioned", "not_converged", "inconsistent", "unobservable", "too_few_intervals",
+        "ok", "suspect", "ill_conditioned", "not_converged", "inconsistent", "unobservable", "too_few_intervals",
     }  # fmt: skip
     for status in Status:
         assert len(status.meaning) > 20

@@ -344,9 +344,17 @@ def test_the_temperature_is_that_stated_or_else_that_recorded(noisy):
         "temperature", parse_unit("K"), 295.15 + np.sin(t), t, columns["acc_x"].source
     )
     recorded = calibrated(Record(columns)).conditions["temperature"]
-    assert recorded == f"{22.0 + np.sin(t).mean():.1f} degC"
+    assert recorded == {
+        "value": pytest.approx(22.0 + np.sin(t).mean()),
+        "u": pytest.approx(np.sin(t).std()),
+        "unit": "degC",
+    }
     stated = parse_quantity("20 degC", "temperature", "temperature")
-    assert calibrated(Record(columns), temperature=stated).conditions["temperature"] == "20 degC"
+    assert calibrated(Record(columns), temperature=stated).conditions["temperature"] == {
+        "value": 20.0,
+        "u": 0.0,
+        "unit": "degC",
+    }
     assert calibrated(noisy[0]).conditions["temperature"] is None
 
 

@@ -9,7 +9,8 @@ import pytest
 import stress
 from absurd import laws
 
-from inercal.estimate.result import without_parameters
+from inercal.estimate.basis import Basis
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 
 RUNS, PARTS = 500, 4
@@ -43,7 +44,7 @@ def test_a_run_is_the_same_again():
 def test_the_laws_see_what_is_wrong():
     from dataclasses import replace
 
-    none = without_parameters("test", Status.OK, "sound")
+    none = Estimate.without(Basis("test"), Status.OK, "sound")
     estimate = replace(
         none,
         names=("a",),
@@ -51,7 +52,6 @@ def test_the_laws_see_what_is_wrong():
         values=np.ones(1),
         covariance=np.eye(1),
         dof=np.ones(1),
-        k=np.ones(1),
     )
     assert laws.of_estimate(estimate) == []
     assert laws.of_estimate(replace(estimate, values=np.array([np.nan]))) == ["values is not finite"]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from inercal.estimate.result import without_parameters
+from inercal.estimate.basis import Basis
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.report.sensitivity import _even_grid, _map, interactions, maps
@@ -65,7 +66,7 @@ def study(plan, table="two_axis_turntable", analysis=EXACT, **errors):
 
 def told(analysed):
     """What the command brings back, without its numbers."""
-    return without_parameters("sensitivity", Status.OK, analysed.message)
+    return Estimate.without(Basis("sensitivity"), Status.OK, analysed.message)
 
 
 def page_of(settings):

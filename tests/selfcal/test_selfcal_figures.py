@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from paper_study import ARCSEC, MICRO_G, PER_HOUR, PRIOR, TRUTH, study
 
 import inercal.selfcal.figures as drawn_by
+from inercal.estimate.basis import Basis
 from inercal.estimate.budget import TypeA, combine
-from inercal.estimate.result import Estimate, without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.rotations import exp, multiply, normalize
 from inercal.report import filtering
@@ -82,7 +83,7 @@ def evidence(found=None, status=Status.OK, **changes):
         TypeA("noise", 1.0, "1", 0.7 * covariance, 900.0),
         TypeA("prior", 1.0, "1", 0.3 * covariance, 9e9),
     ]
-    total, dof, budget = combine(names(p), sources)
+    total, dof, budget, _ = combine(names(p), sources)
     estimate = Estimate(
         "selfcal",
         names(p),
@@ -90,7 +91,6 @@ def evidence(found=None, status=Status.OK, **changes):
         to_product(found.coefficients),
         total,
         dof,
-        np.full(p, 2.0),
         status,
         "as it is",
         budget=budget,
@@ -181,7 +181,7 @@ def test_the_attitude_against_the_encoders_turns_from_these_to_the_estimate(monk
     monkeypatch.setattr(
         drawn_by, "attitude_correction", lambda t, rotation, u: told.update(rotation=rotation)
     )
-    none = without_parameters("selfcal", Status.NOT_CONVERGED, "")  # spares the other pictures
+    none = Estimate.without(Basis("selfcal"), Status.NOT_CONVERGED, "")  # spares the other pictures
     found = evidence(filtered("map", innovations=np.zeros((0, 6))), estimate=none)
     read, _ = gimbals(found.recording.th, study().world)
     turned = multiply(read, exp(np.array([5.0 * ARCSEC, 0.0, 0.0])))
@@ -222,7 +222,7 @@ def diverged():
 
 def without_coefficients():
     """A calibration that says why it has none."""
-    none = without_parameters("selfcal", Status.NOT_CONVERGED, "diverged", provenance={"settings": {}})
+    none = Estimate.without(Basis("selfcal", provenance={"settings": {}}), Status.NOT_CONVERGED, "diverged")
     return evidence(diverged(), bounds=evidence().bounds, estimate=none)
 
 
@@ -401,7 +401,7 @@ def judged(name, plan, size, settings):
 
 def told(found):
     """What a command brings back, without its numbers."""
-    return without_parameters("design selfcal", Status.OK, found.message)
+    return Estimate.without(Basis("design selfcal"), Status.OK, found.message)
 
 
 def test_the_page_of_a_design():

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from inercal.estimate.result import rounded, without_parameters
+from inercal.estimate.basis import Basis
+from inercal.estimate.result import Estimate, rounded
 from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.report.html import render
@@ -171,7 +172,7 @@ def test_a_design_on_a_page():
         grid((12, 12)), gyrowheel(), positions=24, criterion="D", compare=("24-position", "6-position")
     )
     designed = design(settings)
-    told = without_parameters("design positions", Status.OK, designed.message)
+    told = Estimate.without(Basis("design positions"), Status.OK, designed.message)
     page = check(design_page(designed, settings, told))
     rows = [
         [re.sub("<.*?>", "", cell) for cell in re.findall("<td.*?>(.*?)</td>", row, re.DOTALL)]

@@ -17,7 +17,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.selfcal.filters.filter_result import History, Problem, State, Trace, known_in
 from inercal.selfcal.filters.gaps import LONG, RECENT, advance, held_rate, usual
 from inercal.selfcal.filters.run import LOCK, recursive
@@ -250,7 +250,7 @@ class Selfcal:
         )
         for k, (due, code, text) in enumerate(alarms):
             if due and not state.said & 1 << k:
-                self._say(Finding(code, text, f"t = {state.t:.10g} s"))
+                self._say(Finding(code, text, f"t = {state.t:.10g} s", EVERYTHING))
                 state = state._replace(said=state.said | 1 << k)
         return state
 

@@ -122,7 +122,13 @@ def design(
     judged = tuple(_judged(name, plan, settings) for name, plan in plans.items())
     lock = float(np.abs(np.cos(found.angles()[:, 1])).min())
     near = (
-        [Finding("gimbal_lock", f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found")]
+        [
+            Finding(
+                "gimbal_lock",
+                f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found",
+                harm=(),
+            )
+        ]
         if lock < LOCK
         else []
     )

@@ -46,7 +46,7 @@ def _fault(
     def without(case: Case, _: Array) -> Case:
         return repaired, case[1]
 
-    harm = () if code in ("gap", "outlier") else EVERYTHING
+    harm = () if code == "gap" else EVERYTHING
     return Hypothesis(
         text,
         code,

@@ -226,5 +226,12 @@ def _harmonic(joint: int, order: int, angle: Array) -> Hypothesis[Case]:
 
     name = f"harmonic {order} of {JOINTS[joint]}"
     return Hypothesis(
-        name, "unmodelled", says, without, ("sin", "cos"), 1e-6, alternatives=LIMITS.harmonic_orders
+        name,
+        "unmodelled",
+        says,
+        without,
+        ("sin", "cos"),
+        1e-6,
+        alternatives=LIMITS.harmonic_orders,
+        harm=EVERYTHING,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.inputs import Source
+from inercal.units import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +32,8 @@ class Recording:
     held : tuple of int
         Steps whose rate was not recorded, and is that of a platform that turns on as before
         (`inercal.selfcal.filters.gaps`).
-    temperature : str or None
-        That was recorded, its mean in words.
+    temperature : Quantity or None
+        That was recorded: its mean and standard deviation.
     """
 
     t: Array
@@ -43,7 +44,7 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     sources: tuple[Source, ...] = ()
     held: tuple[int, ...] = ()
-    temperature: str | None = None
+    temperature: Quantity | None = None
 
     @property
     def dt(self) -> Array:

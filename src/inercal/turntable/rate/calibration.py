@@ -145,7 +145,7 @@ def _excess(fit: RateFit) -> list[Finding]:
         "table explain: what S_nl and S_hyst say is the gyro's own, and the uncertainties are those of the terms over "
         "these rates"
     )
-    return [Finding("excess_scatter", said)]
+    return [Finding("excess_scatter", said, harm=())]
 
 
 def _whole_turns(found: RateDwells, inputs: Sequence[Input]) -> list[Finding]:
