@@ -17,7 +17,7 @@ from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.campaign import campaign
 from inercal.selfcal.filters import quaternion
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.platform.kinematics import attitude
@@ -306,8 +306,7 @@ def test_an_indefinite_covariance():
     recording, given, row = run.recording, replace(given, filter=Filter("svd-qukf")), 900
 
     def advanced(state, rows):
-        parts = recording.dt, recording.rate, recording.acc[1:], recording.th[1:]
-        return quaternion.advance(state, given, *(part[rows] for part in parts), history=False)
+        return quaternion.advance(state, given, recording.steps.part(rows), history=False)
 
     state, trace = advanced(quaternion.initial(given, recording.th[0]), slice(0, row))
     assert trace.lowest_eigenvalue > 0.0

@@ -13,7 +13,7 @@ from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.causes import diagnose
 from inercal.selfcal.diagnosis.small import filtered, likely, search
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.result.outcome import assemble, verdict

@@ -24,7 +24,8 @@ from inercal.selfcal.before.observability import UNOBSERVABLE
 from inercal.selfcal.diagnosis.gross import RISK, Proposal, proposals
 from inercal.selfcal.diagnosis.small import Case, Cause, Found, directions, filtered, likely, regular, search
 from inercal.selfcal.display import shown_unit
-from inercal.selfcal.filters.filter_result import Filtered, Problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.platform.coefficients import names, units
 from inercal.selfcal.platform.recording import Recording
 
@@ -43,15 +44,15 @@ _FAULTS = 4
 
 
 def diagnose(
-    recording: Recording, problem: Problem, found: Filtered, stated: Cause | None = None
+    recording: Recording, problem: FilterProblem, found: FilterResult, stated: Cause | None = None
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
     Parameters
     ----------
     recording : Recording
-    problem : Problem
-    found : Filtered
+    problem : FilterProblem
+    found : FilterResult
         What the estimator of the study made of it; the error-state filter judges the recording itself.
     stated : Cause, optional
         What the study states with an uncertainty: no error within that is named.
@@ -72,7 +73,7 @@ def diagnose(
     return findings
 
 
-def _fair(problem: Problem, moved: Problem, found: Filtered) -> Problem:
+def _fair(problem: FilterProblem, moved: FilterProblem, found: FilterResult) -> FilterProblem:
     """The problem as it may be meant: what is stated ``moved`` to where the recording fits best, and no prior that is
     in the way of what the filter then ``found``."""
     if not found.converged:
@@ -91,7 +92,7 @@ def _most(alternatives: int) -> float:
     return -float(ndtri(0.5 * RISK / alternatives))
 
 
-def _small_errors(case: Case, meant: Problem, stated: Cause | None) -> list[Finding]:
+def _small_errors(case: Case, meant: FilterProblem, stated: Cause | None) -> list[Finding]:
     """What the model leaves out, a prior that is too narrow, and noise that is not what is stated; ``meant`` as of
     `_fair`."""
     recording, problem = case
@@ -107,7 +108,7 @@ def _small_errors(case: Case, meant: Problem, stated: Cause | None) -> list[Find
     return [*(_in_words(each, corrected) for each in errors), *_beyond_prior(now, problem.prior), *rest]
 
 
-def _beyond_prior(found: Filtered, prior: Array) -> list[Finding]:
+def _beyond_prior(found: FilterResult, prior: Array) -> list[Finding]:
     """Coefficients, found without a prior in the way, that the prior [SI] did not expect."""
     if not found.converged:
         return []
@@ -122,12 +123,12 @@ def _beyond_prior(found: Filtered, prior: Array) -> list[Finding]:
     return findings
 
 
-def _white(case: Case, found: Filtered) -> bool:
+def _white(case: Case, found: FilterResult) -> bool:
     """Whether innovations are of the size that is stated and uncorrelated."""
     return _sound(found) and whiteness(regular(case[0], found)) > RISK
 
 
-def _sound(found: Filtered) -> bool:
+def _sound(found: FilterResult) -> bool:
     """Whether a filter agrees with its recording, as a whole and in each row; not where nothing is measured."""
     if not found.converged or not found.dims.any():
         return False
@@ -136,8 +137,8 @@ def _sound(found: Filtered) -> bool:
 
 
 def _without_faults(
-    recording: Recording, problem: Problem, stated: Cause | None
-) -> tuple[Recording, Problem, list[Finding]]:
+    recording: Recording, problem: FilterProblem, stated: Cause | None
+) -> tuple[Recording, FilterProblem, list[Finding]]:
     """The recording without its gross faults, the problem as it may then be meant (`_fair`), and these faults."""
     findings = list[Finding]()
     of = likely(recording, problem, stated)
@@ -163,7 +164,9 @@ def _without_faults(
     return recording, _fair(problem, of, now), findings
 
 
-def _best(tried: Iterable[Proposal], now: Filtered, problem: Problem) -> tuple[Proposal | None, Filtered]:
+def _best(
+    tried: Iterable[Proposal], now: FilterResult, problem: FilterProblem
+) -> tuple[Proposal | None, FilterResult]:
     """The proposal that explains most beyond what chance does, and what the filter then makes of the recording."""
     best, then, least = None, now, _misfit(now)
     for each in tried:
@@ -173,13 +176,13 @@ def _best(tried: Iterable[Proposal], now: Filtered, problem: Problem) -> tuple[P
     return best, then
 
 
-def _misfit(found: Filtered) -> float:
+def _misfit(found: FilterResult) -> float:
     """Sum of the normalised innovations squared; infinite where the filter diverged or nothing is measured."""
     total = float(found.nis[found.dims > 0].sum())
     return total if found.converged and found.dims.any() and math.isfinite(total) else math.inf
 
 
-def _outliers(recording: Recording, problem: Problem, now: Filtered) -> list[Proposal]:
+def _outliers(recording: Recording, problem: FilterProblem, now: FilterResult) -> list[Proposal]:
     """Single readings far from what the filter expects, left out one row after the other: an early one spoils what
     follows."""
     rows = np.zeros(0, dtype=np.int64)
@@ -267,7 +270,7 @@ def _latitude(error: Found, case: Case) -> Finding:
     return Finding("site_suspect", text)
 
 
-def _scatter(case: Case, now: Filtered) -> list[Finding]:
+def _scatter(case: Case, now: FilterResult) -> list[Finding]:
     """Innovations larger or smaller than the stated noise has them, or correlated in time."""
     if not now.converged:
         return [Finding("contradiction", f"the error-state filter fails on this recording: {now.message}")]

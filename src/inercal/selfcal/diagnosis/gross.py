@@ -22,7 +22,7 @@ from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.geometry.rotations import boxminus, conjugate, rotate
 from inercal.records.places import counted, places
-from inercal.selfcal.filters.filter_result import Problem
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
@@ -71,7 +71,7 @@ class Turning:
         return np.asarray(off > 10.0 * self.noise + 0.5 * np.linalg.norm(self.told, axis=1))
 
 
-def turning(recording: Recording, problem: Problem) -> Turning:
+def turning(recording: Recording, problem: FilterProblem) -> Turning:
     """Compare encoders and commands from row to row."""
     q, joints = gimbals(recording.th, problem.world)
     dt = recording.dt[:, None]
@@ -93,7 +93,7 @@ def turning(recording: Recording, problem: Problem) -> Turning:
     )
 
 
-def proposals(recording: Recording, problem: Problem) -> Iterator[Proposal]:
+def proposals(recording: Recording, problem: FilterProblem) -> Iterator[Proposal]:
     """All gross faults that the recording may have."""
     turn = turning(recording, problem)
     yield from _accelerometer_axes(recording, turn)

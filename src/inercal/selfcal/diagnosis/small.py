@@ -21,14 +21,15 @@ from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import boxminus, exp, rotate
 from inercal.selfcal.diagnosis.gross import RISK
-from inercal.selfcal.filters.filter_result import Filtered, Problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
 
-Case = tuple[Recording, Problem]
+Case = tuple[Recording, FilterProblem]
 
 ORDERS = np.arange(1, 65)
 """Periods per turn that an error of an encoder is looked for at."""
@@ -51,7 +52,7 @@ class Cause:
     kind: str
     names: tuple[str, ...]
     step: float
-    corrected: Callable[[Recording, Problem, Array], Case]
+    corrected: Callable[[Recording, FilterProblem, Array], Case]
     alternatives: int = 1
     prior: float = math.inf
 
@@ -65,12 +66,12 @@ class Found:
     u: Array
 
 
-def filtered(case: Case) -> Filtered:
+def filtered(case: Case) -> FilterResult:
     """What the error-state filter makes of a case."""
     return estimate(*case, "error-state")
 
 
-def regular(recording: Recording, found: Filtered) -> Array:
+def regular(recording: Recording, found: FilterResult) -> Array:
     """Normalised innovations (n - 1, 6), NaN near gimbal lock."""
     near = ~(np.abs(np.cos(recording.th[1:, 1])) >= LEAST_COSINE)
     innovations = found.innovations.copy()
@@ -78,7 +79,7 @@ def regular(recording: Recording, found: Filtered) -> Array:
     return innovations
 
 
-def likely(recording: Recording, problem: Problem, stated: Cause | None) -> Problem:
+def likely(recording: Recording, problem: FilterProblem, stated: Cause | None) -> FilterProblem:
     """The problem with what is ``stated`` moved, within its uncertainty, to where the recording fits best.
 
     Where one of it would have to move further than chance takes it, at a risk of `RISK` over all, the recording
@@ -95,13 +96,15 @@ def likely(recording: Recording, problem: Problem, stated: Cause | None) -> Prob
     return _corrected((recording, problem), [fit])[1]
 
 
-def search(recording: Recording, problem: Problem, stated: Cause | None = None) -> tuple[list[Found], Case]:
+def search(
+    recording: Recording, problem: FilterProblem, stated: Cause | None = None
+) -> tuple[list[Found], Case]:
     """Find what the model leaves out, and what is ``stated`` does not explain within its uncertainty.
 
     Returns
     -------
     found : list of `Found`
-    case : (Recording, Problem)
+    case : (Recording, FilterProblem)
         Corrected by all of it.
     """
     causes, base, taken = _causes(problem), (recording, problem), list[Found]()
@@ -218,7 +221,7 @@ def _gain(
     return (after.gained - before) / after.left - chance
 
 
-def _causes(problem: Problem) -> tuple[Cause, ...]:
+def _causes(problem: FilterProblem) -> tuple[Cause, ...]:
     """What may be wrong of the site, the base, the gyros and the clock of the commands."""
     general = (
         Cause("latitude", ("north", "up"), 1e-3 * EARTH_RATE, _other_earth),
@@ -234,17 +237,17 @@ def _causes(problem: Problem) -> tuple[Cause, ...]:
     )
 
 
-def _other_mounting(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_mounting(recording: Recording, problem: FilterProblem, values: Array) -> Case:
     """Sensors turned by gamma [rad] against the axes that the encoders tell of: ``q_bp = q_encoders qexp(gamma)``."""
     turn = exp(values)
     return replace(recording, acc=rotate(turn, recording.acc), rate=rotate(turn, recording.rate)), problem
 
 
-def _other_earth(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_earth(recording: Recording, problem: FilterProblem, values: Array) -> Case:
     """Earth rate with other north and upward parts [rad/s]."""
     north, up = directions(problem.world)
     earth = problem.world.earth + values[0] * north + values[1] * up
-    return recording, replace(problem, world=replace(problem.world, earth=earth))
+    return recording, replace(problem, world=problem.world._replace(earth=earth))
 
 
 def directions(world: World) -> tuple[Array, Array]:
@@ -257,7 +260,7 @@ def directions(world: World) -> tuple[Array, Array]:
     return level / np.linalg.norm(level), up
 
 
-def _delayed(recording: Recording, problem: Problem, values: Array) -> Case:
+def _delayed(recording: Recording, problem: FilterProblem, values: Array) -> Case:
     """Commands that act later by a part of a row."""
     part = float(values[0])
     before = np.vstack([recording.rate[:1], recording.rate[:-1]])
@@ -266,19 +269,19 @@ def _delayed(recording: Recording, problem: Problem, values: Array) -> Case:
     return replace(recording, rate=recording.rate + abs(part) * (other - recording.rate)), problem
 
 
-def _other_base(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_base(recording: Recording, problem: FilterProblem, values: Array) -> Case:
     """A base turned by beta [rad]."""
     q, world = exp(values), problem.world
-    turned = replace(world, earth=rotate(q, world.earth), up=rotate(q, world.up))
+    turned = world._replace(earth=rotate(q, world.earth), up=rotate(q, world.up))
     return recording, replace(problem, world=turned)
 
 
-def _other_scale(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_scale(recording: Recording, problem: FilterProblem, values: Array) -> Case:
     """Gyros with scale errors."""
     return replace(recording, rate=recording.rate * (1.0 + values)), problem
 
 
-def _harmonics(case: Case, now: Filtered, z: Array) -> list[Cause]:
+def _harmonics(case: Case, now: FilterResult, z: Array) -> list[Cause]:
     """Errors periodic in the angle of a joint: of each joint the order that its innovations show most."""
     angles, joints = _found_angles(case, now)
     th = angles[1:]
@@ -296,7 +299,7 @@ def _harmonics(case: Case, now: Filtered, z: Array) -> list[Cause]:
     return causes
 
 
-def _found_angles(case: Case, now: Filtered) -> tuple[Array, Array]:
+def _found_angles(case: Case, now: FilterResult) -> tuple[Array, Array]:
     """Gimbal angles (n, 3) [rad] that the filter found, and the axes (n, 3, 3) of the joints: at rest the angles read
     change with their noise alone, which they would explain."""
     recording, problem = case
@@ -310,7 +313,7 @@ def _harmonic(joint: int, order: int, angle: Array) -> Cause:
     """An error ``a sin(k th) + b cos(k th)`` of an encoder at angles th (n,)."""
     waves = np.stack([np.sin(order * angle), np.cos(order * angle)])
 
-    def corrected(recording: Recording, problem: Problem, values: Array) -> Case:
+    def corrected(recording: Recording, problem: FilterProblem, values: Array) -> Case:
         th = recording.th.copy()
         th[:, joint] -= values @ waves
         return replace(recording, th=th), problem

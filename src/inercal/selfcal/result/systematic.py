@@ -10,7 +10,7 @@ from typing import Any
 
 from inercal.arrays import Array
 from inercal.selfcal.diagnosis.small import Cause
-from inercal.selfcal.filters.filter_result import Problem
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.settings import SelfcalSettings
 
@@ -92,13 +92,15 @@ def stated_errors(settings: SelfcalSettings) -> Cause | None:
         return None
     here = settings.world
 
-    def corrected(recording: Recording, problem: Problem, values: Array) -> tuple[Recording, Problem]:
+    def corrected(
+        recording: Recording, problem: FilterProblem, values: Array
+    ) -> tuple[Recording, FilterProblem]:
         earth, up = problem.world.earth, problem.world.up
         for statement, value in zip(uncertain, values, strict=True):
             if value == 0.0:
                 continue
             there = statement.changed(float(value) * statement.u).world
             earth, up = earth + there.earth - here.earth, up + there.up - here.up
-        return recording, replace(problem, world=replace(problem.world, earth=earth, up=up))
+        return recording, replace(problem, world=problem.world._replace(earth=earth, up=up))
 
     return Cause("stated", tuple(each.name for each in uncertain), 0.1, corrected, prior=1.0)
