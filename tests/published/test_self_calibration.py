@@ -15,7 +15,7 @@ from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import quaternion
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.monte_carlo import campaign
 from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
@@ -305,8 +305,7 @@ def test_an_indefinite_covariance():
     recording, given, row = run.recording, replace(given, filter=Filter("svd-qukf")), 900
 
     def advanced(state, rows):
-        parts = recording.dt, recording.rate, recording.acc[1:], recording.th[1:]
-        return quaternion.advance(state, given, *(part[rows] for part in parts), history=False)
+        return quaternion.advance(state, given, recording.steps.part(rows), history=False)
 
     state, trace = advanced(quaternion.initial(given, recording.th[0]), slice(0, row))
     assert trace.lowest_eigenvalue > 0.0
@@ -441,7 +440,7 @@ def test_earth_rate_in_other_axes_than_gravity():
     """Printed as east-north-up beside a gravity in north-up-east: it cannot have been computed so."""
     world = study().world
     printed = np.array([0.0, world.earth[0], world.earth[1]])
-    found, nis = off(world=replace(world, earth=printed))
+    found, nis = off(world=world._replace(earth=printed))
     assert found > 1000.0
     assert nis > 1000.0
 

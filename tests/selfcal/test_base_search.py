@@ -17,7 +17,7 @@ from inercal.geometry.earth import gravity
 from inercal.geometry.rotations import exp, to_matrix
 from inercal.geometry.site import Site
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA

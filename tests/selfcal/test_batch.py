@@ -22,7 +22,7 @@ from inercal.geometry.rotations import (
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters.batch import _terms, estimate_map, inverse_diagonal
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.residuals import (
     first_reading,
     readings,

@@ -20,7 +20,7 @@ from inercal.selfcal.filters import gimbal
 from inercal.selfcal.filters import multiplicative
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import Filter

@@ -10,7 +10,7 @@ from inercal.findings import Finding
 from inercal.geometry.rotations import exp, rotate
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.settings import Disturbances

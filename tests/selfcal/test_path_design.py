@@ -12,7 +12,7 @@ from inercal.errors import StudyError
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, design, lasting, stated_moves, with_stops
 from inercal.selfcal.before.path_search import LOCK, STARTS, criterion, search
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import Search
 

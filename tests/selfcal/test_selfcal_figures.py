@@ -26,7 +26,8 @@ from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import Designed, Judged
 from inercal.selfcal.display import displayed, of_field
-from inercal.selfcal.filters.filter_result import Filtered, History, Problem
+from inercal.selfcal.filters.filter_result import FilterResult, History
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.monte_carlo import Campaign
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear, to_product, units
@@ -54,7 +55,7 @@ def filtered(kind="error-state", p=18, seed=1, **changes):
     history = History(multiply(q, exp(error)), np.full((n, 3), 0.5 * ARCSEC), course, u)
     innovations = rng.standard_normal((n - 1, 6))
     return replace(
-        Filtered(
+        FilterResult(
             kind=kind,
             coefficients=course[-1],
             covariance=np.diag(u[-1] ** 2),
@@ -97,7 +98,7 @@ def evidence(found=None, status=Status.OK, **changes):
         provenance={"settings": {}},
     )
     bounds = Bounds(names(p), 0.9 * covariance, PRIOR[:p], np.zeros((0, p)))
-    of = Problem(study().world, study().noise, PRIOR[:p])
+    of = FilterProblem(study().world, study().noise, PRIOR[:p])
     return replace(Calibration(estimate, of, recording, found, bounds), **changes)
 
 

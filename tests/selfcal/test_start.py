@@ -10,7 +10,7 @@ from paper_study import ARCSEC, DEG, MICRO_G, PRIOR, TRUTH, study
 from inercal.geometry.rotations import attitude_difference, boxminus, boxplus, normalize
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters.batch import estimate_map
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.residuals import readings
 from inercal.selfcal.filters.start import _along, estimate_lm, wahba
 from inercal.selfcal.platform.coefficients import to_linear

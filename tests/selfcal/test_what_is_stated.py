@@ -14,7 +14,7 @@ from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.diagnosis.fit_quality import filtered
 from inercal.selfcal.diagnosis.small import likely, small_errors
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.result.outcome import assemble, verdict

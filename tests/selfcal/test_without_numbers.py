@@ -15,7 +15,7 @@ from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.observability import singular
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
 from inercal.selfcal.platform.plan import Plan, Turn

@@ -29,7 +29,7 @@ from inercal.report.spectra import of_angle
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from inercal.aoa.fusion.filter_result import Filtered
+    from inercal.aoa.fusion.filter_result import FilterResult
     from inercal.aoa.settings import AoaSettings
     from inercal.aoa.task import Measurement
 
@@ -312,7 +312,7 @@ def _lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[
     ]
 
 
-def _flexure(seen: Measurement, found: Filtered, settings: AoaSettings, marks: Marks) -> list[Picture]:
+def _flexure(seen: Measurement, found: FilterResult, settings: AoaSettings, marks: Marks) -> list[Picture]:
     """The sting's flexure as it was estimated; nothing where it is not."""
     names, prior = seen.problem.names, settings.prior
     if "flexure_z" not in names or len(found.kept_t) < 2:
@@ -338,7 +338,7 @@ def _flexure(seen: Measurement, found: Filtered, settings: AoaSettings, marks: M
     ]
 
 
-def _learned(seen: Measurement, found: Filtered) -> list[Picture]:
+def _learned(seen: Measurement, found: FilterResult) -> list[Picture]:
     """Biases, lever arms, heights and scale: at the end against their priors, and over time."""
     problem, t = seen.problem, found.kept_t
     if len(t) < 2:

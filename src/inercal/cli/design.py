@@ -87,7 +87,7 @@ def design_selfcal(
     from inercal._jit import compiling
     from inercal.selfcal.before.bounds import bounds
     from inercal.selfcal.before.path_design import REFERENCES, design
-    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.platform.plan import Plan, Rest, motion
     from inercal.studies.load import load_selfcal_study
 

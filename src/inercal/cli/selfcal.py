@@ -134,7 +134,7 @@ def _live(
 ) -> None:
     """Calibrate row by row."""
     from inercal._jit import compiling
-    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.find_base import stated_well
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
     from inercal.studies.load import load_selfcal_study

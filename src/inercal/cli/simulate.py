@@ -111,7 +111,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
     from inercal._jit import compiling
     from inercal.findings import Status
     from inercal.records.read import source_of
-    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.filters.run import load_kernels
     from inercal.selfcal.monte_carlo import REFERENCES, campaign
     from inercal.studies.load import load_selfcal_study

@@ -15,7 +15,7 @@ from inercal.report.histories import Course, Line, converging, falling, lines_by
 from inercal.report.html import Picture, page, render
 from inercal.report.selfcal import attitude_correction, attitude_errors, bounds_beside, filters_apart
 from inercal.selfcal.display import displayed, of_field, shown_unit
-from inercal.selfcal.filters.filter_result import found
+from inercal.selfcal.filters.filter_result import product_form
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
 from inercal.selfcal.platform.rig import JOINTS
@@ -26,7 +26,7 @@ from inercal.selfcal.task import compared
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.selfcal.before.path_design import Designed
-    from inercal.selfcal.filters.filter_result import Filtered, History
+    from inercal.selfcal.filters.filter_result import FilterResult, History
     from inercal.selfcal.monte_carlo import Campaign
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.selfcal.task import Calibration
@@ -97,9 +97,9 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     filters = _all(calibration)
     if len(filters) < 2:
         return []
-    values, u = found(calibration.filtered)
+    values, u = product_form(calibration.filtered)
     apart = {
-        kind: (found(each)[0] - values) / u
+        kind: (product_form(each)[0] - values) / u
         for kind, each in filters.items()
         if kind != calibration.filtered.kind
     }
@@ -303,6 +303,6 @@ def _bounds(calibration: Calibration, settings: SelfcalSettings) -> Picture:
     )
 
 
-def _all(calibration: Calibration) -> Mapping[str, Filtered]:
+def _all(calibration: Calibration) -> Mapping[str, FilterResult]:
     """Every filter that ran, the one that counts first."""
     return {calibration.filtered.kind: calibration.filtered} | dict(calibration.compared)

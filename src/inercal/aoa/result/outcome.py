@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, Filtered
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reference.corrections import as_stated, told
@@ -79,8 +79,8 @@ _OF_FUSION = (
 def assemble(
     recording: Recording,
     settings: AoaSettings,
-    problem: Problem,
-    filtered: Filtered,
+    problem: FilterProblem,
+    filtered: FilterResult,
     findings: Sequence[Finding],
     delay: Delay | None,
     points: Iterable[Point] = (),
@@ -96,8 +96,8 @@ def assemble(
     recording : Recording
         As it was filtered.
     settings : AoaSettings
-    problem : Problem
-    filtered : Filtered
+    problem : FilterProblem
+    filtered : FilterResult
     findings : sequence of Finding
         Of plausibility and diagnosis, beside those of the recording.
     delay : Delay or None

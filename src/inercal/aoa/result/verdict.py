@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, Filtered
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
@@ -39,7 +39,7 @@ _BLIND = 0.1
 
 
 def of_fusion(
-    recording: Recording, filtered: Filtered, angles: Angles, said: Sequence[Finding]
+    recording: Recording, filtered: FilterResult, angles: Angles, said: Sequence[Finding]
 ) -> tuple[Status, str]:
     """Status and sentence of what the fusion found; ``said`` all findings.
 
@@ -96,7 +96,7 @@ def is_covariance(P: Array) -> bool:
     return bool(np.isfinite(correlation).all() and np.linalg.eigvalsh(correlation)[0] >= NEGATIVE)
 
 
-def _lost(recording: Recording, filtered: Filtered) -> str | None:
+def _lost(recording: Recording, filtered: FilterResult) -> str | None:
     """That a filter lost the angle too often, in words; None where it did not."""
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
     losses = [
@@ -129,7 +129,7 @@ def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
     return Finding("at_prior", text)
 
 
-def shaken(problem: Problem, filtered: Filtered, settings: AoaSettings) -> Finding | None:
+def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings) -> Finding | None:
     """That the sting shakes the model, where it does."""
     at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
     if not at or not len(filtered.kept_t):

@@ -14,7 +14,7 @@ from inercal.findings import Finding
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, Bounds, bounds
 from inercal.selfcal.before.observability import Seen, seen
 from inercal.selfcal.before.path_search import LOCK, criterion, search
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import SelfcalSettings
 

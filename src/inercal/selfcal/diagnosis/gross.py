@@ -136,7 +136,7 @@ def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: s
     if misfit < LIMITS.rough_misfit:
         return []
     for other in _other_gimbals(settings.gimbals):
-        tried = replace(world, axes=other.index, signs=other.sign)
+        tried = world._replace(axes=other.index, signs=other.sign)
         if _misfit(motion.turned(tried), commanded, noise) < LIMITS.rough_fit:
             code = "sign_suspect" if other.axes == settings.gimbals.axes else "channel_swap"
             text = f"th: the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"

@@ -13,13 +13,13 @@ from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, white
-from inercal.selfcal.filters.filter_result import Filtered
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 
 _SENSORS = ("accelerometers", "encoders")
 
 
-def misstated(case: Case, now: Filtered) -> list[Finding]:
+def misstated(case: Case, now: FilterResult) -> list[Finding]:
     """Innovations larger or smaller than the stated noise has them, or correlated in time."""
     if not now.converged:
         text = f"the error-state filter fails on this recording: {now.message}"

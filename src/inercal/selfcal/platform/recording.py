@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,20 @@ from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.inputs import Source
 from inercal.units import Quantity
+
+
+class Steps(NamedTuple):
+    """Rates and measurements of m steps, as kernels take them: ``dt`` (m,) [s]; ``rate`` (m, 3) [rad/s], held over each
+    step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not."""
+
+    dt: Array
+    rate: Array
+    acc: Array
+    th: Array
+
+    def part(self, steps: slice) -> Steps:
+        """Some of the steps."""
+        return Steps(self.dt[steps], self.rate[steps], self.acc[steps], self.th[steps])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +65,11 @@ class Recording:
     def dt(self) -> Array:
         """(n - 1,) s, from each row to the next."""
         return np.diff(self.t)
+
+    @property
+    def steps(self) -> Steps:
+        """The n - 1 steps from row to row."""
+        return Steps(self.dt, self.rate, self.acc[1:], self.th[1:])
 
     @property
     def scalars(self) -> int:

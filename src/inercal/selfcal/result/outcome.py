@@ -21,7 +21,8 @@ from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE, Seen, s
 from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
 from inercal.selfcal.display import shown_unit
-from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import LOCK
 from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
@@ -78,7 +79,7 @@ _BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
 def assemble(
     recording: Recording,
     settings: SelfcalSettings,
-    filtered: Filtered,
+    filtered: FilterResult,
     bounds: Bounds,
     findings: Sequence[Finding] = (),
 ) -> Estimate:
@@ -88,7 +89,7 @@ def assemble(
     ----------
     recording : Recording
     settings : SelfcalSettings
-    filtered : Filtered
+    filtered : FilterResult
     bounds : Bounds
         Along the path as it was estimated, with ``contributions``.
     findings : sequence of Finding
@@ -184,7 +185,7 @@ def assemble(
 
 
 def verdict(
-    filtered: Filtered, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
+    filtered: FilterResult, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
 ) -> tuple[Status, str]:
     """Status of what an estimator found, and its sentence, without all that an estimate holds: for comparisons."""
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
@@ -324,13 +325,13 @@ def _taken_as_exact(words: Mapping[str, str]) -> list[Finding]:
     return [Finding("stated_exact", text)]
 
 
-def _scalars(filtered: Filtered) -> int:
+def _scalars(filtered: FilterResult) -> int:
     """Number of scalar measurements used."""
     known = np.isfinite(filtered.innovations)
     return int(known.sum() if len(known) else filtered.dims.sum())
 
 
-def _rms(filtered: Filtered) -> float:
+def _rms(filtered: FilterResult) -> float:
     """Root mean square of the normalised innovations; 1 where all is well."""
     count = float(filtered.dims.sum())
     return math.sqrt(float(np.nansum(filtered.nis)) / count) if count else math.nan
