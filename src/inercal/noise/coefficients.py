@@ -221,9 +221,9 @@ def _uncertain(
 
 def _findings(span: tuple[float, float], cut: bool, inflation: float) -> list[Finding]:
     """What is to be said of a fit."""
-    found = []
+    findings = []
     if cut:
-        found.append(
+        findings.append(
             Finding(
                 "noise_misfit",
                 f"means shorter than {span[0]:.3g} s were left out of the fit: their noise is not N, B, K, R, Q "
@@ -231,11 +231,11 @@ def _findings(span: tuple[float, float], cut: bool, inflation: float) -> list[Fi
             )
         )
     if inflation > 1.0:
-        found.append(
+        findings.append(
             Finding(
                 "noise_misfit",
                 "the Allan deviation is not that of N, B, K, R, Q: its residuals are "
                 f"{np.sqrt(inflation):.2g} times what chance explains, and the uncertainties are enlarged by that",
             )
         )
-    return found
+    return findings

@@ -137,8 +137,8 @@ def pair_sums(n: int, m: int, other: int) -> tuple[Array, Array]:
 @lru_cache(maxsize=16)
 def _offsets(last: int) -> Integers:
     """Distances 0, 1, 2, ... from a kink, further apart the further away, up to ``last``."""
-    found, d = [], 0
+    offsets, d = [], 0
     while d <= last:
-        found.append(d)
+        offsets.append(d)
         d += max(1, int(_SPACING * d))
-    return np.array(found)
+    return np.array(offsets)

@@ -58,8 +58,8 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
     """
     free = np.array([each is None for each in noise])
     low = 2.0 * np.log(floor)
-    stated = np.array([1.0 if each is None else each for each in noise])
-    start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), stated), floor))
+    std = np.array([1.0 if each is None else each for each in noise])
+    start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), std), floor))
     dof = np.full(len(free), np.inf)
     if not free.any():
         return Scatter(np.exp(0.5 * start), dof)

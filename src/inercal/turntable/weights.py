@@ -86,8 +86,8 @@ def least_noise(within: Array) -> Array:
 
 def beside_inputs(model: TableModel, angles: Array, c: Array) -> Array:
     """Change (n, c, b) of the readings by one standard uncertainty of each input beside the table."""
-    found, columns = model.beside(angles, c)
-    return np.asarray(columns * np.array([each.u for each in found]))
+    inputs, columns = model.beside(angles, c)
+    return np.asarray(columns * np.array([each.u for each in inputs]))
 
 
 def weights_of(

@@ -148,6 +148,8 @@ def _restricted(columns: Array, prior: Array, t: Array, white: Array, walk: Arra
     own = gram[:-1, :-1] + np.eye(len(prior))
     length = np.sqrt(np.diag(own))
     factor = np.linalg.cholesky(own / np.outer(length, length) + 1e-12 * np.eye(len(prior)))
-    told = np.linalg.solve(factor, right / length)
+    projected = np.linalg.solve(factor, right / length)
     volume = 2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(length).sum()
-    return -0.5 * float(np.log(done.size[1:]).sum() + volume + gram[-1, -1] + prior @ prior - told @ told)
+    return -0.5 * float(
+        np.log(done.size[1:]).sum() + volume + gram[-1, -1] + prior @ prior - projected @ projected
+    )

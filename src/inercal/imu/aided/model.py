@@ -118,22 +118,22 @@ class Side:
         return self.rate_errors + np.cross(rate[:, :, None], self.errors, axis=1)
 
 
-def side_of(blocks: Blocks, motion: Motion, rests: Array, known: Unknowns) -> Side:
+def side_of(blocks: Blocks, motion: Motion, rests: Array, layout: Unknowns) -> Side:
     """Prepare a triad."""
     at = {
         k: _turns(motion, t, rests)
         for k, t in enumerate((blocks.nodes[:, 0], blocks.middle, blocks.nodes[:, -1]))
     }
-    names = [error.name for error in motion.chain.errors if error.name in known.places]
-    places = np.concatenate([known.places[name] for name in names]) if names else np.zeros(0, dtype=np.int64)
+    names = [error.name for error in motion.chain.errors if error.name in layout.places]
+    places = np.concatenate([layout.places[name] for name in names]) if names else np.zeros(0, dtype=np.int64)
     change = (at[2] - at[0]) / blocks.length[:, None, None]
     return Side(blocks.triad.sensor, blocks, at[1], change, places)
 
 
 def _turns(motion: Motion, t: Array, rests: Array) -> Array:
     """(n, 3, Q): turn of the instrument by unit errors at times t."""
-    found = [nodes.slopes[:, :, None] * nodes.hats[:, None, :] for nodes in error_nodes(motion, t, rests)]
-    return np.concatenate(found, axis=-1) if found else np.zeros((len(t), 3, 0))
+    parts = [nodes.slopes[:, :, None] * nodes.hats[:, None, :] for nodes in error_nodes(motion, t, rests)]
+    return np.concatenate(parts, axis=-1) if parts else np.zeros((len(t), 3, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +145,9 @@ class Equation:
     residual: Array
 
 
-def equations(side: Side, ref: Reference, known: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
+def equations(side: Side, ref: Reference, layout: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
     """The three sensors of a triad at unknowns ``x`` (P,)."""
-    places = known.places
+    places = layout.places
     B = x[places[f"gain {side.sensor}"]].reshape(3, 3)
     force = gravity * ref.C_bn[:, :, 2]
     if side.sensor == "acc":

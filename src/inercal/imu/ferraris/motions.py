@@ -175,8 +175,8 @@ def _edges(
         inner = [rest for rest in rests if pause.start <= rest.start and rest.stop <= pause.stop]
         pauses += [each for each in inner or [pause] if each.start > 0 and each.stop < len(t)]
     rows = np.array([(t[pause.start], t[pause.stop - 1]) for pause in pauses]).reshape(-1, 2)
-    found = stretch.start + np.searchsorted(acc.t[stretch.start : stretch.stop], rows)
-    spans = [(int(a), int(b) + 1) for a, b in found]
+    ends = stretch.start + np.searchsorted(acc.t[stretch.start : stretch.stop], rows)
+    spans = [(int(a), int(b) + 1) for a, b in ends]
     return [stretch.start, *((a + b) // 2 for a, b in spans), stretch.stop], spans
 
 

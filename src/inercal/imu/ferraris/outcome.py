@@ -64,7 +64,7 @@ def assemble(
     covariance, dof, budget = combine(NAMES, [*from_data, *known])
     residual = np.sum([source.covariance for source in from_data], axis=0)
     status, message = verdict(readings, scatter, against, options)
-    gain = np.abs(np.diag(errors.found.force_gain))
+    gain = np.abs(np.diag(errors.solution.force_gain))
     left = scatter.left["acc"] / gain
     return Estimate(
         command=COMMAND,

@@ -139,5 +139,5 @@ def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) ->
         end = "beginning" if edges[0] == max(edges) else "end"
         code = "poor_section" if max(edges) > LIMITS.lost_rate * largest else "turn_cut"
         part = f"{100 * max(edges) / largest:.0f} % of its largest rate"
-        said = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
-        yield Finding(code, said, where)
+        text = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
+        yield Finding(code, text, where)

@@ -29,14 +29,14 @@ class Propagation:
     """Readings and matrices with the derivatives ``by`` (33, *shape) of the coefficients, by input."""
 
     readings: Readings
-    found: Matrices
+    solution: Matrices
     scatter: Scatter
     by: dict[str, Array]
 
 
-def propagation(readings: Readings, found: Matrices, scatter: Scatter) -> Propagation:
+def propagation(readings: Readings, solution: Matrices, scatter: Scatter) -> Propagation:
     """Take the derivatives."""
-    return Propagation(readings, found, scatter, derivatives(readings.inputs, readings.weights))
+    return Propagation(readings, solution, scatter, derivatives(readings.inputs, readings.weights))
 
 
 def type_a(p: Propagation, acc_unit: str, gyro_unit: str) -> list[TypeA]:
@@ -86,15 +86,18 @@ def alignment(p: Propagation, tilt: float) -> Array:
     The last ten columns are of second order, and so hold a factor ``tilt``: the mean of (d1^2 + d2^2)/2 over all, which
     is tilt^2, and its standard deviation of each, which is the same.
     """
-    x, found = p.readings.inputs, p.found
+    x, solution = p.readings.inputs, p.solution
     first, second = [], []
     for k, j in enumerate(_AXIS):
-        to_force, to_rate = p.by["force"][:, k] @ found.force_gain, p.by["rate"][:, k] @ found.apparent_g
+        to_force, to_rate = (
+            p.by["force"][:, k] @ solution.force_gain,
+            p.by["rate"][:, k] @ solution.apparent_g,
+        )
         both = float(x.gravity) * (to_force + to_rate)
         first += [both[:, d] for d in range(3) if d != j]
         second.append(-both @ UP[k])
     for k in range(3):
-        turned = p.by["turned_rate"][:, k] @ found.rate_gain * float(x.angles[k] / x.durations[k])
+        turned = p.by["turned_rate"][:, k] @ solution.rate_gain * float(x.angles[k] / x.durations[k])
         first += [turned[:, d] for d in range(3) if d != k]
         second.append(-turned[:, k])
     return np.column_stack([*first, tilt * np.sum(second, axis=0), *(tilt * each for each in second)])
@@ -141,10 +144,10 @@ def _horizontal_earth_rate(p: Propagation) -> Array:
     """(33, 18): by either horizontal component in each position and turn, the heading of each unknown."""
     columns = []
     for k, j in enumerate(_AXIS):
-        at_rest = p.by["rate"][:, k] @ p.found.rate_gain
+        at_rest = p.by["rate"][:, k] @ p.solution.rate_gain
         columns += [at_rest[:, d] for d in range(3) if d != j]
     for k, (cosine, sine) in enumerate(p.readings.swing):
-        turned = p.by["turned_rate"][:, k] @ p.found.rate_gain
+        turned = p.by["turned_rate"][:, k] @ p.solution.rate_gain
         a, b = turned[:, (k + 1) % 3], turned[:, (k + 2) % 3]
         columns += [cosine * a - sine * b, sine * a + cosine * b]
     return np.column_stack(columns)
@@ -174,5 +177,5 @@ def _unequal_holds(p: Propagation) -> list[TypeB]:
     size = float(np.linalg.norm(mean))
     if size == 0.0:
         return []
-    shift = p.by["rate"].sum(axis=1) @ p.found.apparent_g @ mean / size
+    shift = p.by["rate"].sum(axis=1) @ p.solution.apparent_g @ mean / size
     return [TypeB("unequal holds", size, "m/s^2", shift, redrawn=True)]

@@ -153,8 +153,8 @@ def fit_gyro(
         theta = x[:p]
         spread = np.tile(np.maximum(static.scatter, finest), len(f))
         vertical_error = _vertical_errors(part, verticals, size, theta) @ force_error
-        known = scatter**2 * vertical_error @ vertical_error.T
-        weigh = np.linalg.inv(np.linalg.cholesky(known + walk2 * np.diag(durations)))
+        by_verticals = scatter**2 * vertical_error @ vertical_error.T
+        weigh = np.linalg.inv(np.linalg.cholesky(by_verticals + walk2 * np.diag(durations)))
         unknown = unknown_rates(part, verticals, *unpack(theta), earth)
         x = np.concatenate([theta, np.zeros(len(unknown.sizes))])
 
@@ -167,7 +167,7 @@ def fit_gyro(
         by_earth = unknown.output(model, x[p:])
         static = regress_static(means - by_earth, drivers.at_rest)
         dof = max(1.0, 2.0 * len(turns) - _absorbed(fit, len(weigh)))
-        walk2 = _excess(left, known, durations, dof)
+        walk2 = _excess(left, by_verticals, durations, dof)
 
     gain = fit.gain()[:p]
     m, n = len(weigh), len(spread)
@@ -291,7 +291,7 @@ def _absorbed(fit: NonlinearFit, rows: int) -> float:
     return float(np.sum((J @ fit.unit_covariance) * J))
 
 
-def _excess(miss: Array, known: Array, durations: Array, dof: float) -> float:
+def _excess(miss: Array, by_verticals: Array, durations: Array, dof: float) -> float:
     """Variance per second that brings the weighted sum of squares of ``miss`` down to ``dof``.
 
     Mandel and Paule's rule (Anal. Chem. 42 (1970) 1194) with a variance proportional to the duration; not
@@ -300,7 +300,7 @@ def _excess(miss: Array, known: Array, durations: Array, dof: float) -> float:
     root = np.sqrt(durations)
     floor = 1e-6 * float(miss @ miss) / float(np.sum(durations)) + 1e-24
     # in the eigenvectors of the known part, per second, the covariance is diagonal for every variance
-    values, vectors = np.linalg.eigh(known / np.outer(root, root))
+    values, vectors = np.linalg.eigh(by_verticals / np.outer(root, root))
     parts = (vectors.T @ (miss / root)) ** 2
 
     def surplus(variance: float) -> float:

@@ -49,11 +49,13 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
     where = temperature.source.path
     if not channels:
         raise RecordError(where, f"found {', '.join(record.columns)}, expected acc_x.., gyro_x.. to fit")
-    known = temperature.si()
-    known = known[np.isfinite(known)]
-    if len(known) < 2 * PARTS:
-        raise RecordError(where, f"found {counted(len(known), 'temperature')}, expected at least {2 * PARTS}")
-    low, high = float(known.min()), float(known.max())
+    finite = temperature.si()
+    finite = finite[np.isfinite(finite)]
+    if len(finite) < 2 * PARTS:
+        raise RecordError(
+            where, f"found {counted(len(finite), 'temperature')}, expected at least {2 * PARTS}"
+        )
+    low, high = float(finite.min()), float(finite.max())
     if high - low < LIMITS.temperature_span:
         return TemperatureModel(no_span(low, high, record.sources, record.findings))
     live = [channel for channel in channels if not is_dead(channel.values)]
@@ -116,8 +118,8 @@ def _apart(T: Array, y: Array, risk: float) -> tuple[float, bool]:
     times: list[Array] = []
     for part in passes:
         order = part[np.argsort(at[part])]
-        for drawn, of in ((values, means), (times, np.arange(float(PARTS)))):
-            drawn.append(np.interp(grid, at[order], of[order], left=np.nan, right=np.nan))
+        for curves, of in ((values, means), (times, np.arange(float(PARTS)))):
+            curves.append(np.interp(grid, at[order], of[order], left=np.nan, right=np.nan))
     bends = [np.diff(means[part], 2) ** 2 for part in passes]
     # of a step: by the median, for the ends of the passes are no noise
     step = np.sqrt(np.median(np.concatenate(bends)) / _MEDIAN_OF_A_SQUARE / 2.0) if passes else 0.0

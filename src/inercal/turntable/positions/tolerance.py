@@ -26,12 +26,12 @@ def shifts(fit: Regression) -> tuple[Array, ...]:
 
     q is 1 for a constant error, and the number of positions for one that is redrawn there.
     """
-    chain, found = fit.model.chain, []
+    chain, by_error = fit.model.chain, []
     slopes = averaged(chain, fit.slopes, fit.samples)
     for k, error in enumerate(chain.errors):
         each = np.einsum("pnc,nc->pn", fit.gain, slopes[..., k]) * error.distribution.std
-        found.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
-    return tuple(found)
+        by_error.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
+    return tuple(by_error)
 
 
 def coefficient_shares(fit: Regression, slope: Array) -> dict[str, dict[str, float]]:
@@ -40,8 +40,8 @@ def coefficient_shares(fit: Regression, slope: Array) -> dict[str, dict[str, flo
     ``slope`` (p, p) derivatives of the terms with respect to the linear coefficients. The shares of a term sum
     to one; a term that the table does not touch has none.
     """
-    found = [np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)]
-    parts = np.array(found).reshape(-1, len(fit.c))
+    variances = [np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)]
+    parts = np.array(variances).reshape(-1, len(fit.c))
     return {symbol: _shares(fit.model.chain, parts[:, j]) for j, symbol in enumerate(fit.model.symbols)}
 
 
