@@ -1,4 +1,4 @@
-# The two commands a newcomer needs: `make demo` and `make test`. Each makes its own environment.
+# The commands a newcomer needs: `make demo`, and `make quick` and `make test`. Each makes its own environment.
 PYTHON ?= python3
 RUN := .venv/run/bin
 DEV := .venv/dev/bin
@@ -7,7 +7,7 @@ DEMO := build/demo
 # Where it is set, each of the many processes of the tests would parse every module again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test coverage docs bench lock clean
+.PHONY: demo quick test campaign coverage docs bench lock clean
 
 demo: .venv/run/installed
 	rm -rf $(DEMO)
@@ -16,16 +16,26 @@ demo: .venv/run/installed
 	    --map $(DEMO)/xsens-map.toml --study $(DEMO)/xsens.toml \
 	    --out $(DEMO)/calibration.json --report $(DEMO)/report.html
 
+# Under a minute: lint, types beside the tests, and of these what is near the change (tests/quick.py).
+quick: .venv/dev/installed
+	$(DEV)/ruff format --check --quiet .
+	$(DEV)/ruff check --quiet .
+	@$(DEV)/mypy & types=$$!; $(DEV)/python tests/quick.py; tests=$$?; wait $$types && exit $$tests
+
 test: .venv/dev/installed
 	$(DEV)/ruff format --check .
 	$(DEV)/ruff check .
 	$(DEV)/mypy
-	$(DEV)/python -m pytest -n 2 --dist worksteal
+	$(DEV)/python -m pytest -n 2 --dist worksteal -m "not campaign" --slow-rule
+
+# The full numbers of runs, of which `make test` has short versions.
+campaign: .venv/dev/installed
+	$(DEV)/python -m pytest -n 2 --dist worksteal -m campaign
 
 # Compiled lines cannot be counted: short tests of kernels run once more with kernels as plain Python.
 coverage: .venv/dev/installed
 	rm -rf build/coverage
-	$(DEV)/coverage run -m pytest -n 2 --dist worksteal
+	$(DEV)/coverage run -m pytest -n 2 --dist worksteal -m "not campaign"
 	NUMBA_DISABLE_JIT=1 $(DEV)/coverage run -m pytest -n 2 --dist worksteal -m kernels
 	$(DEV)/coverage combine --quiet
 	$(DEV)/coverage report

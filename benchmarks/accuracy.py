@@ -17,7 +17,7 @@ from measure import Row, alone, in_turn, row, spread
 from sting_bands import FIGURES, FILTERS, PAPER, UPPER, errors_of, judged
 
 from inercal.examples import FOLDER
-from inercal.selfcal.campaign import campaign
+from inercal.selfcal.monte_carlo import campaign
 from inercal.studies.load import load_selfcal_study
 
 SEED = 20261121

@@ -14,12 +14,12 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from campaigns import aided, ferraris
+from campaigns import imu as by_hand
+
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import Processes, run
-from inercal.imu import campaign as by_hand
-from inercal.imu.aided import campaign as aided
 from inercal.imu.aided.coefficients import names_of
-from inercal.imu.ferraris import campaign as ferraris
 from inercal.imu.ferraris.method import NAMES
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 

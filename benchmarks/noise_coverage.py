@@ -13,12 +13,12 @@ from functools import partial
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from campaigns.noise import MIXES, one_recording
 from scipy import stats
 
 from inercal.estimate.result import coverage_factor
 from inercal.estimate.runs import Processes, run
 from inercal.instruments.noise import SYMBOLS
-from inercal.noise.campaign import MIXES, one_recording
 
 SEED, LEVEL = 20261121, 0.95
 

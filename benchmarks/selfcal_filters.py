@@ -33,6 +33,7 @@ OURS = {
     "svd-qukf, SVD": (Filter("svd-qukf", factor="svd"), EIGEN, {}),
     "mukf": (Filter("mukf"), CHOLESKY, {}),
     "gimbal-ukf": (Filter("gimbal-ukf"), CHOLESKY, {}),
+    "gimbal-ukf, Euler": (Filter("gimbal-ukf", integration="euler"), CHOLESKY, {}),
     "error-state": (Filter("error-state"), CHOLESKY, {"at_least": 150.0}),
 }
 

@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from inercal.estimate.coverage import coverage, nees
 from inercal.estimate.runs import Processes, run
 from inercal.instruments.by_angle import EXTRA, channel_model
-from inercal.turntable.campaign import (
+from inercal.validate.gyrowheel import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )

@@ -1,6 +1,95 @@
-"""What holds for all tests."""
+"""What holds for all tests: none of them judges speed, and what takes long is marked so."""
 
+import os
 import signal
+import sys
+import time
+
+import pytest
+from hypothesis import settings
+
+LIMIT = 2.0
+"""Processor time that a test may take without the mark `slow` or `campaign` [s], on a machine of `YARDSTICK`."""
+
+YARDSTICK = 0.05
+"""Processor time of `yardstick` where the marks were set [s]."""
 
 # A shell that starts the tests behind its back (&) has them ignore interrupts, and all programs they start, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--slow-rule", action="store_true", help=f"unmarked tests over {LIMIT:g} s fail")
+    parser.addoption("--within", type=float, metavar="SECONDS", help="begin no test after that time")
+
+
+def processor():
+    """Processor time of this process and of those that it has waited for [s]."""
+    return sum(os.times()[:4])
+
+
+def yardstick():
+    """Processor time of a fixed piece of work just now [s]: a slow or crowded machine is given more time."""
+    began = time.process_time()
+    sum(k * k for k in range(1_000_000))
+    return time.process_time() - began
+
+
+def compiled_since(moment):
+    """True if any process has compiled a kernel since."""
+    from inercal._jit import cache_folder
+
+    folder = cache_folder()
+    return folder is None or any(path.stat().st_mtime >= moment for path in folder.rglob("*"))
+
+
+def timed(item, what):
+    """Run one phase of a test; it fails if it takes too long, unless it had to compile or import first."""
+    began, moment, modules = processor(), time.time(), len(sys.modules)
+    outcome = yield
+    marked = item.get_closest_marker("slow") or item.get_closest_marker("campaign")
+    if item.config.getoption("slow_rule") and not marked:
+        taken = processor() - began
+        cold = len(sys.modules) > modules + 20 or compiled_since(moment) if taken > LIMIT else True
+        if not cold and taken > LIMIT * max(1.0, yardstick() / YARDSTICK):
+            pytest.fail(
+                f"{what} took {taken:.1f} s, expected at most {LIMIT:g} s or the mark slow", pytrace=False
+            )
+    return outcome
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item):
+    return (yield from timed(item, "a fixture"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    return (yield from timed(item, "the test"))
+
+
+def pytest_configure(config):
+    config.began, config.asked = time.monotonic(), 0
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item):
+    """Pass over a test when the time is up, without a word for each."""
+    within = item.config.getoption("within")
+    return True if within is not None and time.monotonic() - item.config.began > within else None
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_node_collection_finished(node, ids):
+    node.config.asked = len(ids)
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """How many tests the time was too short for."""
+    ended = ("passed", "failed", "error", "skipped", "xfailed")
+    ran = sum(len(terminalreporter.stats.get(how, ())) for how in ended)
+    if config.getoption("within") is not None and ran < config.asked:
+        terminalreporter.write_line(f"{config.asked - ran} of {config.asked} tests are left to `make test`")

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = [
     {"arrays", "errors", "inputs"},
     {"findings", "units"},
-    {"_jit", "_files", "_toml"},
+    {"_jit", "_files", "_toml", "keys"},
     {"geometry"},
     {"instruments"},
     {"records"},
@@ -149,17 +149,18 @@ def test_no_circles():
 WITHIN = {
     "imu": (
         "limits recording turns aided_settings ferraris_settings settings simulate multiposition ferraris aided "
-        "temperature campaign task"
+        "temperature task"
     ),
     "turntable": (
-        "limits settings model weights noise regression readings display sensitivity positions rate task campaign "
+        "limits settings model weights noise regression readings display sensitivity positions rate task "
         "figures"
     ),
     "aoa": (
-        "layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task figures"
+        "limits layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task "
+        "figures"
     ),
     "selfcal": (
-        "platform display settings filters before diagnosis find_base campaign reading result task figures"
+        "limits platform display settings filters before diagnosis find_base monte_carlo reading result task figures"
     ),
 }
 

@@ -18,7 +18,6 @@ from inercal.estimate import runs
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "benchmarks"
-sys.path.insert(0, str(FOLDER))
 measure, bench, scaling = (importlib.import_module(name) for name in ("measure", "run", "scaling"))
 
 PAGE = ROOT / "docs" / "design" / "benchmarks.md"

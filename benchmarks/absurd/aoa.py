@@ -25,7 +25,7 @@ _NOISE = {
 }
 
 SEARCH = {
-    "inercal.aoa.diagnosis.plausibility._explaining": lambda *_: [],
+    "inercal.aoa.diagnosis.examination._explaining": lambda *_: [],
     "inercal.aoa.task.diagnose": lambda *_: [],
 }
 """The search for named faults -> what it finds where there are none; most of the time of a run."""

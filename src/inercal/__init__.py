@@ -47,6 +47,7 @@ Uncertainty
 Map, lower floors first; each imports only from those above its own line
     arrays, errors, inputs     the type of arrays; what goes wrong; files that a result rests on
     findings, units            what is said of a recording or result, and the verdict; texts with units
+    keys                       what a study says of a field of settings: key, unit, default, bounds, meaning
     geometry                   rotations, earth, site
     instruments                terms, triad, polynomial, by_angle, noise
     records                    record, column, clocks, made, channels, maps, read, write, checks, dwells

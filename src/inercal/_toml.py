@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -13,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inercal._files import read_bytes
 from inercal.errors import InputError
+from inercal.keys import keys_of
 from inercal.units import shown
 
 
@@ -80,52 +82,56 @@ def _dotted(location: tuple[Any, ...]) -> str:
 
 def _sentence(model: type[BaseModel], first: Any) -> str:
     """One sentence for one pydantic error."""
-    key, found = _dotted(first["loc"]), first.get("input")
+    key, value = _dotted(first["loc"]), first.get("input")
     match first["type"]:
         case "extra_forbidden":
-            known = _known_keys(model, first["loc"][:-1])
-            near = difflib.get_close_matches(str(first["loc"][-1])[:80], known, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(known)}"
+            keys = _known_keys(model, first["loc"][:-1])
+            near = difflib.get_close_matches(str(first["loc"][-1])[:80], keys, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(keys)}"
             return f"{key}: unknown key, {hint}"
         case "missing":
             return f"{key}: missing, expected a value"
         case "literal_error":
-            return f"{key}: found {shown(found)}, expected {first['ctx']['expected']}"
+            return f"{key}: found {shown(value)}, expected {first['ctx']['expected']}"
         case "model_type" | "dict_type":
-            return f"{key}: found {shown(found)}, expected a table"
+            return f"{key}: found {shown(value)}, expected a table"
         case "list_type" | "tuple_type":
-            return f"{key}: found {shown(found)}, expected a list in brackets"
+            return f"{key}: found {shown(value)}, expected a list in brackets"
         case "too_short":
-            return f"{key}: found {shown(found)}, expected {first['ctx']['min_length']} or more in it"
+            return f"{key}: found {shown(value)}, expected {first['ctx']['min_length']} or more in it"
         case "string_too_short":
-            return f"{key}: found {shown(found)}, expected a text that is not empty"
+            return f"{key}: found {shown(value)}, expected a text that is not empty"
         case "int_type" | "int_from_float":
-            return f"{key}: found {shown(found)}, expected a whole number"
+            return f"{key}: found {shown(value)}, expected a whole number"
         case "bool_type":
-            return f"{key}: found {shown(found)}, expected true or false"
+            return f"{key}: found {shown(value)}, expected true or false"
         case "string_type":
-            return f"{key}: found {shown(found)}, expected a text in quotes"
+            return f"{key}: found {shown(value)}, expected a text in quotes"
         case _:
             words = first["msg"].removeprefix("Value error, ").removeprefix("Input ").rstrip(".")
-            return f"{key}: found {shown(found)}, {words.replace('should be', 'expected')}"
+            return f"{key}: found {shown(value)}, {words.replace('should be', 'expected')}"
 
 
 def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
-    """Keys of the (nested) model at that path."""
+    """Keys of the (nested) table at that path."""
+    table: type[Any] = model
     for part in path:
-        info = model.model_fields.get(str(part)) or next(
-            (field for field in model.model_fields.values() if field.alias == part), None
+        fields: dict[str, Any] = getattr(table, "model_fields", {})
+        info = fields.get(str(part)) or next(
+            (field for field in fields.values() if field.alias == part), None
         )
-        inner = None if info is None else _model_in(info.annotation)
+        inner = None if info is None else _table_in(info.annotation)
         if inner is None:
             # a table of tables keyed by the user's own names: the model is one level up
             continue
-        model = inner
-    return [field.alias or name for name, field in model.model_fields.items()]
+        table = inner
+    if is_dataclass(table):
+        return [key.name or field.name for field, key in keys_of(table)]
+    return [field.alias or name for name, field in table.model_fields.items()]
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The model inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _table_in(annotation: Any) -> type[Any] | None:
+    """The model or settings inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _model_in(part))), None)
+    return next((table for part in get_args(annotation) if (table := _table_in(part))), None)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario, study
 
-from inercal.aoa.diagnosis.causes import diagnose
+from inercal.aoa.diagnosis.examination import diagnose
 from inercal.aoa.diagnosis.noise_check import scatter
 from inercal.aoa.settings import Disturbances, Estimator, MotionPlan, Oscillation
 from inercal.aoa.simulate import simulate

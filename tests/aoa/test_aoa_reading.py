@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
-from sting_study import BASE, DEG, G, scenario, study
+from sting_study import BASE, DEG, G, study
 
 from inercal.aoa.reading.from_record import of_sensors, recording_of
 from inercal.aoa.settings import Calibration
@@ -234,16 +234,3 @@ def test_a_reference_that_jumps_by_a_turn_goes_on_over_it(every):
     off = (found.reference - true)[told]
     np.testing.assert_allclose(off, off[0], atol=1e-6)
     assert abs(principal(off[0])) < 1e-6
-
-
-def test_fast_on_a_long_record():
-    import time
-
-    n = 600_000
-    long = simulate(scenario("clipping", duration=60.0), np.random.default_rng(2)).recording
-    columns = {f"a{k + 1}": ("g", np.resize(long.acc[:, k] / G, n)) for k in range(3)}
-    gyro = ("deg/s", np.resize(long.gyro / DEG, n))
-    big = record(t=1e-3 * np.arange(n), **columns, gyro=gyro, theta_ref=None, point=None, trigger=None)
-    clock = time.perf_counter()
-    recording_of(big, scenario("clipping"))
-    assert time.perf_counter() - clock < 2.0

@@ -1,7 +1,6 @@
 """The exchange against all subsets, against the continuous optimum, and against the figures of the drift model."""
 
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -84,19 +83,6 @@ def test_efficiency_of_d_optimal_designs(n, least, half_step):
     assert least <= efficiency(plan) <= 1.0
     assert len(np.unique(found.chosen)) == n
     assert found.value == pytest.approx(-9.0 * np.log(n * efficiency(plan)), rel=1e-9)
-
-
-def test_quick_enough_to_be_used_while_planning():
-    """2592 candidates, both axes of a gyrowheel, constant errors: far from the limit on any machine."""
-    G = grid((72, 36))
-    x = with_rates(G, 0.8).rows[:, 0]
-    rows = np.zeros((len(G), 2, 24))
-    rows[:, 0, :12] = rows[:, 1, 12:] = x
-    names = tuple(f"b{k}" for k in range(24))
-    candidates = Candidates(names, rows, np.ones((len(G), 2)), 0.1 * rows[:, :, [1, 5, 14]] ** 3)
-    start = time.perf_counter()
-    exchange(candidates, 24, D, np.random.default_rng(3), starts=2)
-    assert time.perf_counter() - start < 20.0
 
 
 def test_scaling_of_the_coefficients_leaves_the_d_optimal_positions():

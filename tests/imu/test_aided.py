@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaigns.aided import LATITUDE, PROGRAM, draw_truth, one_calibration
 
 from inercal._toml import check
 from inercal.errors import RecordError, StudyError
@@ -16,7 +17,6 @@ from inercal.estimate.runs import run
 from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.aided.campaign import LATITUDE, PROGRAM, draw_truth, one_calibration
 from inercal.imu.aided.figures import pictures
 from inercal.imu.aided.simulate import simulate
 from inercal.imu.aided.walk import whiten

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaigns.aided import LATITUDE, PROGRAM, draw_truth
 
 from inercal._toml import check
 from inercal.errors import StudyError
@@ -15,7 +16,6 @@ from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.aided.campaign import LATITUDE, PROGRAM, draw_truth
 from inercal.imu.aided.simulate import rests_of, simulate
 from inercal.imu.aided_settings import AidedSettings
 from inercal.imu.settings import ImuSettings

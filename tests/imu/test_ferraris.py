@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from campaigns.ferraris import one_calibration
 from ferraris_sessions import SETTINGS, session, with_values
 
 from inercal.convert.correct import imu_model
@@ -18,7 +19,6 @@ from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.campaign import one_calibration
 from inercal.imu.ferraris.method import NAMES, Inputs, coefficients, derivatives
 from inercal.imu.ferraris.simulate import true_values
 from inercal.imu.ferraris_settings import FerrarisSettings

@@ -7,10 +7,10 @@ correlation between the coefficients of one run (design effect 1.2). `benchmarks
 
 import numpy as np
 import pytest
+from campaigns.imu import one_calibration
 
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import run
-from inercal.imu.campaign import one_calibration
 
 SEED = 20261121
 RUNS = 250

@@ -4,19 +4,13 @@ A result is finite, with a covariance that is one and a known status, or the run
 warns, and nothing takes longer than 30 s. The seed was fixed before the first run.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+import stress
+from absurd import laws
 
 from inercal.estimate.result import without_parameters
 from inercal.findings import Status
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-
-import stress
-from absurd import laws
 
 RUNS, PARTS = 500, 4
 

@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 import pytest
+from campaigns.noise import MIXES, one_recording
 
 from inercal.estimate.result import coverage_factor
 from inercal.estimate.runs import run
 from inercal.instruments.noise import SYMBOLS
-from inercal.noise.campaign import MIXES, one_recording
 
 SEED, RUNS = 20261121, 250
 

@@ -1,9 +1,7 @@
 """The filter of the paper against filterpy's unscented filter, told the same model."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
+import plain_filterpy
 import pytest
 from paper_study import study
 
@@ -13,9 +11,6 @@ from inercal.selfcal.filters import quaternion
 from inercal.selfcal.filters.filter_result import problem
 from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import Filter
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import plain_filterpy
 
 STEPS = 400
 

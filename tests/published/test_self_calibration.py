@@ -3,7 +3,6 @@ Univ. 2018) says, claim by claim: docs/published/continuous-self-calibration.md.
 test_self_calibration_bounds.py.
 """
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +14,10 @@ from inercal.geometry.rotations import boxminus, boxplus
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.campaign import campaign
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.filters.filter_result import Start, problem
 from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.monte_carlo import campaign
 from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion, path
@@ -323,35 +322,6 @@ def test_an_indefinite_covariance():
     u = np.sqrt(np.diag(sound.covariance)[4:])
     assert 1.5 < np.max(np.abs(end.coefficients - sound.coefficients) / u) < 2.2
     assert ends["told"][1].lowest_eigenvalue < NEGATIVE
-
-
-# Times
-
-
-@pytest.mark.slow
-def test_times_follow_integrator_and_factor_not_representation(runs):
-    """The paper: 7 ms a step for the quaternion and 13 ms for gimbal angles, for want of trigonometry.
-
-    Processor time, the least of five. With one factor and one integration per step the two models differ by a third;
-    Runge-Kutta's four, and singular values in place of Cholesky's factor, make more of a difference.
-    """
-    settings = {
-        "quaternion": Filter("svd-qukf", factor="cholesky"),
-        "quaternion, svd": Filter("svd-qukf", factor="svd"),
-        "gimbal, euler": Filter("gimbal-ukf", integration="euler"),
-        "gimbal": Filter("gimbal-ukf"),
-    }
-    least = dict.fromkeys(settings, np.inf)
-    for _ in range(5):
-        for name, kind in settings.items():
-            began = time.process_time()
-            found = estimate(runs[0].recording, replace(problem(study()), filter=kind), history=False)
-            least[name] = min(least[name], (time.process_time() - began) / found.steps)
-    assert least["gimbal, euler"] < 1.7 * least["quaternion"]
-    assert least["gimbal"] > 1.1 * least["gimbal, euler"]
-    assert least["quaternion, svd"] > 2.0 * least["gimbal"]
-    # of the interval of 20 ms the paper's 7 ms are 35 %
-    assert least["quaternion, svd"] < 0.05 * 20e-3
 
 
 # Near-level gating

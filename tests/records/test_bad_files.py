@@ -40,7 +40,7 @@ from = ["v", 1]
 unit = "deg/s"
 """
 
-many = settings(max_examples=200, deadline=5000, suppress_health_check=[HealthCheck.function_scoped_fixture])
+many = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def saved(compressed):

@@ -158,10 +158,10 @@ def test_what_a_metrologist_looks_for():
 
 
 def test_order_of_the_sections():
-    text = render(estimate(), [PICTURE], "Report")
+    text = render(estimate(), [PICTURE, replace(PICTURE, title="Another")], "Report")
     heads = re.findall("<h2>(.*?)</h2>", text)
     assert heads == [
-        "Findings", "Coefficients", "Model, conditions and validity", "Figures", "Uncertainty budget",
+        "A figure", "Findings", "Coefficients", "Figures", "Uncertainty budget", "Model, conditions and validity",
         "Details", "How it was done",
     ]  # fmt: skip
 

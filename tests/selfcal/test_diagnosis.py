@@ -9,7 +9,7 @@ from paper_study import ARCSEC, DEG, NOISE, PPM, TRUTH, study
 from inercal.findings import Finding
 from inercal.geometry.rotations import exp, rotate
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.filters.filter_result import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base

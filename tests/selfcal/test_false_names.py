@@ -7,7 +7,7 @@ import pytest
 from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.filters.filter_result import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES

@@ -12,8 +12,8 @@ from inercal.findings import Finding, Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.causes import diagnose
-from inercal.selfcal.diagnosis.plausibility import implausible
+from inercal.selfcal.diagnosis.examination import diagnose
+from inercal.selfcal.diagnosis.gross import implausible
 from inercal.selfcal.filters.filter_result import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES, to_product, units

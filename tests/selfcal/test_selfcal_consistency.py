@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from paper_study import TRUTH, study
 
-from inercal.selfcal.campaign import campaign
+from inercal.selfcal.monte_carlo import campaign
 
 SEED, RUNS = 20261121, 100
 

@@ -24,10 +24,10 @@ from inercal.report.selfcal import attitude_errors
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import Designed, Judged
-from inercal.selfcal.campaign import Campaign
 from inercal.selfcal.display import displayed, of_field
 from inercal.selfcal.filters.filter_result import Filtered, History, Problem
 from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.monte_carlo import Campaign
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear, to_product, units
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.recording import Recording

@@ -11,8 +11,9 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput
 from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.causes import diagnose
-from inercal.selfcal.diagnosis.small import filtered, likely, search
+from inercal.selfcal.diagnosis.examination import diagnose
+from inercal.selfcal.diagnosis.fit_quality import filtered
+from inercal.selfcal.diagnosis.small import likely, small_errors
 from inercal.selfcal.filters.filter_result import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
@@ -135,7 +136,7 @@ def test_what_is_stated_is_fitted_with_its_uncertainty_for_a_prior():
     """The search for errors has the stated latitude as a parameter: what it corrects agrees with the recording."""
     made = recorded(with_latitude(PLAIN, 40.3))
     stated = with_latitude(PLAIN, 40.0, 0.2)
-    errors, corrected = search(made, problem(stated), stated_errors(stated))
+    errors, corrected = small_errors((made, problem(stated)), stated_errors(stated))
     assert errors == []
     assert np.degrees(np.arctan2(corrected[1].world.earth[1], corrected[1].world.earth[0])) == pytest.approx(
         40.3, abs=0.05

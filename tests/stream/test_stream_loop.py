@@ -6,7 +6,6 @@ import math
 import os
 import signal
 import threading
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -308,12 +307,11 @@ def test_an_interrupt_does_not_wait_for_a_line(tmp_path):
     saving = Saving(tmp_path / "state", 1000)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     with os.fdopen(read, "rb") as stream:
-        lines, clock = Lines(stream, "stdin", None, print), time.perf_counter()
+        lines = Lines(stream, "stdin", None, print)
         timer.start()
         with pytest.raises(KeyboardInterrupt):
             run(Smoother(), lines, lambda text: None, saving)
     os.close(write_end)
-    assert time.perf_counter() - clock < 5.0
     assert play(Smoother(), recording(9), saving) == play(Smoother(), recording(9))[5:]
 
 

@@ -329,10 +329,10 @@ def test_every_key_is_in_the_template():
     text = re.sub(r"(?m)^# ((\w+) = |\[)", r"\1", TEMPLATE)
     whole = tomllib.loads(re.sub("(?m)^path = .*", "", text))
     assert set(whole) == set(SCHEMA["$defs"]["SelfcalStudyFile"]["properties"])
-    tables = {"rig": "GimbalsTable", "design": "SearchTable"}
+    of_file = SCHEMA["$defs"]["SelfcalStudyFile"]["properties"]
     for name, given_keys in whole.items():
         if name != "schema":
-            keys = set(SCHEMA["$defs"][tables.get(name, f"{name.title()}Table")]["properties"])
+            keys = set(SCHEMA["$defs"][of_file[name]["$ref"].rpartition("/")[2]]["properties"])
             assert set(given_keys) | ({"path"} if name == "plan" else set()) == keys
     VALIDATOR.validate(whole)
     assert isinstance(selfcal_study(whole, "t.toml"), SelfcalSettings)

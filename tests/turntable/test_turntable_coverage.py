@@ -12,7 +12,7 @@ from turntable_studies import usual_terms
 
 from inercal.estimate.coverage import coverage, nees
 from inercal.estimate.runs import run
-from inercal.turntable.campaign import (
+from inercal.validate.gyrowheel import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )

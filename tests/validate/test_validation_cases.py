@@ -15,7 +15,7 @@ from inercal.geometry import earth, rotations
 from inercal.noise import deviation
 from inercal.selfcal.platform import rig
 from inercal.validate import aoa, foundation, imu, noise, selfcal, turntable
-from inercal.validate.case import Case, Found, find, judge
+from inercal.validate.case import Case, Numbers, find, judge
 from inercal.validate.run import SYSTEMS, cases_of, validate
 from inercal.validate.sources import SOURCES
 
@@ -106,8 +106,8 @@ def test_what_is_no_number_or_not_there_fails(values):
 
 def test_an_exact_number_passes_a_limit_of_zero_and_no_other_does():
     exact = replace(LINE, limit=0.0)
-    assert judge(exact, Found(np.array([1.0, 2.0]))).passed
-    assert not judge(exact, Found(np.array([1.0, np.nextafter(2.0, 3.0)]))).passed
+    assert judge(exact, Numbers(np.array([1.0, 2.0]))).passed
+    assert not judge(exact, Numbers(np.array([1.0, np.nextafter(2.0, 3.0)]))).passed
 
 
 def test_a_case_that_raises_is_a_failure_with_one_line():

@@ -11,8 +11,7 @@ import numpy as np
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
-from inercal.aoa.diagnosis.causes import diagnose
-from inercal.aoa.diagnosis.plausibility import implausible
+from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live, smoother
 from inercal.aoa.fusion.filter_result import Filtered
 from inercal.aoa.fusion.problem import Problem, problem

@@ -111,9 +111,9 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
     from inercal._jit import compiling
     from inercal.findings import Status
     from inercal.records.read import source_of
-    from inercal.selfcal.campaign import REFERENCES, campaign
     from inercal.selfcal.filters.filter_result import problem
     from inercal.selfcal.filters.run import load_kernels
+    from inercal.selfcal.monte_carlo import REFERENCES, campaign
     from inercal.studies.load import load_selfcal_study
 
     if not 2 <= runs <= _MOST_RUNS:

@@ -97,11 +97,11 @@ def require(candidates: Candidates, allowed: Mask, n: int, repeats: bool, where:
         raise InputError(where, f"found {n} positions, expected {least} or more for {p} coefficients")
     if remain < (1 if repeats else n):
         raise InputError(where, f"found {remain} of {m} candidates that remain, expected {n} or more")
-    known = identify(candidates.whitened[allowed, :, :p].reshape(-1, p), candidates.names)
-    if known.rank < p:
-        unknown = "; ".join(in_words(v, candidates.names) for v in few_terms(known.null_vectors))
+    information = identify(candidates.whitened[allowed, :, :p].reshape(-1, p), candidates.names)
+    if information.rank < p:
+        unknown = "; ".join(in_words(v, candidates.names) for v in few_terms(information.null_vectors))
         raise InputError(
             where,
-            f"found that the {remain} of {m} candidates that remain identify {known.rank} of {p} coefficients, "
+            f"found that the {remain} of {m} candidates that remain identify {information.rank} of {p} coefficients, "
             f"not {unknown}",
         )

@@ -1,4 +1,5 @@
-"""What a position would tell: rows linear in the coefficients, their noise, and the errors common to all."""
+"""Candidate positions, each by what it tells: rows linear in the coefficients, their noise, and the errors common to
+all."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _PART = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PlanFigures:
-    """What a plan of positions is worth.
+    """Worth of a plan of positions.
 
     Attributes
     ----------
@@ -64,14 +64,14 @@ def judge(name: str, plan: Candidates, basis: Array, prediction: Criterion) -> P
     if prediction.weights is None:
         raise ValueError("found the D-criterion, expected one of prediction")
     p = len(plan.names)
-    known = information_svd(plan)
-    null = known.null_vectors[:, :p]
-    u = np.sqrt(np.diag(known.unit_covariance)[:p])
+    information = information_svd(plan)
+    null = information.null_vectors[:, :p]
+    u = np.sqrt(np.diag(information.unit_covariance)[:p])
     u[np.any(np.abs(null) > _PART, axis=0)] = np.inf
-    unseen = null / known.scale[:p]  # in the coefficients' own units
+    unseen = null / information.scale[:p]  # in the coefficients' own units
     size = np.square(unseen) @ np.diag(prediction.weights)
     lost = np.einsum("ki,ij,kj->k", unseen, prediction.weights, unseen) > _PART**2 * size
-    rms = math.inf if np.any(lost) else math.sqrt(prediction.value(known.unit_covariance[:p, :p]))
+    rms = math.inf if np.any(lost) else math.sqrt(prediction.value(information.unit_covariance[:p, :p]))
     condition, efficiency = in_basis(basis)
     return PlanFigures(
         name=name,
@@ -89,7 +89,9 @@ def in_basis(basis: Array) -> tuple[float, float]:
     """Condition number and D-efficiency of positions from orthonormal functions (N, b) there; inf and 0 where the
     rank is not b."""
     terms = [str(k) for k in range(basis.shape[1])]
-    known = identify(basis, terms, sizes=np.ones(len(terms)))
-    if known.rank < len(terms):
+    information = identify(basis, terms, sizes=np.ones(len(terms)))
+    if information.rank < len(terms):
         return math.inf, 0.0
-    return known.condition, float(np.exp(np.mean(np.log(np.square(known.singular_values) / len(basis)))))
+    return information.condition, float(
+        np.exp(np.mean(np.log(np.square(information.singular_values) / len(basis))))
+    )

@@ -1,4 +1,4 @@
-"""How good a plan is: the covariance of the coefficients, and one number made of it.
+"""Worth of a plan: the covariance of the coefficients, and one number made of it.
 
 With the errors chi that stay constant over a test taken as unknowns of unit prior variance, the information is a
 sum over positions, ``M = blockdiag(0, I) + sum Z_j^T V_j^-1 Z_j`` with ``Z_j = [rows_j, common_j]``, and the
@@ -20,7 +20,7 @@ from inercal.estimate.identifiability import Identifiability, identify, in_words
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """What is to be small: the determinant of the covariance, or ``trace(weights cov)``.
+    """Criterion that a design makes small: the determinant of the covariance, or ``trace(weights cov)``.
 
     ``weights`` (p, p) symmetric and not negative; None for the determinant.
     """
@@ -56,7 +56,7 @@ def i_criterion(region: Array) -> Criterion:
 
 
 def information_svd(plan: Candidates) -> Identifiability:
-    """What a plan tells of coefficients and constant errors together, the latter with unit prior.
+    """Information of a plan on coefficients and constant errors together, the latter with unit prior.
 
     Its null vectors, if any, have no part in the constant errors.
     """
@@ -75,8 +75,8 @@ def covariance(plan: Candidates) -> Array:
     ValueError
         The plan leaves a combination of coefficients unidentified; the message names it.
     """
-    known, p = information_svd(plan), len(plan.names)
-    if known.rank < len(known.names):
-        unknown = "; ".join(in_words(v[:p], plan.names) for v in known.null_vectors)
+    information, p = information_svd(plan), len(plan.names)
+    if information.rank < len(information.names):
+        unknown = "; ".join(in_words(v[:p], plan.names) for v in information.null_vectors)
         raise ValueError(f"the {len(plan)} positions do not identify {unknown}")
-    return known.unit_covariance[:p, :p]
+    return information.unit_covariance[:p, :p]

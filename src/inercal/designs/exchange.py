@@ -83,15 +83,15 @@ def exchange(
     indices = np.flatnonzero(open_)
     W, weights = _scaled(candidates.take(indices), criterion)
     p = len(candidates.names)
-    found = []
+    designs = []
     for stream in rng.spawn(starts):
         first = _start(W[..., :p], n, repeats, stream)
         if first is None:
             raise InputError(
                 where, f"found none that identifies all of {p} coefficients, expected more positions"
             )
-        found.append(np.sort(indices[_improved(W, p, weights, first, repeats)]))
-    values = np.array([_value(candidates.take(chosen), criterion) for chosen in found])
+        designs.append(np.sort(indices[_improved(W, p, weights, first, repeats)]))
+    values = np.array([_value(candidates.take(chosen), criterion) for chosen in designs])
     if not np.isfinite(values).any():
         raise InputError(
             where,
@@ -99,7 +99,7 @@ def exchange(
         )
     # of determinants as such, whose logarithms may be near zero
     best = _first_least(np.exp(values - values.min()) if criterion.weights is None else values)
-    return Design(found[best], float(values[best]), values)
+    return Design(designs[best], float(values[best]), values)
 
 
 def _value(plan: Candidates, criterion: Criterion) -> float:
@@ -203,7 +203,7 @@ class _State:
 
 
 def _state(W: Array, p: int, weights: Array | None, chosen: Indices) -> _State:
-    """What the exchanges of a design need."""
+    """Quantities that the exchanges of a design use."""
     d = W.shape[-1]
     taken = W[chosen].reshape(-1, d)
     M = taken.T @ taken + np.diag(np.repeat([0.0, 1.0], [p, d - p]))

@@ -33,9 +33,9 @@ _SMALL_TURN = 1e-2
 
 def principal(angle: ArrayLike) -> Array:
     """The same angle [rad] (*batch) within (-pi, pi]; NaN of NaN."""
-    found = np.pi - np.remainder(np.pi - np.asarray(angle, dtype=float), 2.0 * np.pi)
+    wrapped = np.pi - np.remainder(np.pi - np.asarray(angle, dtype=float), 2.0 * np.pi)
     # of a rounding error below -pi the remainder is 2 pi itself
-    return np.where(found <= -np.pi, np.pi, found)
+    return np.where(wrapped <= -np.pi, np.pi, wrapped)
 
 
 def multiply(p_ab: ArrayLike, q_bc: ArrayLike) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 from inercal.geometry.site import Site
 from inercal.imu.aided_settings import AidedSettings
 from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.keys import RELATIVE_U, TIME, option, quantity
 from inercal.units import Quantity
 
 COMMAND = "calibrate imu"
@@ -23,14 +24,8 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start : float or None
-        Length of the still period at the start [s]; None: to be found.
-    g_sensitivity : bool
-        Also estimate the g-sensitive drift of the gyro.
-    bias_drift : bool
-        Also estimate how the bias of the gyro drifts with time.
-    time_base_u : float
-        Relative standard uncertainty of the record's clock.
+    static_start, g_sensitivity, bias_drift, time_base_u
+        As their keys say.
     traceability : mapping
         ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
     method : FerrarisSettings, AidedSettings or None
@@ -42,10 +37,16 @@ class ImuSettings:
     """
 
     site: Site
-    static_start: float | None = None
-    g_sensitivity: bool = False
-    bias_drift: bool = False
-    time_base_u: float = 0.0
+    static_start: float | None = quantity(
+        "length of the still period at the start; found automatically if absent", "time", example="50 s",
+        bounds=TIME,
+    )  # fmt: skip
+    g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
+    bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
+    time_base_u: float = quantity(
+        "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
+        bounds=RELATIVE_U, name="time_base",
+    )  # fmt: skip
     traceability: Mapping[str, str] = field(default_factory=dict)
     method: FerrarisSettings | AidedSettings | None = None
     temperature: Quantity | None = None

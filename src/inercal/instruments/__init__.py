@@ -1,1 +1,1 @@
-"""What an instrument is: its terms, and the models that take truth to indication."""
+"""Instruments: their terms, and the models that take truth to indication."""

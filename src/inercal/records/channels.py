@@ -84,16 +84,16 @@ def needs_unit(name: str) -> bool:
 
 
 def misfit(name: str, unit: Unit, increment: bool = False) -> str | None:
-    """What is wrong with that unit for that channel, as "found ..., expected ..."; None if it fits."""
+    """The misfit of a unit and a channel, as "found ..., expected ..."; None if the unit fits."""
     dimensions, gained = _dimensions(name)
     allowed = dimensions if not increment else () if gained is None else (gained,)
     if unit.dimension in allowed:
         return None
-    found = f'found "{unit.symbol}" ({unit.dimension})'
+    as_given = f'found "{unit.symbol}" ({unit.dimension})'
     if increment and gained is None:
-        return f'{found} and kind = "increment", expected kind = "rate" for {name}'
+        return f'{as_given} and kind = "increment", expected kind = "rate" for {name}'
     hint = ' or kind = "increment"' if not increment and unit.dimension == gained else ""
-    return f"{found}, expected a unit of {' or '.join(allowed)}{hint}"
+    return f"{as_given}, expected a unit of {' or '.join(allowed)}{hint}"
 
 
 def _dimensions(name: str) -> tuple[tuple[str, ...], str | None]:

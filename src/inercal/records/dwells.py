@@ -93,9 +93,9 @@ def static_intervals(still: NDArray[np.bool_], cuts: NDArray[np.int64], shortest
     """Runs of ``still`` samples (n,), cut where the time axis breaks, of at least ``shortest`` samples."""
     edges = np.diff(still.astype(np.int8), prepend=0, append=0)
     starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    found = []
+    dwells = []
     for start, stop in zip(starts, stops, strict=True):
         inner = cuts[(cuts > start) & (cuts < stop)]
         bounds = [start, *inner, stop]
-        found += [Dwell(int(a), int(b)) for a, b in itertools.pairwise(bounds) if b - a >= shortest]
-    return tuple(found)
+        dwells += [Dwell(int(a), int(b)) for a, b in itertools.pairwise(bounds) if b - a >= shortest]
+    return tuple(dwells)

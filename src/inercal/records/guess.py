@@ -39,7 +39,7 @@ class _Guess:
 
 @dataclass(frozen=True)
 class _File:
-    """What was guessed about one file, or about the columns of one clock in it."""
+    """Guess about one file, or about the columns of one clock in it."""
 
     path: Path
     guesses: Mapping[str, _Guess]
@@ -118,21 +118,21 @@ def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
-    found = [_File(path, longest, leading)]
+    files = [_File(path, longest, leading)]
     for guesses in others:
-        known = {name for file in found for name in file.guesses} - {"t"}
-        new = {name: guess for name, guess in guesses.items() if name not in known}
+        guessed = {name for file in files for name in file.guesses} - {"t"}
+        new = {name: guess for name, guess in guesses.items() if name not in guessed}
         if "t" in new and len(new) > 1:
-            found.append(_File(path, new, ()))
+            files.append(_File(path, new, ()))
     if on_table and not longest.keys() - {"t", "label"}:
         raise RecordError(path, f"found {_held(samples)}, expected a header such as phi1,phi2,acc_x")
     if all(np.isnan(sample.values).all() for sample in samples):
         raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
-    return [replace(found[0], unused=_unused(samples, found)), *found[1:]]
+    return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
 
 
 def _held(samples: Sequence[Sample]) -> str:
-    """What a file holds, in words."""
+    """The contents of a file in words."""
     return "; ".join(
         counted_names(sample.names, 8) or f"{sample.values.shape[1]} columns" for sample in samples
     )
@@ -191,7 +191,7 @@ def _is_clock(values: Array) -> bool:
 
 
 def _origin(sample: Sample, index: int) -> Origin:
-    """How a map names a column."""
+    """The name of a column in a map."""
     if sample.names:
         return sample.names[index] if sample.names.count(sample.names[index]) == 1 else index
     return (sample.variable, index) if sample.variable else index
@@ -222,9 +222,9 @@ def _sensors(
 ) -> list[tuple[str, list[int], str]]:
     """Which triad is which sensor, and why."""
     for name in names if len(triads) == 1 else ():
-        said = [sensor for sensor, pattern in _IN_NAMES.items() if re.search(pattern, name, re.IGNORECASE)]
-        if len(said) == 1:
-            return [(said[0], triads[0], f"the name says {_quoted(name)}")]
+        named = [sensor for sensor, pattern in _IN_NAMES.items() if re.search(pattern, name, re.IGNORECASE)]
+        if len(named) == 1:
+            return [(named[0], triads[0], f"the name says {_quoted(name)}")]
     spread = [_spread(values[:, triad]) for triad in triads]
     acc = int(np.argmin(spread))
     if len(triads) == 1:
@@ -245,14 +245,14 @@ def _spread(triad: Array) -> float:
 
 def _median(values: Array) -> float:
     """Median of the numbers there are, 0 if there are none."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else 0.0
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else 0.0
 
 
 def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
     """Unit of each channel, and why."""
-    stated = guesses["acc_x"].unit if "acc_x" in guesses else None
-    acc = (stated, "as x") if stated and fits("acc_x", stated) else _acc_unit(guesses)
+    acc_unit = guesses["acc_x"].unit if "acc_x" in guesses else None
+    acc = (acc_unit, "as x") if acc_unit and fits("acc_x", acc_unit) else _acc_unit(guesses)
     units = {}
     for name, guess in guesses.items():
         if guess.unit is not None and fits(name, guess.unit):
@@ -347,12 +347,12 @@ def _options(file: _File, table: str) -> list[str]:
 
 def _rate(leading: Iterable[str]) -> list[str]:
     """The sample rate as TOML, where there is no time column."""
-    said = next((line for line in leading if _RATE.search(line)), None)
-    match = _RATE.search(said) if said is not None else None
-    if said is not None and match:
+    sentence = next((line for line in leading if _RATE.search(line)), None)
+    match = _RATE.search(sentence) if sentence is not None else None
+    if sentence is not None and match:
         return [
             "",
-            f"# there is no time column; a line says {_quoted(said[:60])}",
+            f"# there is no time column; a line says {_quoted(sentence[:60])}",
             "[time]",
             f'rate = "{match[1]} Hz"',
         ]

@@ -23,12 +23,12 @@ def counted_names(names: Sequence[str], most: int = 5) -> str:
 
 def places(word: str, numbers: ArrayLike) -> str:
     """Numbers (ascending, counted from 1) as ranges: the first few, and how many ranges more."""
-    found = np.asarray(numbers, dtype=np.int64)
-    if found.size == 0:
+    rows = np.asarray(numbers, dtype=np.int64)
+    if rows.size == 0:
         return ""
-    breaks = np.flatnonzero(np.diff(found) > 1)
-    starts, ends = found[np.r_[0, breaks + 1]], found[np.r_[breaks, -1]]
+    breaks = np.flatnonzero(np.diff(rows) > 1)
+    starts, ends = rows[np.r_[0, breaks + 1]], rows[np.r_[breaks, -1]]
     shown = zip(starts[:_SHOWN].tolist(), ends[:_SHOWN].tolist(), strict=True)
     text = ", ".join(str(start) if start == end else f"{start}-{end}" for start, end in shown)
     more = f" and {len(starts) - _SHOWN} more" if len(starts) > _SHOWN else ""
-    return f"{word}{'' if found.size == 1 else 's'} {text}{more}"
+    return f"{word}{'' if rows.size == 1 else 's'} {text}{more}"

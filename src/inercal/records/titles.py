@@ -1,4 +1,4 @@
-"""What the title of a column says: which channel is in it, and in which unit."""
+"""Titles of columns: the channel and the unit that a title names."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ _SPELLED = {
 _BY_DIMENSION = {"acceleration": "acc", "rate": "gyro", "temperature": "temperature", "time": "t"}
 
 
-def titled(title: str, stated: str | None = None) -> tuple[str | None, str | None]:
+def titled(title: str, given: str | None = None) -> tuple[str | None, str | None]:
     """The channel and the unit that a title such as ``gyro_x_mdps`` or ``Drehrate X [mdeg/s]`` speaks of.
 
-    A unit stands in brackets, beside the title (``stated``), or behind the last ``_`` or blank. Where the name says
+    A unit stands in brackets, beside the title (``given``), or behind the last ``_`` or blank. Where the name says
     nothing, or another quantity than the unit, the channel goes by the unit and by X, Y, Z or 1, 2, 3 in the name.
 
     Returns
@@ -50,13 +50,13 @@ def titled(title: str, stated: str | None = None) -> tuple[str | None, str | Non
         The unit as it is written, known or not; plainly where a name spells it, as ``acc_x_m_s2``.
     """
     match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title.strip())
-    plain, unit = (match[1], match[2] or stated) if match else (title, stated)
+    plain, unit = (match[1], match[2] or given) if match else (title, given)
     name = _named(plain)
     if unit is None:
         stem, _, suffix = plain.replace(" ", "_").rpartition("_")
         for spelled, texts in _SPELLED.items():
-            if found := re.fullmatch(rf"(.+)_(?:{texts})", plain):
-                stem, suffix = found[1], spelled
+            if parts := re.fullmatch(rf"(.+)_(?:{texts})", plain):
+                stem, suffix = parts[1], spelled
         if (meant := _named(stem)) and fits(meant, suffix):
             return meant, suffix
         return name, None
@@ -76,8 +76,8 @@ def numbered(title: str) -> str | None:
 
 def fits(name: str, unit: str) -> bool:
     """True if there is such a unit and the channel may have it."""
-    known = _known(unit)
-    return known is not None and misfit(name, known) is None
+    parsed = _known(unit)
+    return parsed is not None and misfit(name, parsed) is None
 
 
 def _known(unit: str) -> Unit | None:

@@ -14,6 +14,7 @@ from inercal.estimate.result import Estimate, Parameter, in_degrees, rounded
 from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.instruments.terms import term
+from inercal.report.mathml import clauses
 from inercal.report.style import plain_unit
 
 _INFINITE = 1e6
@@ -94,11 +95,11 @@ def render(
     estimate : Estimate
         Of any command and any status, with or without parameters.
     pictures : sequence of Picture
-        In the order they are to be shown.
+        In the order they are to be shown; the first one answers the question of the page.
     title : str
         Heading of the page.
     tables : sequence of Table
-        What else there is to tell, ahead of the pictures.
+        What else there is to tell, ahead of the other pictures.
     answer : sequence of Table
         What was asked for, where that is not the coefficients: ahead of these.
 
@@ -140,12 +141,14 @@ def page(
     title: str,
     facts: Sequence[tuple[str, str, str]] | None = None,
     meaning: str = "",
+    pictures: Sequence[Picture] = (),
     **content: Any,
 ) -> str:
     """A page of this package: its one frame, and in it what a template makes of ``content``.
 
-    The frame is the title, who did what, the verdict, the findings, and at the end how it was done. Whatever is put in
-    is escaped. Bytes in file names that no encoding knew are read as UTF-8, and what that does not know is replaced.
+    The frame is the title, who did what, the verdict, the picture that answers the question, the findings, and at the
+    end how it was done. Whatever is put in is escaped. Bytes in file names that no encoding knew are read as UTF-8,
+    and what that does not know is replaced.
 
     Parameters
     ----------
@@ -159,8 +162,11 @@ def page(
         What was looked at, where there is no instrument to trace; `Estimate.traceability` if absent.
     meaning : str
         What the verdict says, ahead of the message of the estimate.
+    pictures : sequence of Picture
+        The first one answers the question of the page; a template shows the others below its tables.
     """
     import jinja2
+    from markupsafe import Markup
 
     from inercal import __version__
 
@@ -186,6 +192,9 @@ def page(
         facts=_heading(estimate) if facts is None else facts,
         mood={Status.OK: "good", Status.ILL_CONDITIONED: "doubtful"}.get(estimate.status, "bad"),
         meaning=meaning,
+        first=pictures[:1],
+        pictures=pictures[1:],
+        model=[Markup(clause) for clause in clauses(estimate.model)],
         statistics=[(*_labelled((key,)), _short(value)) for key, value in estimate.statistics.items()],
         provenance=[
             ("command", estimate.command),

@@ -1,1 +1,1 @@
-"""Where an instrument is mounted: kinematic chains with their errors, tables, plans, references."""
+"""Rigs that carry an instrument: kinematic chains with their errors, tables, plans, references."""

@@ -25,7 +25,7 @@ from inercal.rigs.distribution import Distribution
 
 
 class Scope(enum.Enum):
-    """How long an error keeps its value: until it is drawn anew."""
+    """Time over which an error keeps its value, until it is drawn anew."""
 
     SAMPLE = "sample"
     POSITION = "position"
@@ -133,11 +133,11 @@ class Chain:
             One of scope ``sample`` is drawn once a position too: averaging it is the simulation's work.
         """
         shape = (positions,) if runs is None else (runs, positions)
-        drawn = np.empty((*shape, len(self.errors)))
+        errors = np.empty((*shape, len(self.errors)))
         for k, error in enumerate(self.errors):
             once = (*shape[:-1], 1) if error.scope.constant else shape
-            drawn[..., k] = error.distribution.sample(rng, once)
-        return drawn
+            errors[..., k] = error.distribution.sample(rng, once)
+        return errors
 
     def pose(self, angles: ArrayLike, errors: ArrayLike | None = None) -> Array:
         """Homogeneous transforms from b to n.
@@ -177,18 +177,20 @@ class Chain:
         """
         angles, none = self._checked(angles, None)
         before = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
-        found = []
+        turned_parts = []
         for element, value in self._values(angles, none):
             if isinstance(element, Error):
                 turn = np.zeros((3, 3)) if element.is_offset else skew(_UNIT[element.axis])
                 # before K after, with C = before after
-                found.append((before @ turn, before))
+                turned_parts.append((before @ turn, before))
             else:
                 before = before @ _rotation(element, value)
-        if not found:
+        if not turned_parts:
             return np.zeros((*angles.shape[:-1], 0, 3, 3))
         whole = before
-        return np.stack([turned @ np.swapaxes(first, -1, -2) @ whole for turned, first in found], axis=-3)
+        return np.stack(
+            [turned @ np.swapaxes(first, -1, -2) @ whole for turned, first in turned_parts], axis=-3
+        )
 
     def _values(self, angles: Array, errors: Array) -> Iterable[tuple[Element, Array]]:
         """Each element with its values (*batch)."""
@@ -206,13 +208,13 @@ class Chain:
     def _checked(self, angles: ArrayLike, errors: ArrayLike | None) -> tuple[Array, Array]:
         """Arrays of the right last axis."""
         given = np.asarray(angles, dtype=float)
-        drawn = np.zeros(len(self.errors)) if errors is None else np.asarray(errors, dtype=float)
-        for array, names, what in ((given, self.joints, "angles"), (drawn, self.factors, "errors")):
+        values = np.zeros(len(self.errors)) if errors is None else np.asarray(errors, dtype=float)
+        for array, names, what in ((given, self.joints, "angles"), (values, self.factors, "errors")):
             if array.ndim == 0 or array.shape[-1] != len(names):
                 raise ValueError(
                     f"found {what} of shape {array.shape}, expected {len(names)} in the last axis"
                 )
-        return given, drawn
+        return given, values
 
 
 _UNIT: dict[str, Array] = dict(zip("xyz", np.eye(3), strict=True))

@@ -1,4 +1,4 @@
-"""How an elementary error of a rig is distributed: about a mean, with nodes that integrate it exactly.
+"""Distribution of an elementary error of a rig: about a mean, with nodes that integrate it exactly.
 
 Everything the exact analysis needs are expectations of trigonometric polynomials, and every distribution
 here comes with quadrature nodes that give them to rounding, so that one rule serves all densities.

@@ -1,4 +1,4 @@
-"""What an instrument on a rig should read: gravity and earth rate carried through the chain to its axes.
+"""Reference inputs of an instrument on a rig: gravity and earth rate carried through the chain to its axes.
 
 The signs are those of Zhao et al. 2023: ``a = [0 0 -g] C_nb`` is the gravity reference (an accelerometer at
 rest indicates -a), ``omega = we [cos L, 0, sin L] C_nb`` the earth rate, n being north, west, up.

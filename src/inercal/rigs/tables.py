@@ -17,7 +17,7 @@ from inercal.rigs.distribution import Distribution
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a table may err: name of the factor, axis, scope where nothing else is said, and what it is.
+    """Elementary error of a table: name of the factor, axis, default scope, and meaning.
 
     ``optional`` ones are there only where a distribution is given for them by name.
     """
@@ -115,9 +115,9 @@ def turntable(
         An unknown kind, or a factor the table does not have.
     """
     given, scope_of = dict(errors or {}), dict(scopes or {})
-    known = {slot.name for slot in slots(kind)}
+    factors = {slot.name for slot in slots(kind)}
     for name in (*given, *scope_of):
-        if name not in known:
+        if name not in factors:
             raise KeyError(name)
     elements: list[Element] = []
     if any(base):

@@ -26,8 +26,8 @@ from inercal.selfcal.task import compared
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.selfcal.before.path_design import Designed
-    from inercal.selfcal.campaign import Campaign
     from inercal.selfcal.filters.filter_result import Filtered, History
+    from inercal.selfcal.monte_carlo import Campaign
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.selfcal.task import Calibration
 

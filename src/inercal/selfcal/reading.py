@@ -21,7 +21,7 @@ from inercal.records.column import Column
 from inercal.records.places import counted, places
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-from inercal.selfcal.diagnosis.plausibility import implausible, off_the_path
+from inercal.selfcal.diagnosis.gross import implausible, off_the_path
 from inercal.selfcal.filters.gaps import with_held
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording

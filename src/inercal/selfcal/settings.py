@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -10,6 +11,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.geometry.site import Site
+from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.rig import Base, Gimbals, World, world
@@ -21,15 +23,28 @@ FactorKind = Literal["cholesky", "eigen", "svd"]
 KINDS: tuple[FilterKind, ...] = ("error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm")
 """All estimators, the product's default first."""
 
+_OF_A_SAMPLE = above_zero("a standard deviation of a sample")
+_OF_A_TURN = Bounds(lambda angle: 0.0 < angle <= 2.0 * math.pi, "an angle above 0 and up to 360 deg")
+
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: ``angle_random_walk`` of the gyros [rad/sqrt(s)], ``accelerometer`` [m/s^2] and
-    ``encoder`` [rad] of each sample."""
+    """Noise of the instruments."""
 
-    angle_random_walk: float
-    accelerometer: float
-    encoder: float
+    angle_random_walk: float = quantity(
+        "of the gyros", "angle random walk", REQUIRED, example="5e-4 deg/sqrt(h)",
+        bounds=above_zero("an angle random walk"),
+    )  # fmt: skip
+    accelerometer: float = quantity(
+        "standard deviation of a sample", "acceleration", REQUIRED, example="10 ug", bounds=_OF_A_SAMPLE
+    )
+    encoder: float = quantity(
+        "standard deviation of a sample of an angle",
+        "angle",
+        REQUIRED,
+        example="2 arcsec",
+        bounds=_OF_A_SAMPLE,
+    )
 
     @property
     def levels(self) -> Array:
@@ -55,50 +70,50 @@ class Gating:
 class Filter:
     """Which estimator, and how.
 
-    ``extended`` estimates gyro scale errors and the zero of the encoders too; ``factor`` of the covariance for
-    sigma points (None: cholesky, but eigen for svd-qukf); ``integration`` of the gimbal-ukf; ``gating`` None is off.
+    ``gating`` None is off.
     """
 
-    kind: FilterKind = "error-state"
-    extended: bool = False
+    kind: FilterKind = option("the estimator; --filter overrides it", "error-state")
+    extended: bool = option("estimate gyro scale errors and the encoders' zero too", False)
     gating: Gating | None = None
-    factor: FactorKind | None = None
-    integration: Literal["rk4", "euler"] = "rk4"
+    factor: FactorKind | None = option(
+        "of the covariance, for sigma points; cholesky if absent, but eigen for svd-qukf", None
+    )
+    integration: Literal["rk4", "euler"] = option("of the gimbal angles, for gimbal-ukf", "rk4")
 
 
 @dataclass(frozen=True)
 class Disturbances:
-    """What a simulation adds to the model; nothing by default.
+    """What a simulation adds to the model; nothing if absent.
 
-    Attributes
-    ----------
-    dropouts : float
-        Probability that a row has neither accelerometers nor angles.
-    harmonics : tuple of (int, int, float, float)
-        Errors of encoders: joint 0, 1, 2, order k, amplitude [rad], phase [rad]: a sin(k th + phase).
-    command_delay : float
-        Time [s] by which the platform acts after the command log says.
-    substeps : int
-        Steps of the truth between two rows.
+    ``harmonics`` are errors of encoders: joint 0, 1, 2, order k, amplitude [rad], phase [rad]: a sin(k th + phase).
+    ``substeps`` of the truth lie between two rows.
     """
 
-    dropouts: float = 0.0
+    dropouts: float = quantity(
+        "part of the rows without accelerometers and angles", "number", "0", example="1 %", bounds=PART
+    )
     harmonics: tuple[tuple[int, int, float, float], ...] = ()
-    command_delay: float = 0.0
+    command_delay: float = quantity(
+        "by which the platform acts later than commanded", "time", "0 s", example="0.2 s",
+        bounds=within(0.0, math.inf, "a time of 0 or more"),
+    )  # fmt: skip
     substeps: int = 10
 
 
 @dataclass(frozen=True)
 class Search:
-    """A search for a path: ``turns`` most in number, of multiples of ``angle`` [rad], within ``time`` [s] at the
-    rates of the plan; ``criterion`` ``mean`` (of log u) or ``worst`` (largest u over goal or prior); ``seed``.
-    ``time`` None: as long as the plan of the study."""
+    """The search for a path."""
 
-    turns: int = 5
-    angle: float = float(np.radians(30.0))
-    time: float | None = None
-    criterion: Literal["worst", "mean"] = "mean"
-    seed: int = 1
+    turns: int = option("how many at most", 5, least=1, most=50)
+    angle: float = quantity("turns are multiples of it", "angle", "30 deg", bounds=_OF_A_TURN)
+    time: float | None = quantity(
+        "most that the path may take; that of the plan if absent", "time", example="540 s", bounds=TIME
+    )
+    criterion: Literal["worst", "mean"] = option(
+        "the mean of all uncertainties on a log scale, or the largest over goal or prior (worst)", "mean"
+    )
+    seed: int = option("of the random starts", 1, least=0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.records.record import Record
 from inercal.selfcal.before.bounds import Bounds, recorded_bounds
-from inercal.selfcal.diagnosis.causes import diagnose
+from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.filters import run as filtering
 from inercal.selfcal.filters.filter_result import Filtered, Problem, problem
 from inercal.selfcal.filters.filter_result import found as found_by

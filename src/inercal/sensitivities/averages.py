@@ -60,18 +60,18 @@ def flagged(indices: Indices) -> tuple[Flag, ...]:
     """Outputs and positions whose first-order indices sum to less than 0.99, by output, then position."""
     sums = indices.first.sum(axis=2)
     with np.errstate(invalid="ignore"):
-        found = np.argwhere(sums < SINGULAR)
+        places = np.argwhere(sums < SINGULAR)
     return tuple(
-        Flag(indices.outputs[o], tuple(indices.angles[n].tolist()), float(sums[o, n])) for o, n in found
+        Flag(indices.outputs[o], tuple(indices.angles[n].tolist()), float(sums[o, n])) for o, n in places
     )
 
 
 def _mean(values: Array) -> Array:
     """Mean over positions (o, k) of (o, n, k) without NaN; NaN where nothing is left."""
-    known = np.isfinite(values)
-    count = known.sum(axis=1)
+    finite = np.isfinite(values)
+    count = finite.sum(axis=1)
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(known, values, 0.0).sum(axis=1) / np.where(count > 0, count, np.nan))
+        return np.asarray(np.where(finite, values, 0.0).sum(axis=1) / np.where(count > 0, count, np.nan))
 
 
 def _shares(variance: Array, first: Array, interaction: Array) -> Averages:

@@ -88,13 +88,13 @@ def blocks(chain: Chain, angles: ArrayLike, degrees: Sequence[int]) -> Dense:
 def homogeneous(chain: Chain, angles: ArrayLike) -> Dense:
     """Homogeneous transforms (4, 4) of a chain, as in `Chain.pose`, offsets [m] and their errors included."""
     elements = iter(blocks(chain, angles, (1, 0)).elements)
-    found: list[Element] = []
+    transforms: list[Element] = []
     for element in chain.elements:
         if isinstance(element, Error) and element.is_offset:
             along = np.zeros((4, 4))
             along["xyz".index(element.axis), 3] = 1.0
             distribution = element.distribution
-            found.append(
+            transforms.append(
                 Random(
                     chain.factors.index(element.name),
                     distribution.mean * along,
@@ -106,8 +106,8 @@ def homogeneous(chain: Chain, angles: ArrayLike) -> Dense:
         transform = next(elements)
         if isinstance(element, Fixed) and not isinstance(transform, Random):
             transform[:3, 3] = element.offset
-        found.append(transform)
-    return Dense(chain.factors, positions(chain, angles), tuple(found))
+        transforms.append(transform)
+    return Dense(chain.factors, positions(chain, angles), tuple(transforms))
 
 
 def analyse(dense: Dense, outputs: Sequence[Output], shapley: bool = False, second: bool = False) -> Indices:
@@ -265,7 +265,7 @@ def _congruent(W: Array, M: Array) -> Array:
 
 
 def _scatter(F: Array, element: Random) -> Array:
-    """What the parts of an error make of second moments F: sum of var A^T F A."""
+    """Second moments F carried through the parts of an error: sum of var A^T F A."""
     total = np.zeros_like(F)
     for variance, A in zip(element.variances, element.parts, strict=True):
         total += variance * _congruent(F, A)
@@ -312,7 +312,7 @@ def _random_rotation(error: Error, factor: int, degrees: Sequence[int]) -> Rando
             _kron(C, C) - _kron(K, K),
         ],
     }
-    found = moments(error.distribution, max(1, *degrees))
-    basis = np.stack([_diagonal([of_degree[d][f] for d in degrees]) for f in range(len(found.mean))])
-    shift = np.einsum("f,fij->ij", found.mean, basis)
-    return Random(factor, shift, found.variance, np.einsum("fp,fij->pij", found.lower, basis))
+    moment = moments(error.distribution, max(1, *degrees))
+    basis = np.stack([_diagonal([of_degree[d][f] for d in degrees]) for f in range(len(moment.mean))])
+    shift = np.einsum("f,fij->ij", moment.mean, basis)
+    return Random(factor, shift, moment.variance, np.einsum("fp,fij->pij", moment.lower, basis))

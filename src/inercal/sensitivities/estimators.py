@@ -79,12 +79,12 @@ def evaluate(function: Callable[[Array], ArrayLike], A: Array, B: Array) -> tupl
     """
 
     def outputs(errors: Array) -> Array:
-        found = np.asarray(function(errors), dtype=float)
-        if found.shape[:1] != (len(errors),) or found.ndim > 2:
-            raise ValueError(f"found outputs of shape {found.shape}, expected ({len(errors)}, outputs)")
-        if not np.isfinite(found).all():
+        values = np.asarray(function(errors), dtype=float)
+        if values.shape[:1] != (len(errors),) or values.ndim > 2:
+            raise ValueError(f"found outputs of shape {values.shape}, expected ({len(errors)}, outputs)")
+        if not np.isfinite(values).all():
             raise ValueError("found an output that is not finite")
-        return found.reshape(len(errors), -1)
+        return values.reshape(len(errors), -1)
 
     f_A, f_B = outputs(A), outputs(B)
     f_AB = np.empty((A.shape[1], *f_A.shape))

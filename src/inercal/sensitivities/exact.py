@@ -229,12 +229,12 @@ class _Passes:
 
 def _error_row(error: Error) -> Array:
     """Numbers of an error as in `inercal.sensitivities.kernels.ERROR_ROW`."""
-    found = moments(error.distribution)
-    return np.array([-found.mean[1], found.mean[0], *found.variance, -found.lower[1, 0]])
+    moment = moments(error.distribution)
+    return np.array([-moment.mean[1], moment.mean[0], *moment.variance, -moment.lower[1, 0]])
 
 
 def _distinct(vectors: Sequence[Array]) -> tuple[Array, Integers]:
     """Distinct rows (r, 3), and the place of each vector among them."""
     rows = np.array(vectors, dtype=float).reshape(-1, 3)
-    found, places = np.unique(rows, axis=0, return_inverse=True)
-    return np.ascontiguousarray(found), places.reshape(-1).astype(np.int64)
+    distinct, places = np.unique(rows, axis=0, return_inverse=True)
+    return np.ascontiguousarray(distinct), places.reshape(-1).astype(np.int64)

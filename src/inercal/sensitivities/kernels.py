@@ -38,7 +38,7 @@ FIXED, JOINT, ERROR = 0, 1, 2
 def spread(
     f_bb: float, f_cc: float, f_bc: float, v1: float, v2: float, slope: float
 ) -> tuple[float, float, float]:
-    """What the parts of an error make of second moments F in its plane: sum of var A^T F A (bb, cc, bc).
+    """Second moments F in the plane of an error, carried through its parts: sum of var A^T F A (bb, cc, bc).
 
     A^T of J + slope is -(J - slope): for A F A^T give -slope.
     """
@@ -233,10 +233,10 @@ def analyse(
             for e in range(m):
                 if elements[e, 0] == ERROR:
                     k = elements[e, 2]
-                    found = parts(rows, columns, r, c, e, elements[e, 1], errors[k])
-                    first[o, n, k], interaction[o, n, k] = found[0], found[1]
-                    all_variance += found[2]
-                    all_bias += found[3]
+                    variances = parts(rows, columns, r, c, e, elements[e, 1], errors[k])
+                    first[o, n, k], interaction[o, n, k] = variances[0], variances[1]
+                    all_variance += variances[2]
+                    all_bias += variances[3]
             variance[o, n], bias[o, n] = all_variance, all_bias
 
 
@@ -272,9 +272,9 @@ def second_order(
                             j = elements[later, 2]
                             for o in range(len(outputs)):
                                 if outputs[o, 0] == r:
-                                    found = parts(
+                                    variances = parts(
                                         ray, columns, 0, outputs[o, 1], later, elements[later, 1], errors[j]
                                     )
-                                    second[o, n, i, j] += errors[i, 2 + part] * found[0]
+                                    second[o, n, i, j] += errors[i, 2 + part] * variances[0]
                                     second[o, n, j, i] = second[o, n, i, j]
                         advance(ray, 0, later, elements[later], fixed, errors, cosines, 1.0)

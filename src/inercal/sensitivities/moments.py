@@ -1,4 +1,4 @@
-"""What the exact analysis needs of a random angle d: mean and uncorrelated parts of its rotation matrix.
+"""Moments of a random angle d for the exact analysis: mean and uncorrelated parts of its rotation matrix.
 
 With K = skew(axis) and C = -K^2 (1 in the plane, 0 along the axis)::
 

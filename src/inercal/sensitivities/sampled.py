@@ -60,19 +60,19 @@ def analyse(
     positions = np.atleast_2d(np.asarray(angles, dtype=float))
     distributions = [error.distribution for error in chain.errors]
     sizes = np.array([np.linalg.norm(each.reference) * np.linalg.norm(each.axis) for each in outputs])
-    found, ideal = [], []
+    parts, ideal = [], []
     for done, at in enumerate(positions, start=1):
 
         def function(errors: Array, at: Array = at) -> Array:
             C_nb = chain.attitude(at, errors)
             return np.stack([each.value(C_nb) for each in outputs], axis=-1)
 
-        found.append(_parts(function, distributions, samples, rng, sampling))
+        parts.append(_parts(function, distributions, samples, rng, sampling))
         ideal.append(function(np.zeros((1, len(distributions))))[0])
         if progress is not None:
             progress(done, len(positions))
     return _indices(
-        found,
+        parts,
         np.array(ideal),
         _ROUNDING * sizes,
         factors=chain.factors,
@@ -122,14 +122,14 @@ def analyse_function(
     """
     names = tuple(outputs)
     each = list(distributions.values())
-    found = _parts(function, each, samples, rng, sampling)
+    parts = _parts(function, each, samples, rng, sampling)
     ideal = np.asarray(function(np.zeros((1, len(each)))), dtype=float).reshape(1, -1)
-    if len(found.mean) != len(names):
-        raise ValueError(f"found {len(found.mean)} outputs, expected {len(names)}: {', '.join(names)}")
+    if len(parts.mean) != len(names):
+        raise ValueError(f"found {len(parts.mean)} outputs, expected {len(names)}: {', '.join(names)}")
     return _indices(
-        [found],
+        [parts],
         ideal,
-        _ROUNDING * np.abs(found.mean),
+        _ROUNDING * np.abs(parts.mean),
         factors=tuple(distributions),
         outputs=names,
         units=("",) * len(names),
@@ -152,7 +152,7 @@ def _parts(
 
 
 def _method(samples: int, sampling: Sampling) -> dict[str, object]:
-    """How the indices were estimated."""
+    """Settings of the sampled estimation of the indices."""
     return {
         "name": "sampled",
         "sampling": sampling,
@@ -163,7 +163,7 @@ def _method(samples: int, sampling: Sampling) -> dict[str, object]:
 
 
 def _indices(
-    found: Sequence[Parts],
+    positions: Sequence[Parts],
     ideal: Array,
     rounding: Array,
     *,
@@ -175,7 +175,7 @@ def _indices(
     method: Mapping[str, object],
 ) -> Indices:
     """The result of positions (n) one after the other; ``ideal`` (n, o), ``rounding`` (o,) of the outputs."""
-    variance = np.stack([parts.variance for parts in found], axis=1)
+    variance = np.stack([parts.variance for parts in positions], axis=1)
     return Indices(
         factors=factors,
         outputs=outputs,
@@ -183,10 +183,10 @@ def _indices(
         scales=scales,
         angles=angles,
         variance=np.where(variance > np.square(rounding)[:, None], variance, 0.0),
-        bias=np.stack([parts.mean for parts in found], axis=1) - ideal.T,
-        first_variance=np.stack([parts.first_variance for parts in found], axis=1),
-        interaction_variance=np.stack([parts.interaction_variance for parts in found], axis=1),
+        bias=np.stack([parts.mean for parts in positions], axis=1) - ideal.T,
+        first_variance=np.stack([parts.first_variance for parts in positions], axis=1),
+        interaction_variance=np.stack([parts.interaction_variance for parts in positions], axis=1),
         method=method,
-        u_first=np.stack([parts.u_first for parts in found], axis=1),
-        u_total=np.stack([parts.u_total for parts in found], axis=1),
+        u_first=np.stack([parts.u_first for parts in positions], axis=1),
+        u_total=np.stack([parts.u_total for parts in positions], axis=1),
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, model_validator
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
@@ -22,9 +22,10 @@ from inercal.studies.common import (
     Version,
     site_of,
 )
-from inercal.studies.fields import Duration, RelativeUncertainty, refusal
+from inercal.studies.fields import refusal
 from inercal.studies.imu_aided import AidedTable, aided_settings
 from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings
+from inercal.studies.tables import as_typed, settings_of, table_of
 
 #: keys that not all methods heed -> those that do
 _METHODS = {
@@ -36,25 +37,13 @@ _METHODS = {
 }
 
 
-class ImuTable(Strict):
+class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     """How to calibrate the IMU."""
 
     method: Literal["multiposition", "ferraris", "aided"] = Field(
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
         "turns by a known angle; aided: on a table whose angles are in the record",
-    )
-    static_start: Duration | None = Field(
-        default=None, description="length of the still period at the start; found automatically if absent"
-    )
-    g_sensitivity: StrictBool = Field(
-        default=False, description="also estimate how the gyro's drift depends on specific force"
-    )
-    bias_drift: StrictBool = Field(
-        default=False, description="also estimate how the gyro's bias drifts with time"
-    )
-    time_base: RelativeUncertainty | None = Field(
-        default=None, description="relative standard uncertainty of the record's clock; 0 if absent"
     )
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
@@ -94,14 +83,12 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         method = ferraris_settings(file.imu.ferraris)
     elif file.imu.method == "aided":
         method = aided_settings(file.imu.aided, path)
-    return ImuSettings(
+    return settings_of(
+        ImuSettings,
+        file.imu,
         site=site_of(file.site, path),
-        static_start=None if file.imu.static_start is None else file.imu.static_start.value,
-        g_sensitivity=file.imu.g_sensitivity,
-        bias_drift=file.imu.bias_drift,
-        time_base_u=0.0 if file.imu.time_base is None else file.imu.time_base.value,
         traceability=file.traceability.model_dump(),
         method=method,
         temperature=file.conditions.temperature,
-        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+        given=as_typed(data),
     )

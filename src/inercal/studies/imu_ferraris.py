@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
 
 from pydantic import BeforeValidator, Field
@@ -11,29 +10,14 @@ from inercal._toml import Strict
 from inercal.errors import QuantityError
 from inercal.imu.ferraris.names import NAMES
 from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.studies.fields import QuantityText, refusal
-from inercal.units import Quantity, parse_quantity, shown
+from inercal.studies.fields import refusal
+from inercal.studies.tables import settings_of, table_of
+from inercal.units import parse_quantity, shown
 
 _EXPECTED = (
     'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a '
     "label"
 )
-
-TurnAngle = Annotated[
-    Quantity,
-    QuantityText(
-        "angle",
-        "360(0.5) deg",
-        lambda a: math.radians(10.0) <= abs(a) <= math.radians(36000.0),
-        "an angle of 10 deg to 36000 deg, negative for turns against the right-hand rule",
-    ),
-]
-Alignment = Annotated[
-    Quantity,
-    QuantityText(
-        "angle", "0.5 deg", lambda a: 0.0 <= a <= math.radians(20.0), "a standard uncertainty up to 20 deg"
-    ),
-]
 
 
 def _ends(value: object) -> object:
@@ -82,19 +66,9 @@ class SectionsTable(Strict):
     z_rot: Section | None = Field(default=None, description="the turn about z, from rest to rest")
 
 
-class FerrarisTable(Strict):
+class FerrarisTable(table_of(FerrarisSettings)):  # type: ignore[misc]
     """Options of the Ferraris calibration: six positions, each axis up and down, and a turn about each axis."""
 
-    turn: TurnAngle | None = Field(
-        default=None,
-        description="angle of the turns, positive about the positive axis by the right-hand rule, perhaps with its "
-        "standard uncertainty; 360 deg if absent",
-    )
-    alignment: Alignment | None = Field(
-        default=None,
-        description="standard uncertainty of the direction of each position and of the axis of each turn; from the "
-        "scatter of the positions if absent",
-    )
     sections: SectionsTable = Field(
         default=SectionsTable(),
         title="Sections",
@@ -106,9 +80,7 @@ def ferraris_settings(table: FerrarisTable) -> FerrarisSettings:
     """The options in SI."""
     given = {name: ends for name in NAMES if (ends := getattr(table.sections, name)) is not None}
     sections = {name: _span(ends) for name, ends in given.items()}
-    turn = {} if table.turn is None else {"turn": table.turn.value, "turn_u": table.turn.u}
-    alignment = None if table.alignment is None else table.alignment.value
-    return FerrarisSettings(**turn, alignment=alignment, sections=sections)
+    return settings_of(FerrarisSettings, table, sections=sections)
 
 
 def _span(ends: list[str] | list[int] | str) -> tuple[float, float] | str:

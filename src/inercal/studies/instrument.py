@@ -6,17 +6,16 @@ import difflib
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 from pydantic import Field, WithJsonSchema
 
-from inercal._toml import Strict
 from inercal.errors import QuantityError, StudyError
 from inercal.instruments.by_angle import CHANNELS, channel_model
 from inercal.instruments.terms import TERMS
 from inercal.records.channels import misfit
-from inercal.studies.fields import Duration, QuantityText, positive
+from inercal.studies.tables import settings_of, table_of
 from inercal.turntable.settings import Instrument
 from inercal.units import Quantity, Unit, parse_quantity, parse_unit, shown
 
@@ -24,8 +23,6 @@ Typed = Annotated[
     Any, WithJsonSchema({"type": ["string", "number"], "examples": ["50 deg/h", "2 deg/h/g^2", "1.00(2)"]})
 ]
 """A quantity whose unit depends on the term and on the instrument."""
-
-Rate = Annotated[Quantity, QuantityText("frequency", "10 Hz", positive, "a frequency above zero")]
 
 MOST_SAMPLES = 1_000_000_000
 """Samples in a dwell that somebody may wait for."""
@@ -37,12 +34,9 @@ RATE_TERMS = tuple(f"{symbol}_{axis}" for axis in "xyz" for symbol in ("S_asym",
 _USUAL_UNIT = {"gyrowheel": "rad/s", "gyro": "rad/s", "accelerometer": "m/s^2"}
 
 
-class InstrumentTable(Strict):
+class InstrumentTable(table_of(Instrument)):  # type: ignore[misc]
     """The instrument on the table."""
 
-    kind: Literal["gyrowheel", "gyro", "accelerometer"] = Field(
-        default="gyrowheel", description="gyrowheel (two drift outputs), gyro or accelerometer (one to three)"
-    )
     unit: str | None = Field(
         default=None,
         description="of its outputs where no record says it; that of the noise, rad/s or m/s^2 if absent",
@@ -59,17 +53,6 @@ class InstrumentTable(Strict):
         default=None,
         description="standard deviation of a reading, or random walk; from the scatter if absent",
         examples=["0.01 deg/h", "0.001 deg/sqrt(h)"],
-    )
-    dwell: Duration = Field(
-        default_factory=lambda: parse_quantity("60 s", "time", "dwell"),
-        description="time in each position; 60 s if absent",
-    )
-    sample_rate: Rate | None = Field(
-        default=None, description="samples per second of a simulation; one row a position if absent"
-    )
-    earth_rate: Literal["fitted", "stated"] | None = Field(
-        default=None,
-        description="whether the response to earth rate is fitted; if absent where the plan allows",
     )
 
 
@@ -112,23 +95,23 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
         values[symbol] = value
         if u > 0.0:
             uncertainties[symbol] = u
-    if table.sample_rate is not None and table.sample_rate.value * table.dwell.value > MOST_SAMPLES:
-        raise StudyError(
-            where,
-            f"instrument.sample_rate: found {table.sample_rate.value * table.dwell.value:.4g} samples in a dwell, "
-            f"expected at most {MOST_SAMPLES:.0e}",
-        )
-    return Instrument(
-        kind=table.kind,
+    found = settings_of(
+        Instrument,
+        table,
         unit=unit,
         terms=None if table.terms is None else tuple(table.terms),
         coefficients=values,
         coefficients_u=uncertainties,
-        noise=None if table.noise is None else _noise(table.noise, unit, table.dwell.value, where),
-        dwell=table.dwell.value,
-        sample_rate=None if table.sample_rate is None else table.sample_rate.value,
-        earth_rate=table.earth_rate,
     )
+    if found.sample_rate is not None and found.sample_rate * found.dwell > MOST_SAMPLES:
+        raise StudyError(
+            where,
+            f"instrument.sample_rate: found {found.sample_rate * found.dwell:.4g} samples in a dwell, "
+            f"expected at most {MOST_SAMPLES:.0e}",
+        )
+    if table.noise is None:
+        return found
+    return replace(found, noise=_noise(table.noise, unit, found.dwell, where))
 
 
 def _unit(table: InstrumentTable, where: object) -> Unit:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, StrictBool, StrictInt, create_model
+from pydantic import Field, StrictInt, create_model
 
 from inercal._toml import Strict, check
 from inercal.arrays import Array
@@ -19,9 +19,7 @@ from inercal.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.settings import (
     Disturbances,
-    FactorKind,
     Filter,
-    FilterKind,
     Gating,
     Noise,
     Search,
@@ -36,9 +34,10 @@ from inercal.studies.common import (
     Version,
     site_on_earth,
 )
-from inercal.studies.fields import Duration, QuantityText, Several, SeveralTexts, positive
+from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive
 from inercal.studies.gimbals import GimbalsTable, base_of, gimbals_of, limits_of
 from inercal.studies.rig import Angle
+from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.studies.turns import PlanTable, plan_of
 from inercal.units import Quantity, parse_quantity
 
@@ -108,21 +107,6 @@ class TruthTable(_TRUE):  # type: ignore[misc]
     """True coefficients of a simulation, in the product form, three of each group."""
 
 
-_WALK = QuantityText("angle random walk", "5e-4 deg/sqrt(h)", positive, "an angle random walk above zero")
-_ACCELEROMETER = QuantityText(
-    "acceleration", "10 ug", positive, "a standard deviation of a sample above zero"
-)
-_ENCODER = QuantityText("angle", "2 arcsec", positive, "a standard deviation of a sample above zero")
-
-
-class NoiseTable(Strict):
-    """Noise of the instruments."""
-
-    angle_random_walk: Annotated[Quantity, _WALK] = Field(description="of the gyros")
-    accelerometer: Annotated[Quantity, _ACCELEROMETER] = Field(description="standard deviation of a sample")
-    encoder: Annotated[Quantity, _ENCODER] = Field(description="standard deviation of a sample of an angle")
-
-
 def _of_deviations(what: str, note: str) -> dict[str, Any]:
     """Fields of one standard deviation for each group, or three; ``note`` on what absent ones mean."""
     fields = {}
@@ -150,26 +134,15 @@ class GoalTable(_WANTED):  # type: ignore[misc]
     """Wanted standard uncertainties: one for a group, or three."""
 
 
-class FilterTable(Strict):
+class FilterTable(table_of(Filter)):  # type: ignore[misc]
     """Which estimator, and how."""
 
-    kind: FilterKind = Field(default="error-state", description="the estimator; --filter overrides it")
-    extended: StrictBool = Field(
-        default=False, description="estimate gyro scale errors and the encoders' zero too"
-    )
     gating: Literal["off", "any", "two", "channel"] = Field(
         default="off",
         description="near-level gating: stop where any accelerometer is near level, where two are, or each by itself",
     )
     gating_stops: Literal["accelerometers", "step"] = Field(
         default="accelerometers", description="what gating stops: the accelerometers, or the whole update"
-    )
-    factor: FactorKind | None = Field(
-        default=None,
-        description="of the covariance, for sigma points; cholesky if absent, but eigen for svd-qukf",
-    )
-    integration: Literal["rk4", "euler"] = Field(
-        default="rk4", description="of the gimbal angles, for gimbal-ukf"
     )
 
 
@@ -182,42 +155,10 @@ class HarmonicTable(Strict):
     phase: Angle | None = Field(default=None, description="at angle 0; 0 if absent")
 
 
-class DisturbancesTable(Strict):
+class DisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
     """What a simulation adds to the model; nothing if absent."""
 
-    dropouts: (
-        Annotated[
-            Quantity, QuantityText("number", "1 %", lambda p: 0.0 <= p < 1.0, "a part from 0 to below 1")
-        ]
-        | None
-    ) = Field(default=None, description="part of the rows without accelerometers and angles; 0 if absent")
     harmonics: list[HarmonicTable] = Field(default=[], description="errors of the encoders; none if absent")
-    command_delay: (
-        Annotated[Quantity, QuantityText("time", "0.2 s", lambda t: t >= 0.0, "a time of 0 or more")] | None
-    ) = Field(default=None, description="by which the platform acts later than commanded; 0 if absent")
-
-
-class SearchTable(Strict):
-    """The search for a path."""
-
-    turns: Annotated[StrictInt, Field(ge=1, le=50)] = Field(default=5, description="how many at most")
-    angle: (
-        Annotated[
-            Quantity,
-            QuantityText(
-                "angle", "30 deg", lambda a: 0.0 < a <= 2.0 * math.pi, "an angle above 0 and up to 360 deg"
-            ),
-        ]
-        | None
-    ) = Field(default=None, description="turns are multiples of it; 30 deg if absent")
-    time: Duration | None = Field(
-        default=None, description="most that the path may take; that of the plan if absent"
-    )
-    criterion: Literal["worst", "mean"] = Field(
-        default="mean",
-        description="the mean of all uncertainties on a log scale, or the largest over goal or prior (worst)",
-    )
-    seed: Annotated[StrictInt, Field(ge=0)] = Field(default=1, description="of the random starts")
 
 
 class SelfcalStudyFile(Strict):
@@ -232,7 +173,7 @@ class SelfcalStudyFile(Strict):
     truth: TruthTable | None = Field(
         default=None, title="Truth", description="true coefficients, for simulations"
     )
-    noise: NoiseTable = Field(title="Noise", description="noise of the instruments")
+    noise: Stated[Noise] = Field(title="Noise", description="noise of the instruments")
     prior: PriorTable = Field(
         default=PriorTable(), title="Prior", description="what is known before the test"
     )
@@ -241,7 +182,7 @@ class SelfcalStudyFile(Strict):
     disturbances: DisturbancesTable = Field(
         default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
     )
-    design: SearchTable = Field(default=SearchTable(), title="Design", description="the search for a path")
+    design: Stated[Search] = Field(default=Search(), title="Design", description="the search for a path")
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -253,10 +194,9 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
     """
     file = check(SelfcalStudyFile, data, path, StudyError)
     base, limits = base_of(file.rig), limits_of(file.rig, path)
-    noise = file.noise
     return SelfcalSettings(
         site=_site(file.site, path),
-        noise=Noise(noise.angle_random_walk.value, noise.accelerometer.value, noise.encoder.value),
+        noise=file.noise,
         prior=_prior(file.prior, base),
         gimbals=gimbals_of(file.rig),
         base=base,
@@ -267,10 +207,10 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         goal=_wanted(file.goal),
         filter=_filter(file.filter),
         disturbances=_disturbances(file.disturbances),
-        search=_search(file.design),
+        search=file.design,
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
-        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+        given=as_typed(data),
     )
 
 
@@ -318,16 +258,17 @@ def _wanted(table: GoalTable) -> dict[str, float]:
     }
 
 
-def _filter(table: FilterTable) -> Filter:
+def _filter(table: Any) -> Filter:
     """The estimator."""
     gating = None if table.gating == "off" else Gating(table.gating, table.gating_stops)
-    return Filter(table.kind, table.extended, gating, table.factor, table.integration)
+    return settings_of(Filter, table, gating=gating)
 
 
-def _disturbances(table: DisturbancesTable) -> Disturbances:
+def _disturbances(table: Any) -> Disturbances:
     """What a simulation adds."""
-    return Disturbances(
-        dropouts=0.0 if table.dropouts is None else table.dropouts.value,
+    return settings_of(
+        Disturbances,
+        table,
         harmonics=tuple(
             (
                 "xyz".index(each.axis),
@@ -337,17 +278,4 @@ def _disturbances(table: DisturbancesTable) -> Disturbances:
             )
             for each in table.harmonics
         ),
-        command_delay=0.0 if table.command_delay is None else table.command_delay.value,
-    )
-
-
-def _search(table: SearchTable) -> Search:
-    """The search for a path."""
-    usual = Search()
-    return Search(
-        table.turns,
-        usual.angle if table.angle is None else table.angle.value,
-        None if table.time is None else table.time.value,
-        table.criterion,
-        table.seed,
     )

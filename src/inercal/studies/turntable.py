@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, StrictInt
+from pydantic import Field
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
@@ -21,20 +21,16 @@ from inercal.studies.common import (
     Version,
     site_on_earth,
 )
-from inercal.studies.fields import QuantityText, RelativeUncertainty, positive
 from inercal.studies.instrument import InstrumentTable, instrument_of
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
+from inercal.studies.tables import as_typed, settings_of, table_of
 from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
-from inercal.units import Quantity
 
 OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
-Seed = Annotated[StrictInt, Field(ge=0)]
-AnyRate = Annotated[Quantity, QuantityText("rate", "10 deg/s")]
-RateAbove = Annotated[Quantity, QuantityText("rate", "100 deg/s", positive, "a rate above zero")]
 
 
-class AnalysisTable(Strict):
+class AnalysisTable(table_of(Analysis)):  # type: ignore[misc]
     """The sensitivity analysis."""
 
     outputs: list[OutputName] = Field(
@@ -42,16 +38,6 @@ class AnalysisTable(Strict):
         min_length=1,
         description="components of gravity (a) and earth rate (w) on the instrument's axes",
     )
-    method: Literal["exact", "sampled", "local"] = Field(
-        default="exact", description="exact, from samples, or from derivatives alone"
-    )
-    sampling: Literal["random", "sobol"] = Field(
-        default="sobol", description="plain random rows, or scrambled Sobol points; for sampled"
-    )
-    samples: Annotated[StrictInt, Field(ge=2, le=2**24)] = Field(
-        default=1024, description="rows at each position; for sampled"
-    )
-    seed: Seed = Field(default=1, description="of the random numbers; for sampled")
 
 
 class ConstraintTable(Strict):
@@ -62,16 +48,9 @@ class ConstraintTable(Strict):
     below: Annotated[float, Field(gt=0.0, le=1.0)] = Field(description="what each index stays below")
 
 
-class DesignTable(Strict):
+class DesignTable(table_of(Design)):  # type: ignore[misc]
     """The search for positions."""
 
-    positions: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(default=24, description="how many")
-    criterion: Literal["D", "A", "I"] = Field(
-        default="D", description="D: volume, A: mean variance of the coefficients; I: variance of prediction"
-    )
-    table_errors: StrictBool = Field(
-        default=True, description="judge with the errors of the table, or by the noise alone"
-    )
     candidates: GridTable | None = Field(
         default=None,
         title="Candidates",
@@ -83,7 +62,6 @@ class DesignTable(Strict):
     sensitivity: ConstraintTable | None = Field(
         default=None, title="Sensitivity", description="only positions of low sensitivity; all if absent"
     )
-    seed: Seed = Field(default=1, description="of the random starts")
 
 
 class AnglesTable(Strict):
@@ -94,20 +72,9 @@ class AnglesTable(Strict):
     phi3: Angle | None = Field(default=None, description="of the inner axis of three; 0 if absent")
 
 
-class RateTestTable(Strict):
+class RateTestTable(table_of(RateTest)):  # type: ignore[misc]
     """A rate test of gyros: the table turns at each rate in turn."""
 
-    joint: str = Field(default="phi2", description="axis that turns")
-    full_scale: RateAbove | None = Field(
-        default=None, description="rate that non-linearity is stated against; the largest if absent"
-    )
-    order: Literal[1, 2, 3] = Field(default=1, description="1 scale factor alone, 2 and 3 with S2 and S3")
-    rates: list[AnyRate] | None = Field(
-        default=None, min_length=1, description="rates of a simulation, in the order taken"
-    )
-    rate_uncertainty: RelativeUncertainty | None = Field(
-        default=None, description="relative standard uncertainty of the table's rate; 0 if absent"
-    )
     at: AnglesTable = Field(
         default=AnglesTable(), title="At", description="angles of a simulation, where each stay begins"
     )
@@ -157,14 +124,14 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
-        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+        given=as_typed(data),
     )
 
 
 def _analysis(table: AnalysisTable, where: object) -> Analysis:
     """How to analyse; each output once."""
     _once(table.outputs, "analysis.outputs", where)
-    return Analysis(tuple(table.outputs), table.method, table.sampling, table.samples, table.seed)
+    return settings_of(Analysis, table, outputs=tuple(table.outputs))
 
 
 def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> Design:
@@ -176,14 +143,12 @@ def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> 
         _once(limit.factors, "design.sensitivity.factors", where)
         _once(limit.outputs, "design.sensitivity.outputs", where)
         constraint = Constraint(tuple(limit.factors), tuple(limit.outputs), limit.below)
-    return Design(
+    return settings_of(
+        Design,
+        table,
         candidates=grid_of(table.candidates, chain, limits, "design.candidates", where, half=False),
-        positions=table.positions,
-        criterion=table.criterion,
-        table_errors=table.table_errors,
         compare=compared(table.compare, chain, limits, where),
         constraint=constraint,
-        seed=table.seed,
     )
 
 
@@ -192,14 +157,7 @@ def _rate_test(table: RateTestTable, chain: Chain, where: object) -> RateTest:
     _known([table.joint], chain.joints, "rate_test.joint", where)
     at = {joint: angle.value for joint in AnglesTable.model_fields if (angle := getattr(table.at, joint))}
     _known(list(at), chain.joints, "rate_test.at", where)
-    return RateTest(
-        joint=table.joint,
-        full_scale=None if table.full_scale is None else table.full_scale.value,
-        rates=tuple(rate.value for rate in table.rates or ()),
-        rate_u=0.0 if table.rate_uncertainty is None else table.rate_uncertainty.value,
-        order=table.order,
-        at=at,
-    )
+    return settings_of(RateTest, table, at=at)
 
 
 def _known(names: Sequence[str], known: Sequence[str], key: str, where: object) -> None:

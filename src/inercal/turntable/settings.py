@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from inercal.geometry.site import Site
+from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity
 from inercal.rigs.chain import Chain
 from inercal.rigs.plans import Plan
 from inercal.units import Quantity, Unit
@@ -14,17 +15,17 @@ from inercal.units import Quantity, Unit
 
 @dataclass(frozen=True)
 class Analysis:
-    """A sensitivity analysis.
-
-    ``outputs`` names of `inercal.rigs.outputs.NAMES`; ``method`` exact, sampled or local; for a sampled one
-    ``sampling`` plain random rows or scrambled Sobol points, ``samples`` N, and ``seed``.
-    """
+    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`."""
 
     outputs: tuple[str, ...] = ("ax", "ay", "az", "wx", "wy")
-    method: Literal["exact", "sampled", "local"] = "exact"
-    sampling: Literal["random", "sobol"] = "sobol"
-    samples: int = 1024
-    seed: int = 1
+    method: Literal["exact", "sampled", "local"] = option(
+        "exact, from samples, or from derivatives alone", "exact"
+    )
+    sampling: Literal["random", "sobol"] = option(
+        "plain random rows, or scrambled Sobol points; for sampled", "sobol"
+    )
+    samples: int = option("rows at each position; for sampled", 1024, least=2, most=2**24)
+    seed: int = option("of the random numbers; for sampled", 1, least=0)
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,8 @@ class Instrument:
 
     Attributes
     ----------
-    kind : str
-        ``gyrowheel``, ``gyro`` or ``accelerometer``, a key of `inercal.instruments.by_angle.CHANNELS`.
+    kind, dwell, sample_rate, earth_rate
+        As their keys say; the kind is a key of `inercal.instruments.by_angle.CHANNELS`.
     unit : Unit
         Of its outputs in a record that is simulated. Coefficients and noise are in its SI unit where it is one of
         rate or acceleration (then k_x is a pure number), else in the unit itself (count, V, 1).
@@ -47,23 +48,24 @@ class Instrument:
         Their standard uncertainties, where stated.
     noise : float or None
         Standard deviation of a reading (the mean over a dwell), SI; None: estimated from the scatter.
-    dwell : float
-        Time in each position [s].
-    sample_rate : float or None
-        Samples per second; None: one row for each position.
-    earth_rate : str or None
-        ``fitted`` or ``stated``; None: fitted where the plan allows, else stated.
     """
 
-    kind: Literal["gyrowheel", "gyro", "accelerometer"] = "gyrowheel"
+    kind: Literal["gyrowheel", "gyro", "accelerometer"] = option(
+        "gyrowheel (two drift outputs), gyro or accelerometer (one to three)", "gyrowheel"
+    )
     unit: Unit = field(default_factory=lambda: Unit("rad/s", "rate", 1.0))
     terms: tuple[str, ...] | None = None
     coefficients: Mapping[str, float] = field(default_factory=dict)
     coefficients_u: Mapping[str, float] = field(default_factory=dict)
     noise: float | None = None
-    dwell: float = 60.0
-    sample_rate: float | None = None
-    earth_rate: Literal["fitted", "stated"] | None = None
+    dwell: float = quantity("time in each position", "time", "60 s", bounds=TIME)
+    sample_rate: float | None = quantity(
+        "samples per second of a simulation; one row a position if absent", "frequency", example="10 Hz",
+        bounds=FREQUENCY,
+    )  # fmt: skip
+    earth_rate: Literal["fitted", "stated"] | None = option(
+        "whether the response to earth rate is fitted; if absent where the plan allows", None
+    )
 
     @property
     def samples(self) -> int:
@@ -82,47 +84,42 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A search for positions.
+    """The search for positions.
 
-    ``positions`` how many; ``criterion`` D, A or I; ``table_errors`` judge by the covariance with table errors
-    and not by the noise alone; ``candidates`` from which to choose; ``compare`` named plans to set beside;
-    ``constraint`` the paper's; ``seed`` of the random starts.
+    ``candidates`` from which to choose; ``compare`` named plans to set beside; ``constraint`` the paper's.
     """
 
     candidates: Plan
-    positions: int = 24
-    criterion: Literal["D", "A", "I"] = "D"
-    table_errors: bool = True
+    positions: int = option("how many", 24, least=1, most=1000)
+    criterion: Literal["D", "A", "I"] = option(
+        "D: volume, A: mean variance of the coefficients; I: variance of prediction", "D"
+    )
+    table_errors: bool = option("judge with the errors of the table, or by the noise alone", True)
     compare: tuple[str, ...] = ()
     constraint: Constraint | None = None
-    seed: int = 1
+    seed: int = option("of the random starts", 1, least=0)
 
 
 @dataclass(frozen=True)
 class RateTest:
-    """A rate test: the table turns about ``joint`` at each rate in turn, whole turns or not.
+    """A rate test of gyros: the table turns at each rate in turn, by whole turns or not.
 
-    Attributes
-    ----------
-    joint : str
-        The one that turns.
-    full_scale : float or None
-        Rate [rad/s] by which non-linearity is divided; None: the largest of the record.
-    rates : tuple of float
-        Rates [rad/s] of a simulation, in the order taken.
-    rate_u : float
-        Relative standard uncertainty of the table's rate, common to all rates.
-    order : int
-        Of the polynomial that is fitted: 1 scale factor, 2 and 3 with S2 and S3.
-    at : mapping
-        Angles [rad] of a simulation: where the other joints stand and each stay begins; 0 where nothing is said.
+    ``at`` holds angles [rad] of a simulation: where the other joints stand and each stay begins; 0 where absent.
     """
 
-    joint: str = "phi2"
-    full_scale: float | None = None
-    rates: tuple[float, ...] = ()
-    rate_u: float = 0.0
-    order: Literal[1, 2, 3] = 1
+    joint: str = option("axis that turns", "phi2")
+    full_scale: float | None = quantity(
+        "rate that non-linearity is stated against; the largest if absent", "rate", example="100 deg/s",
+        bounds=RATE,
+    )  # fmt: skip
+    order: Literal[1, 2, 3] = option("1 scale factor alone, 2 and 3 with S2 and S3", 1)
+    rates: tuple[float, ...] = quantities(
+        "rates of a simulation, in the order taken", "rate", example=["-10 deg/s", "10 deg/s"]
+    )
+    rate_u: float = quantity(
+        "relative standard uncertainty of the table's rate, common to all rates", "number", "0", example="20 ppm",
+        bounds=RELATIVE_U, name="rate_uncertainty",
+    )  # fmt: skip
     at: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -72,7 +72,7 @@ def _freed() -> Array:
 
 
 def _left() -> list[float]:
-    """What mechanical compensation leaves by a gyro that errs by 0.2 deg/s, over what a low pass leaves [%]."""
+    """Error left by mechanical compensation with a gyro that errs by 0.2 deg/s, over that of a low pass [%]."""
     shares = []
     for rate in _RATES:
         t = np.arange(0.0, 4.0, 1e-3)
@@ -94,19 +94,19 @@ def _late() -> list[float]:
     )
     none = Noise(1e-12, 1e-12, 1e-12, 1e-12)
     of = AoaSettings(Site(_G), _LAYOUT, none, motion=motion, disturbances=Disturbances(common_delay=1.5e-3))
-    told = simulate(of, np.random.default_rng(1), {"b_1": 0.0, "b_2": 0.0, "b_3": 0.0, "b_g": 0.0})
-    off = measure_by(told.recording, of, Methods()).theta - told.theta
+    simulated = simulate(of, np.random.default_rng(1), {"b_1": 0.0, "b_2": 0.0, "b_3": 0.0, "b_g": 0.0})
+    off = measure_by(simulated.recording, of, Methods()).theta - simulated.theta
     return [float(np.abs(off[100:-100]).max()) / _DEG]
 
 
 def _flow() -> Array:
     """alpha and beta at theta of -20, 10, 35 deg and rolls of 0, 90, -30 deg, in degrees."""
     theta, none = np.array([-20.0, 10.0, 35.0]) * _DEG, np.zeros(1)
-    found = [
+    flows = [
         alpha_beta(one[None], none, Attitude(roll=parse_quantity(roll, "angle", "roll")))
         for one, roll in zip(theta, ("0 deg", "90 deg", "-30 deg"), strict=True)
     ]
-    return np.array([[flow.alpha[0], flow.beta[0]] for flow in found]) / _DEG
+    return np.array([[flow.alpha[0], flow.beta[0]] for flow in flows]) / _DEG
 
 
 _30 = 30.0 * _DEG
@@ -117,14 +117,14 @@ _35 = 35.0 * _DEG
 def _sting(smooth: bool) -> tuple[Measurement, Array]:
     """The recording that ships by the fusion, and the true angle [rad] at its rows."""
     settings = load_aoa_study(study_of("sting"), ("estimator.smooth=true",) if smooth else ())
-    told = simulate(settings, np.random.default_rng(1))
-    return measure(record_of("sting"), settings), told.theta
+    simulated = simulate(settings, np.random.default_rng(1))
+    return measure(record_of("sting"), settings), simulated.theta
 
 
 def _errors(smooth: bool) -> Array:
     """Errors of the angle over its standard uncertainty, at every tenth row from 5 s on."""
-    found, true = _sting(smooth)
-    return np.asarray((found.angles.theta - true) / found.angles.u)[1250::10]
+    measured, true = _sting(smooth)
+    return np.asarray((measured.angles.theta - true) / measured.angles.u)[1250::10]
 
 
 def _last() -> list[float]:

@@ -47,8 +47,9 @@ class Case:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """What a case found: ``values`` (n,) in so many ``seconds``; without any, why (``error``, one line)."""
+class Numbers:
+    """Outcome of a case: ``values`` (n,) and the ``seconds`` they took; ``error`` says in one line why there are
+    none."""
 
     values: Array
     seconds: float = 0.0
@@ -73,22 +74,22 @@ class Outcome:
     error: str = ""
 
 
-def find(case: Case) -> Found:
+def find(case: Case) -> Numbers:
     """The numbers of a case; whatever goes wrong is kept as a reason, for the next case is to be tried too."""
     began = time.perf_counter()
     try:
         values = np.asarray(case.find(), dtype=float).ravel()
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        return Found(np.empty(0), time.perf_counter() - began, reason)
-    return Found(values, time.perf_counter() - began)
+        return Numbers(np.empty(0), time.perf_counter() - began, reason)
+    return Numbers(values, time.perf_counter() - began)
 
 
-def judge(case: Case, found: Found) -> Outcome:
+def judge(case: Case, numbers: Numbers) -> Outcome:
     """The verdict on what a case found: numbers that are missing, too many, or none (NaN) do not pass."""
     expected = np.asarray(case.expected, dtype=float).ravel()
     limit = np.broadcast_to(np.asarray(case.limit, dtype=float).ravel(), expected.shape)
-    values, error = found.values, found.error
+    values, error = numbers.values, numbers.error
     if not error and len(values) != len(expected):
         error = f"found {len(values)} numbers, expected {len(expected)}"
     if error:
@@ -104,6 +105,6 @@ def judge(case: Case, found: Found) -> Outcome:
         float(expected[worst]),
         float(limit[worst]),
         len(expected),
-        found.seconds,
+        numbers.seconds,
         error,
     )

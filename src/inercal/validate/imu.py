@@ -122,13 +122,13 @@ def _imucal(name: str) -> list[Array]:
 
 def _ferraris(name: str) -> Array:
     """The same as found, each part less the published one and over its largest number."""
-    found = _calibrated(name, "imu.ferraris.turn=-360 deg", "site.gravity=9.81 m/s^2")
+    estimate = _calibrated(name, "imu.ferraris.turn=-360 deg", "site.gravity=9.81 m/s^2")
     parts = [
-        _matrix(found, "K1", "M"),
-        _vector(found, "K0"),
-        _matrix(found, "S", "T") * np.pi / 180.0,
-        _vector(found, "D_F"),
-        np.array([[found[f"G_{i}{j}"].value for j in _AXES] for i in _AXES]),
+        _matrix(estimate, "K1", "M"),
+        _vector(estimate, "K0"),
+        _matrix(estimate, "S", "T") * np.pi / 180.0,
+        _vector(estimate, "D_F"),
+        np.array([[estimate[f"G_{i}{j}"].value for j in _AXES] for i in _AXES]),
     ]
     pairs = zip(parts, _imucal(name), strict=True)
     return np.concatenate([((own - other) / np.max(np.abs(other))).ravel() for own, other in pairs])
@@ -151,12 +151,12 @@ _TABLE_ACC_BIAS = (0.13041039201706542, 0.17227293074811315, -0.1481500012389673
 
 def _table_errors() -> Array:
     """Errors of 12 coefficients of the accelerometers over their standard uncertainties."""
-    found, true = _calibrated("table"), np.array(_TABLE_ACC)
+    estimate, true = _calibrated("table"), np.array(_TABLE_ACC)
     names = [f"K1_{i}" for i in _AXES] + [f"M_{i}{j}" for i in _AXES for j in _AXES if i != j]
     values = [*np.diag(true), *(true[i, j] / true[i, i] for i in range(3) for j in range(3) if i != j)]
     names, values = [*names, *(f"K0_{i}" for i in _AXES)], [*values, *_TABLE_ACC_BIAS]
     return np.array(
-        [(found[name].value - value) / found[name].u for name, value in zip(names, values, strict=True)]
+        [(estimate[name].value - value) / estimate[name].u for name, value in zip(names, values, strict=True)]
     )
 
 
@@ -174,9 +174,9 @@ _HOT = 74.0 ** np.arange(3, -1, -1)
 
 
 def _sweep() -> Array:
-    """What each power does at 74 degC, as found."""
-    found = {curve.name: curve.cubic for curve in fit_recording(record_of("thermal"), 0.0).curves}
-    return np.stack([found[name].coefficients[::-1] * _HOT for name in _SWEEP])
+    """Contribution of each power at 74 degC."""
+    cubics = {curve.name: curve.cubic for curve in fit_recording(record_of("thermal"), 0.0).curves}
+    return np.stack([cubics[name].coefficients[::-1] * _HOT for name in _SWEEP])
 
 
 # A simulated session without noise, and its calibration in the files of other tools.
@@ -195,10 +195,10 @@ def _session() -> tuple[Estimate, Array]:
 
 def _session_errors() -> Array:
     """Coefficients less the truth, over the size of their kind."""
-    found, true = _session()
+    estimate, true = _session()
     size = {"K0": 415.0, "K1": 415.0, "M": 1.0, "D_F": 4775.0, "S": 4775.0, "T": 1.0, "G": 478.0}
     sizes = np.array([size[name.rpartition("_")[0]] for name in NAMES])
-    return np.asarray((np.array([found[name].value for name in NAMES]) - true) / sizes)
+    return np.asarray((np.array([estimate[name].value for name in NAMES]) - true) / sizes)
 
 
 def _corrected(model: ImuModel) -> Array:
@@ -212,8 +212,8 @@ def _corrected(model: ImuModel) -> Array:
 
 def _through(tool: str) -> float:
     """Largest difference that a calibration makes after it went through the files of a tool."""
-    found, _ = _session()
-    estimate = found if tool != "imu_tk" else _without_g(found)
+    calibration, _ = _session()
+    estimate = calibration if tool != "imu_tk" else _without_g(calibration)
     with tempfile.TemporaryDirectory() as folder:
         paths = []
         for middle, text in to_tool(estimate, tool).texts.items():

@@ -66,8 +66,8 @@ def _coefficients() -> list[float]:
     off = []
     for channel in range(4):
         fit = noise_coefficients(curve, channel)
-        found = dict(zip(fit.names, zip(fit.values, fit.u, strict=True), strict=True))
-        off += [(found[name][0] - getattr(_TRUE, name)) / found[name][1] for name in "NK"]
+        terms = dict(zip(fit.names, zip(fit.values, fit.u, strict=True), strict=True))
+        off += [(terms[name][0] - getattr(_TRUE, name)) / terms[name][1] for name in "NK"]
     return off
 
 

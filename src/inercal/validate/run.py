@@ -21,7 +21,7 @@ from inercal.estimate.result import Estimate, without_parameters
 from inercal.estimate.runs import Executor, Processes, Serial
 from inercal.examples import EXAMPLES, shipped
 from inercal.findings import Finding, Status
-from inercal.validate.case import Case, Found, Outcome, find, judge
+from inercal.validate.case import Case, Numbers, Outcome, find, judge
 from inercal.validate.shipped import USED
 from inercal.validate.sources import SOURCES
 
@@ -70,19 +70,19 @@ def validate(executor: Executor, progress: Callable[[int, int], None] | None = N
     systems = list(SYSTEMS)
     cases = {system: cases_of(system) for system in systems}
     total, done = sum(map(len, cases.values())), 0
-    found: dict[str, list[Found]] = {}
+    numbers: dict[str, list[Numbers]] = {}
     # the last systems compile longest: one each for the two processes, and the small ones after them
     chunks = [range(k, k + 1) for k in reversed(range(len(systems)))]
     for chunk, results in executor.map(cast(Any, _find_all), chunks):
         system = systems[chunk[0]]
-        found[system] = cast(list[Found], results)
+        numbers[system] = cast(list[Numbers], results)
         done += len(cases[system])
         if progress is not None:
             progress(done, total)
     rows = [
         _row(system, case, judge(case, each))
         for system in systems
-        for case, each in zip(cases[system], found[system], strict=True)
+        for case, each in zip(cases[system], numbers[system], strict=True)
     ]
     failed = [row["name"] for row in rows if not row["passed"]]
     sources = {row["source"]: SOURCES[row["source"]] for row in rows}
@@ -103,7 +103,7 @@ def validate(executor: Executor, progress: Callable[[int, int], None] | None = N
     )
 
 
-def _find_all(numbers: Iterable[int]) -> list[Found]:
+def _find_all(numbers: Iterable[int]) -> list[Numbers]:
     """What the cases of some systems, by number, found."""
     systems = list(SYSTEMS)
     return [find(case) for number in numbers for case in cases_of(systems[number])]

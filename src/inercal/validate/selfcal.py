@@ -33,9 +33,9 @@ def _study() -> SelfcalSettings:
 def _at_rest(noise: Noise, prior: Array) -> Bounds:
     """Bounds of a platform that rests for 100 s, rows every 0.5 s, on an earth that does not turn."""
     asked = replace(_study(), plan=Plan((Rest(100.0),), step=0.5), noise=noise, prior=prior)
-    told = problem(asked)
-    told = replace(told, world=replace(told.world, earth=np.zeros(3)))
-    return bounds(motion(Plan((Rest(100.0),), step=0.5), told.world), told)
+    posed = problem(asked)
+    posed = replace(posed, world=replace(posed.world, earth=np.zeros(3)))
+    return bounds(motion(Plan((Rest(100.0),), step=0.5), posed.world), posed)
 
 
 def _known_but(chosen: slice, prior: float) -> Array:
@@ -47,8 +47,8 @@ def _known_but(chosen: slice, prior: float) -> Array:
 
 def _accelerometer_bias() -> Array:
     """u of the biases [ug], 200 readings of 100 ug and a prior of 30 ug."""
-    found = _at_rest(Noise(1e-15, 100.0 * _MICRO_G, 1e-15), _known_but(KA0, 30.0 * _MICRO_G))
-    return np.asarray(found.u[KA0] / _MICRO_G)
+    bounded = _at_rest(Noise(1e-15, 100.0 * _MICRO_G, 1e-15), _known_but(KA0, 30.0 * _MICRO_G))
+    return np.asarray(bounded.u[KA0] / _MICRO_G)
 
 
 def _slope() -> Array:
@@ -62,17 +62,17 @@ def _random_walk() -> Array:
 
 
 def _level_axis() -> list[float]:
-    """What two turns that leave z horizontal let be known of its scale error, over the prior."""
+    """Uncertainty of the scale error of z after two turns that leave z horizontal, over its prior."""
     asked = replace(_study(), plan=path("paper two turns"))
-    told = problem(asked)
-    found = bounds(motion(path("paper two turns"), told.world), told)
+    posed = problem(asked)
+    bounded = bounds(motion(path("paper two turns"), posed.world), posed)
     k = NAMES.index("ka1_z")
-    return [float(found.u[k] / found.prior[k])]
+    return [float(bounded.u[k] / bounded.prior[k])]
 
 
 @cache
 def _found(kind: FilterKind) -> Filtered:
-    """What an estimator makes of the recording that ships."""
+    """Result of an estimator on the recording that ships."""
     settings = _study()
     return estimate(recording_of(record_of("selfcal"), settings), problem(settings), kind, history=False)
 
@@ -81,17 +81,17 @@ def _probability() -> list[float]:
     """Probability of a smaller sum of squared errors of the 18 coefficients than that found."""
     from scipy.special import gammainc
 
-    found, true = _found("error-state"), _study().truth
+    filtered, true = _found("error-state"), _study().truth
     if true is None:
         raise ValueError("the study states no truth")
-    error = found.coefficients - to_linear(true)[:18]
-    return [float(gammainc(9.0, 0.5 * float(error @ np.linalg.solve(found.covariance, error))))]
+    error = filtered.coefficients - to_linear(true)[:18]
+    return [float(gammainc(9.0, 0.5 * float(error @ np.linalg.solve(filtered.covariance, error))))]
 
 
 def _surprise() -> list[float]:
-    """How far the mean NIS is off what it should be, in standard errors."""
-    found = _found("error-state")
-    return [nis(found.nis, found.dims).excess]
+    """Distance of the mean NIS from its expected value, in standard errors."""
+    filtered = _found("error-state")
+    return [nis(filtered.nis, filtered.dims).excess]
 
 
 def _apart() -> Array:
@@ -105,8 +105,8 @@ def _over_bounds() -> Array:
     settings = _study()
     if settings.plan is None:
         raise ValueError("the study states no plan")
-    told = problem(settings)
-    before = bounds(motion(settings.plan, told.world), told, truth=settings.truth, history=True).history[-1]
+    posed = problem(settings)
+    before = bounds(motion(settings.plan, posed.world), posed, truth=settings.truth, history=True).history[-1]
     return np.asarray(np.sqrt(np.diag(_found("error-state").covariance)) / before)
 
 

@@ -1,4 +1,4 @@
-"""Where the expected numbers of the cases are from."""
+"""Sources of the expected numbers of the cases."""
 
 from __future__ import annotations
 

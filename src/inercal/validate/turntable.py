@@ -17,11 +17,11 @@ from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
 from inercal.sensitivities import averages, exact
 from inercal.sensitivities.indices import Indices
-from inercal.turntable.campaign import TABLE, one_turntable_calibration, settings_of
 from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 from inercal.validate.case import Case
+from inercal.validate.gyrowheel import TABLE, one_turntable_calibration, settings_of
 
 _ARCMIN = np.radians(1.0 / 60.0)
 _CHAIN = turntable(TABLE, uniform(2.0 * _ARCMIN))
@@ -55,7 +55,7 @@ def _together() -> Array:
 
 
 def _key_factors() -> list[int]:
-    """How many of the paper's six key factors are among the first six by the mean over the accelerations."""
+    """Number of the paper's six key factors that are among the first six by the mean over the accelerations."""
     mean = averages.mean(_full_circle()).first.mean(axis=0)
     return [len(set(np.argsort(-mean)[:6].tolist()) & set(_columns(_OUTER + _INNER)))]
 
@@ -69,8 +69,8 @@ def _ratios() -> Array:
 
 def _vertical() -> Array:
     """Indices of az, first order and interactions, where the inner axis is vertical."""
-    found, rows = _at([[0.0, 0.0]]), _columns((*_OUTER, *_INNER, "dalpha_x1", "deps_x"))
-    return np.concatenate([found.first[2, 0, rows], found.total_minus_first[2, 0, rows]])
+    indices, rows = _at([[0.0, 0.0]]), _columns((*_OUTER, *_INNER, "dalpha_x1", "deps_x"))
+    return np.concatenate([indices.first[2, 0, rows], indices.total_minus_first[2, 0, rows]])
 
 
 def _icosahedron() -> list[float]:
@@ -98,10 +98,10 @@ def _without_errors() -> list[float]:
     1 and 50 deg/h."""
     latitude = np.radians(39.1)
     perfect = replace(settings_of(_WHEEL, None, latitude), chain=turntable(TABLE, None))
-    told = settings_of({}, 1e-6, latitude)
-    found = calibrate(simulate(perfect, np.random.default_rng(1)), told).estimate
+    settings = settings_of({}, 1e-6, latitude)
+    estimate = calibrate(simulate(perfect, np.random.default_rng(1)), settings).estimate
     size = {"k": 1.0, "D": 50.0 * _DEG_PER_H}
-    return [(found[name].value - true) / size[name[0]] for name, true in _WHEEL.items()]
+    return [(estimate[name].value - true) / size[name[0]] for name, true in _WHEEL.items()]
 
 
 _RUNS = 20

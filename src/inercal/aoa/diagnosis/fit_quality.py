@@ -1,4 +1,4 @@
-"""How well a recording fits a study: what the fusion with all its nuisances makes of the liveliest stretch of it."""
+"""How well a recording fits its study: what the fusion with all its nuisances makes of the liveliest stretch of it."""
 
 from __future__ import annotations
 
@@ -11,36 +11,25 @@ from numpy.typing import NDArray
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import Problem, problem
 from inercal.aoa.fusion.run import State, advance, initial
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, States
 from inercal.arrays import Array
 from inercal.records.checks.values import outlying
 
-STRETCH = 6000
-"""Rows that are judged."""
+_BLOCK = 50
+"""Rows that are filtered at a time."""
 
-WIDE = 3.0
-"""Standard deviations of its prior by which a coefficient may be off and still be as expected."""
-
-WIDE_SCALE = 10.0
-"""The same of the gyro's scale, which a filter that linearises also moves where a buffet is fast and small."""
-
-WHITE = 0.53
-"""Mean of log(1 + v^2) of white innovations of variance 1."""
-
-_BLOCK, _STARTS = 50, 10
-"""Rows at a time, and starts beside every tenth row from which a filter is given up."""
-
-_LARGE = 0.75
-_FAR = 1.5
+Case = tuple[Recording, AoaSettings]
+"""A recording and its study, of which hypotheses speak."""
 
 _BY_MOTION = ("dr_", "zo_", "k_g", "tau_g")
 """Coefficients that only motion shows; at rest they follow noise, and where they end says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class FitQuality:
     """What the fusion found in a stretch.
 
     ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` how far
@@ -64,23 +53,24 @@ class Judged:
     def misfit(self) -> float:
         """Sum over the sensors, and over the coefficients of log(1 + (off / 3)^2); a gyro without noise misfits too."""
         of_gyro = float(self.by_sensor[-1])
-        silent = max(0.0, WHITE - of_gyro) if np.isfinite(self.innovations[:, -1]).any() else 0.0
+        silent = max(0.0, LIMITS.white_log - of_gyro) if np.isfinite(self.innovations[:, -1]).any() else 0.0
         return float(self.by_sensor.sum() + silent + np.log1p(self._far**2).sum())
 
     @property
     def white(self) -> bool:
         """True where the innovations of no sensor are larger than its noise."""
-        return bool(self.by_sensor.max() < _LARGE)
+        return bool(self.by_sensor.max() < LIMITS.loud_log)
 
     @property
     def fits(self) -> bool:
         """True where no sensor and no coefficient is beyond what its noise and its prior explain."""
-        return bool(self.white and np.abs(self._far).max() < _FAR)
+        return bool(self.white and np.abs(self._far).max() < LIMITS.far_ratio)
 
     @property
     def _far(self) -> Array:
         """How far the coefficients are off, over what is expected at most."""
-        return np.array([0.0, *(v / (WIDE_SCALE if k == "k_g" else WIDE) for k, v in self.off.items())])
+        wide, wide_scale = LIMITS.prior_sigmas, LIMITS.gyro_scale_sigmas
+        return np.array([0.0, *(v / (wide_scale if k == "k_g" else wide) for k, v in self.off.items())])
 
 
 def _logarithm(v: Array) -> float:
@@ -90,15 +80,15 @@ def _logarithm(v: Array) -> float:
 
 
 def stretch(recording: Recording) -> Recording:
-    """Up to `STRETCH` rows that go on in time, those in which the sensors vary most, without single wild samples."""
-    taken = later(recording.t)
-    if len(taken) > STRETCH:
+    """The rows in which the sensors vary most, of those that go on in time, without single wild samples."""
+    taken, most = later(recording.t), LIMITS.judged_rows
+    if len(taken) > most:
         read = np.column_stack([recording.acc, recording.gyro])[taken]
         scale = _scatter(read)
-        starts = np.arange(0, len(taken) - STRETCH + 1, STRETCH // 2)
-        lively = [float((_scatter(read[k : k + STRETCH]) / scale).sum()) for k in starts]
+        starts = np.arange(0, len(taken) - most + 1, most // 2)
+        lively = [float((_scatter(read[k : k + most]) / scale).sum()) for k in starts]
         first = int(starts[int(np.argmax(lively))])
-        taken = taken[first : first + STRETCH]
+        taken = taken[first : first + most]
     part = of_rows(recording, taken)
     for column in (*part.acc.T, part.gyro, *part.turns.T):
         # mirrored at the ends, where a sample has one neighbour
@@ -125,7 +115,7 @@ def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
     )
 
 
-def judge(recording: Recording, settings: AoaSettings, states: States = 19) -> Judged:
+def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19) -> FitQuality:
     """Filter a stretch whose time goes on."""
     asked = replace(settings, estimator=replace(settings.estimator, states=states))
     posed = problem(asked, recording.spatial)
@@ -140,7 +130,7 @@ def judge(recording: Recording, settings: AoaSettings, states: States = 19) -> J
         for name, each in zip(posed.nuisances, off.tolist(), strict=True)
         if not (still and name.startswith(_BY_MOTION))
     }
-    return Judged(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)
+    return FitQuality(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)
 
 
 def _followed(posed: Problem, t: Array, rows: Array) -> tuple[State, Array]:
@@ -153,7 +143,7 @@ def _followed(posed: Problem, t: Array, rows: Array) -> tuple[State, Array]:
         state, trace = advance(state, posed, t[a:b], rows[a:b], last=b == len(t))
         out[done : done + len(trace.out)] = trace.out
         done, starts = done + len(trace.out), starts + len(trace.starts)
-        if starts > 0.1 * b + _STARTS:
+        if starts > LIMITS.lost_share * b + LIMITS.lost_starts:
             break
     return state, out
 

@@ -1,8 +1,8 @@
-"""Gross faults of a recording or of its study: what may be wrong, and both as they would be without it.
+"""Gross faults of a recording or of its study: hypotheses without parameters, of signs, units, order and clocks.
 
 The commonest slips at the edge: a sensor reversed, columns exchanged, a unit taken for another, positions in mm taken
 for m or counted backwards. Each is judged by what the fusion makes of the recording without it
-(`inercal.aoa.diagnosis.plausibility`); none is believed here.
+(`inercal.aoa.diagnosis.examination`); none is believed here.
 """
 
 from __future__ import annotations
@@ -10,24 +10,25 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from inercal.aoa.diagnosis.fit_quality import judge, rms
+from inercal.aoa.diagnosis.fit_quality import Case, fit_quality, rms
 from inercal.aoa.diagnosis.noise_check import scatter
 from inercal.aoa.layout import AXES
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.delay import aligned, relative_delay
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.estimate.hypotheses import Hypothesis
 from inercal.units import STANDARD_GRAVITY
 
-Change = Callable[[Recording, AoaSettings], tuple[Recording, AoaSettings]]
+Change = Callable[[Recording, AoaSettings], Case]
 
-_MOST_ORDERS = 24
-"""Orders of accelerometers up to which all are tried; of more accelerometers pairs alone are exchanged."""
+OTHER_CHANNEL = "gyro does not tell of the pitch that the accelerometers show"
+"""The hypothesis than which any other is likelier."""
 
 #: what values [SI] are to be multiplied by -> the unit they look to be in, and that they were taken for
 _ACCELEROMETER_UNITS = {
@@ -55,31 +56,10 @@ _LENGTHS = {
     1e1: ("cm", "mm"),
 }
 
-_STILL = 5.0
-"""Times its noise by which a gyro may wander where the model does not move."""
 
-_FEWEST = 100
-"""Rows by which a gyro is held to accelerometers."""
-
-_ARM, _PLAIN = 0.1, 0.02 * STANDARD_GRAVITY
-"""The lever arm [m] of a model at least, and accelerations [m/s^2] from which it shows plainly."""
-
-_LONGEST, _SHORTEST = 3.0, 0.01
-"""Lever arms [m] between which the largest of a model is."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fault:
-    """A ``finding`` and the ``change`` that takes the fault out of a recording and its study; ``last`` where any other
-    is likelier."""
-
-    finding: Finding
-    change: Change
-    last: bool = False
-
-
-def faults(recording: Recording, settings: AoaSettings) -> Iterator[Fault]:
+def gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
     """All faults that the sensors of a recording may have."""
+    recording, settings = case
     there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
     shown = _shown(recording, settings)
     if np.isfinite(recording.gyro).any():
@@ -93,14 +73,19 @@ def faults(recording: Recording, settings: AoaSettings) -> Iterator[Fault]:
     yield from _orders(there, settings)
     yield from _units(there, settings)
     # of steady motion positions show no more than small errors of the sensors do
-    arm = max(float(np.abs(settings.layout.r).max()), _ARM)
-    if arm * rms(np.gradient(shown, recording.t)) > _PLAIN:
+    arm = max(float(np.abs(settings.layout.r).max()), LIMITS.least_arm)
+    if arm * rms(np.gradient(shown, recording.t)) > LIMITS.plain_acceleration:
         yield from _positions(there, settings)
+
+
+def _fault(code: str, text: str, change: Change) -> Hypothesis[Case]:
+    """A fault that a change of the recording or its study takes out."""
+    return Hypothesis(text.split(":")[0], code, text, lambda case, _: change(*case), harm=("theta",))
 
 
 def _shown(recording: Recording, settings: AoaSettings) -> Array:
     """Rate (n,) [rad/s] that the accelerometers show."""
-    return judge(replace(recording, gyro=np.full_like(recording.gyro, np.nan)), settings).rate
+    return fit_quality(replace(recording, gyro=np.full_like(recording.gyro, np.nan)), settings).rate
 
 
 def _follows(recording: Recording, shown: Array, stated: float) -> bool:
@@ -109,51 +94,48 @@ def _follows(recording: Recording, shown: Array, stated: float) -> bool:
     gyro = recording.gyro
     known = np.isfinite(gyro) & np.isfinite(shown)
     known[: len(known) // 10] = False
-    if known.sum() < _FEWEST:
+    if known.sum() < LIMITS.compared_rows:
         return False
     told = scatter(recording.t[known], gyro[known])
     noise = stated if told is None else told.size
     left = float(np.var(gyro[known] - shown[known])) - noise**2
-    return left < 0.5 * max(float(np.var(shown[known])), (_STILL * noise) ** 2)
+    return left < 0.5 * max(float(np.var(shown[known])), (LIMITS.still_gyro_ratio * noise) ** 2)
 
 
-def _of_gyro() -> Iterator[Fault]:
+def _of_gyro() -> Iterator[Hypothesis[Case]]:
     """Reversed, or of another unit."""
 
     def times(factor: float) -> Change:
         return lambda recording, settings: (replace(recording, gyro=factor * recording.gyro), settings)
 
     text = "gyro looks reversed, it is positive nose-up: write sign = -1 for it in the map"
-    yield Fault(Finding("sign_suspect", text), times(-1.0))
+    yield _fault("sign_suspect", text, times(-1.0))
     for factor, (looks, taken) in _GYRO_UNITS.items():
         text = f"gyro looks to be in {looks}, taken for {taken}: correct its unit in the header or the map"
-        yield Fault(Finding("unit_suspect", text), times(factor))
+        yield _fault("unit_suspect", text, times(factor))
 
 
-def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Fault]:
+def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Hypothesis[Case]]:
     """A gyro that is late, or one that tells of something else than pitch."""
     if settings.timing.gyro_delay is not None:
         found = relative_delay(recording, settings.layout)
         shift = 0.0 if found is None else found.value - settings.timing.gyro_delay
-        if found is not None and abs(shift) > 5.0 * found.u:
+        if found is not None and abs(shift) > LIMITS.delay_sigmas * found.u:
             value = f"{1e3 * found.value:.2g} ms"
             how = "later" if shift > 0.0 else "earlier"
             text = (
                 f"gyro comes {1e3 * abs(shift):.2g} ms {how} than the accelerometers and the study say: write "
                 f'gyro_delay = "{value}" or "estimate" under [timing]'
             )
-            yield Fault(Finding("command_shift", text), lambda r, s: (aligned(r, shift), s))
+            yield _fault("command_shift", text, lambda r, s: (aligned(r, shift), s))
     if _follows(recording, shown, settings.noise.gyro):
         return
-    text = (
-        "gyro does not tell of the pitch that the accelerometers show: it may look along another axis, or be another "
-        "channel or on another clock"
-    )
+    text = f"{OTHER_CHANNEL}: it may look along another axis, or be another channel or on another clock"
     none = np.full_like(recording.gyro, np.nan)
-    yield Fault(Finding("channel_swap", text), lambda r, s: (replace(r, gyro=none), s), last=True)
+    yield _fault("channel_swap", text, lambda r, s: (replace(r, gyro=none), s))
 
 
-def _of_turns() -> Iterator[Fault]:
+def _of_turns() -> Iterator[Hypothesis[Case]]:
     """Gyros for roll and yaw reversed, exchanged, or both of another unit."""
 
     def times(factors: tuple[float, float], order: tuple[int, int] = (0, 1)) -> Change:
@@ -164,18 +146,18 @@ def _of_turns() -> Iterator[Fault]:
 
     for name, signs in (("gyro_roll", (-1.0, 1.0)), ("gyro_yaw", (1.0, -1.0))):
         text = f"{name} looks reversed, it is right-handed about {'x forward' if signs[0] < 0.0 else 'z up'}: write "
-        yield Fault(Finding("sign_suspect", f"{text}sign = -1 for it in the map"), times(signs))
+        yield _fault("sign_suspect", f"{text}sign = -1 for it in the map", times(signs))
     text = "gyro_roll and gyro_yaw look exchanged: exchange their columns in the map"
-    yield Fault(Finding("channel_swap", text), times((1.0, 1.0), (1, 0)))
+    yield _fault("channel_swap", text, times((1.0, 1.0), (1, 0)))
     for factor, (looks, taken) in list(_GYRO_UNITS.items())[:2]:
         text = f"gyro_roll and gyro_yaw look to be in {looks}, taken for {taken}: correct their unit"
-        yield Fault(Finding("unit_suspect", text), times((factor, factor)))
+        yield _fault("unit_suspect", text, times((factor, factor)))
 
 
 def _scaled(columns: list[int], factor: float) -> Change:
     """Accelerometers times a factor."""
 
-    def change(recording: Recording, settings: AoaSettings) -> tuple[Recording, AoaSettings]:
+    def change(recording: Recording, settings: AoaSettings) -> Case:
         acc = recording.acc.copy()
         acc[:, columns] *= factor
         return replace(recording, acc=acc), settings
@@ -183,7 +165,7 @@ def _scaled(columns: list[int], factor: float) -> Change:
     return change
 
 
-def _reversed(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+def _reversed(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Case]]:
     """Accelerometers that look the other way."""
     opposite = {"+x": "-x", "-x": "+x", "+z": "-z", "-z": "+z"}
     for k in there:
@@ -192,13 +174,13 @@ def _reversed(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
         other = f'angle = "{math.degrees(angle) + 180.0:.4g} deg"' if axis is None else f'"{opposite[axis]}"'
         what = other if axis is None else f"axis = {other}"
         text = f"{name} looks reversed: write sign = -1 for it in the map, or {what} in the study"
-        yield Fault(Finding("sign_suspect", text), _scaled([k], -1.0))
+        yield _fault("sign_suspect", text, _scaled([k], -1.0))
 
 
-def _orders(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+def _orders(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Case]]:
     """Accelerometers exchanged."""
     names = settings.layout.names
-    if math.factorial(len(there)) <= _MOST_ORDERS:
+    if math.factorial(len(there)) <= LIMITS.tried_orders:
         orders = list(itertools.permutations(there))
     else:
         orders = [
@@ -215,13 +197,13 @@ def _orders(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
             # the column of b holds what belongs to a
             what = ", ".join(f"{names[b]} looks like {names[a]}" for a, b in moved)
         text = f"{what}: correct their columns in the map, or their axes and positions in the study"
-        yield Fault(Finding("channel_swap", text), _ordered(there, order))
+        yield _fault("channel_swap", text, _ordered(there, order))
 
 
 def _ordered(there: list[int], order: tuple[int, ...]) -> Change:
     """Accelerometers in another order."""
 
-    def change(recording: Recording, settings: AoaSettings) -> tuple[Recording, AoaSettings]:
+    def change(recording: Recording, settings: AoaSettings) -> Case:
         acc = recording.acc.copy()
         acc[:, there] = recording.acc[:, list(order)]
         return replace(recording, acc=acc), settings
@@ -229,24 +211,24 @@ def _ordered(there: list[int], order: tuple[int, ...]) -> Change:
     return change
 
 
-def _units(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+def _units(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Case]]:
     """All accelerometers, or one, of another unit."""
     for columns in (there, *([k] for k in there)) if len(there) > 1 else (there,):
         names = ", ".join(settings.layout.names[k] for k in columns)
         look, their = ("looks", "its") if len(columns) == 1 else ("look", "their")
         for factor, (looks, taken) in _ACCELEROMETER_UNITS.items():
             text = f"{names} {look} to be in {looks}, taken for {taken}: correct {their} unit in the header or the map"
-            yield Fault(Finding("unit_suspect", text), _scaled(columns, factor))
+            yield _fault("unit_suspect", text, _scaled(columns, factor))
 
 
-def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
+def _positions(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Case]]:
     """Positions of another unit, or counted backwards."""
     layout = settings.layout
     if not np.any(layout.r):
         return
 
     def times(factor: Array | float, of_height: float = 1.0) -> Change:
-        def change(recording: Recording, settings: AoaSettings) -> tuple[Recording, AoaSettings]:
+        def change(recording: Recording, settings: AoaSettings) -> Case:
             moved = replace(settings.layout, r=settings.layout.r * factor, z=settings.layout.z * of_height)
             return recording, replace(settings, layout=moved)
 
@@ -255,7 +237,8 @@ def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
     example = int(np.argmax(np.abs(layout.r)))
     for factor, (looks, taken) in _LENGTHS.items():
         likely, then_likely = (
-            _SHORTEST < abs(r) < _LONGEST for r in (layout.r[example], factor * layout.r[example])
+            LIMITS.shortest_arm < abs(r) < LIMITS.longest_arm
+            for r in (layout.r[example], factor * layout.r[example])
         )
         # mm and cm are both likely
         if not then_likely or (likely and factor not in (1e-1, 1e1)):
@@ -265,11 +248,11 @@ def _positions(there: list[int], settings: AoaSettings) -> Iterator[Fault]:
             f"the positions r of the accelerometers look to be in {looks}, taken for {taken}: write them with their "
             f'unit, for {layout.names[example]} "{then}" in the place of "{now}"'
         )
-        yield Fault(Finding("unit_suspect", text), times(factor, factor))
+        yield _fault("unit_suspect", text, times(factor, factor))
     text = "the positions r of all accelerometers look reversed, they are positive ahead of the pivot"
-    yield Fault(Finding("sign_suspect", text), times(-1.0))
+    yield _fault("sign_suspect", text, times(-1.0))
     for k in there:
         if layout.r[k] != 0.0:
             text = f'the position r of {layout.names[k]} looks reversed: write r = "{-layout.r[k]:g} m"'
             signs = np.where(np.arange(len(layout.r)) == k, -1.0, 1.0)
-            yield Fault(Finding("sign_suspect", text), times(signs))
+            yield _fault("sign_suspect", text, times(signs))

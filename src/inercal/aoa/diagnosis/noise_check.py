@@ -7,27 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.units import STANDARD_GRAVITY
-
-_ORDER = 6
-_STEADY = 0.5
-"""Part of the mean square by the last order that must be noise for it to count."""
-
-_MORE, _LESS, _NONE = 2.0, 0.5, 1e-3
-"""Ratios to what is stated from which it is worth a word, and below which there is none, as in numbers made up."""
-
-_EVEN = 0.02
-"""Part of an interval by which others may differ."""
-
-_FEWEST = 20
-"""Differences from which noise is told."""
-
-_SPARSE = 4
-"""Rows of which one is taken to see whether noise that is small from row to row is so over some rows too."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +35,8 @@ def scatter(t: Array, values: Array) -> Scatter | None:
     if sizes is None:
         return None
     least = 2.0 * sizes[-1] ** 2 - sizes[-2] ** 2
-    certain = least > _STEADY * sizes[-1] ** 2
-    sparse = _by_order(t[::_SPARSE], values[::_SPARSE]) or sizes
+    certain = least > LIMITS.noise_share * sizes[-1] ** 2
+    sparse = _by_order(t[:: LIMITS.sparse_rows], values[:: LIMITS.sparse_rows]) or sizes
     return Scatter(math.sqrt(least) if certain else min(sizes), certain, min(sparse))
 
 
@@ -63,14 +48,16 @@ def _by_order(t: Array, values: Array) -> list[float] | None:
     there = np.isfinite(values)
     known, step = values[there], np.diff(t[there])
     even = (
-        np.abs(step - np.median(step)) < _EVEN * np.median(step) if len(step) else np.zeros(0, dtype=np.bool_)
+        np.abs(step - np.median(step)) < LIMITS.even_share * np.median(step)
+        if len(step)
+        else np.zeros(0, dtype=np.bool_)
     )
     runs = even
     found = []
-    for order in range(1, _ORDER + 1):
+    for order in range(1, LIMITS.noise_order + 1):
         known = np.diff(known)
         runs = even if order == 1 else runs[:-1] & even[order - 1 :]
-        if runs.sum() < _FEWEST:
+        if runs.sum() < LIMITS.noise_differences:
             return None
         found.append(float(np.median(np.abs(known[runs]))) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
     return found
@@ -87,11 +74,11 @@ def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding
         seen = {name: each for name, each in told.items() if each is not None}
         over = {name: each.size / stated for name, each in seen.items() if each.certain}
         under = {name: max(each.size, each.sparse) / stated for name, each in seen.items() if each.size > 0.0}
-        if loud := [name for name, ratio in over.items() if ratio > _MORE]:
+        if loud := [name for name, ratio in over.items() if ratio > LIMITS.loud_noise_ratio]:
             most = max(over.values())
             findings.append(_finding("excess_scatter", key, loud, most, stated))
             settings = replace(settings, noise=replace(settings.noise, **{key: most * stated}))
-        elif under and _NONE < max(under.values()) < _LESS:
+        elif under and LIMITS.no_noise_ratio < max(under.values()) < LIMITS.low_noise_ratio:
             findings.append(_finding("low_scatter", key, list(under), max(under.values()), stated))
     return findings, settings
 
@@ -100,5 +87,6 @@ def _finding(code: str, key: str, names: list[str], ratio: float, stated: float)
     """Noise in words."""
     unit, size = ("g", STANDARD_GRAVITY) if key == "accelerometer" else ("deg/s", math.pi / 180.0)
     now, then = f"{stated / size:.3g} {unit}", f"{ratio * stated / size:.2g} {unit}"
+    harm = ("theta",) if code == "excess_scatter" else ()
     text = f"{', '.join(names)}: noise is {ratio:.2g} times the {now} that the study states: write {key} = "
-    return Finding(code, f'{text}"{then}" under [noise], unless its unit is wrong')
+    return Finding(code, f'{text}"{then}" under [noise], unless its unit is wrong', harm=harm)

@@ -1,192 +1,232 @@
-"""Constant errors that the fusion leaves out, fitted one at a time to what it cannot explain.
+"""Constant errors that the fusion leaves out: hypotheses with one parameter, and the fusion as their judge.
 
-Innovations of a filter are white where its model holds, so that of a model with one more constant p they change by
-J = d v / d p, and p = -J.v / J.J is its least-squares value (the score test; Willsky and Jones 1976). J is a difference
-of two runs over the stretch that is judged.
+Innovations of a filter are white where its model holds, which makes them the residuals of the score test
+(`inercal.estimate.hypotheses`), over the stretch that is judged. The model is never exact enough for chance alone to
+decide: the likeliest errors are fitted to the end, and that is taken which takes most of the misfit away, if it is
+half. At one angle a bias, a scale, an axis and gravity look alike: what takes away as much is said beside it.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from inercal.aoa.diagnosis.fit_quality import Judged, judge
+from inercal.aoa.diagnosis.fit_quality import Case, fit_quality
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.units import Quantity, parse_unit
-
-_ROUNDS = 6
-_CLOSE = 0.1
-"""Change of p over its uncertainty at which the fit ends."""
-
-_WILD = 30.0
-"""Innovations over their median size that are left out of a fit."""
+from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, search
+from inercal.units import STANDARD_GRAVITY, Quantity, parse_unit
 
 
-@dataclass(frozen=True, eq=False)
-class Error:
-    """A constant ``name`` of a sensor or of all: ``taken_out`` of a recording and its study for a value of it.
+class Fusion:
+    """The fusion as a judge: innovations without a gate and without wild ones, and a misfit that these hardly move."""
 
-    ``step`` [SI] for the difference; ``most`` the largest value that is believed; ``least`` 0.0 where it cannot be
-    negative.
-    """
+    def residuals(self, case: Case) -> Array:
+        """(m, N + 1) innovations over their standard deviations."""
+        recording, settings = case
+        gated = replace(settings, estimator=replace(settings.estimator, gate=1e12))
+        innovations = fit_quality(recording, gated).innovations
+        size = np.abs(innovations)
+        known = np.flatnonzero(np.isfinite(size).any(axis=0))
+        usual = np.zeros(size.shape[1])
+        usual[known] = np.nanmedian(size[:, known], axis=0)
+        return np.where(size < LIMITS.wild_ratio * usual, innovations, np.nan)
 
-    name: str
-    taken_out: Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]
-    step: float
-    most: float
-    least: float = -math.inf
-
-
-@dataclass(frozen=True, eq=False)
-class FittedError:
-    """An error with its ``value``, its standard uncertainty ``u``, and what is ``judged`` without it."""
-
-    error: Error
-    value: float
-    u: float
-    judged: Judged
+    def misfit(self, case: Case) -> float:
+        """Misfit in one number (`inercal.aoa.diagnosis.fit_quality.FitQuality.misfit`)."""
+        return fit_quality(*case).misfit
 
 
-def candidates(recording: Recording, settings: AoaSettings, theta: Array) -> Iterator[Error]:
-    """Errors that may be looked for; ``theta`` (n,) as the fusion has it with the study as it is."""
-    layout = settings.layout
-    there = [k for k in range(len(layout.names)) if np.isfinite(recording.acc[:, k]).any()]
-    for k in there:
-        yield Error(f"axis {layout.names[k]}", _axis(k), 1e-5, 0.7)
-    for k in there:
-        yield Error(f"scale {layout.names[k]}", _scale(k), 1e-5, 0.3)
-    for k in there:
-        yield Error(f"bias {layout.names[k]}", _bias(k), 1e-4, 5.0)
-    for k in there:
-        yield Error(f"position {layout.names[k]}", _position(k), 1e-4, 1.0)
-    yield Error("pivot", _position(slice(None)), 1e-4, 1.0)
-    yield Error("gravity", _gravity, 1e-4, 0.5)
-    if not recording.spatial:
-        yield Error("yaw", _yaw(theta), 1e-4, 100.0, 0.0)
-        yield Error("roll", _roll, 1e-4, 1.0, 0.0)
+JUDGE = Fusion()
 
 
-def likeliest(errors: Iterable[Error], recording: Recording, settings: AoaSettings, most: int) -> list[Error]:
-    """Those ``most`` errors of which a first step of the fit promises to take away most."""
-    gated = _open(settings)
-    now = judge(recording, gated).innovations
-    ranked = [(_step(each, now, recording, gated, 0.0)[2], each) for each in errors]
-    ranked.sort(key=lambda one: -one[0])
-    return [each for gain, each in ranked[:most] if gain > 0.0]
+def small_errors(case: Case) -> tuple[Fits[Case], Case]:
+    """Constant errors that explain what is left over, and the case without them."""
+    return search(case, constant_errors, JUDGE, 1.0, LIMITS.small_errors, choose=_most_explaining)
 
 
-def fitted(error: Error, recording: Recording, settings: AoaSettings) -> FittedError | None:
-    """The error's most likely value; None where it has none, or one that is not believed."""
-    gated = _open(settings)
-    value, u = 0.0, math.inf
-    for _ in range(_ROUNDS):
-        now = judge(*error.taken_out(recording, gated, value)).innovations
-        change, u, _ = _step(error, now, recording, gated, value)
-        if not math.isfinite(change) or abs(value + change) > 2.0 * error.most:
-            return None
-        value += change
-        if abs(change) < _CLOSE * u:
-            break
-    if not error.least <= value or abs(value) > error.most:
-        return None
-    return FittedError(error, value, u, judge(*error.taken_out(recording, settings, value)))
-
-
-def _open(settings: AoaSettings) -> AoaSettings:
-    """A study without a gate."""
-    return replace(settings, estimator=replace(settings.estimator, gate=1e12))
-
-
-def _step(
-    error: Error, now: Array, recording: Recording, settings: AoaSettings, value: float
-) -> tuple[float, float, float]:
-    """Change of ``value`` that makes the innovations ``now`` least, its standard uncertainty, and how much it takes
-    away of their sum of squares; NaN, infinite and 0 where they do not depend on it."""
-    then = judge(*error.taken_out(recording, settings, value + error.step)).innovations
-    with np.errstate(all="ignore"):
-        size = np.array(
-            [np.median(v[np.isfinite(v)]) if np.isfinite(v).any() else 0.0 for v in np.abs(now).T]
+def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
+    """The fit with the least misfit, with others that have hardly more, if it takes enough of it away."""
+    by_misfit = sorted(
+        (
+            (JUDGE.misfit(fit[-1].case), k, fit)
+            for k, fit in enumerate(itertools.islice(fits, LIMITS.fitted_errors))
         )
-        used = np.isfinite(now) & np.isfinite(then) & (np.abs(now) < _WILD * size)
-        slope = np.where(used, then - now, 0.0) / error.step
-        power = float(np.square(slope).sum())
-        along = float((slope * np.where(used, now, 0.0)).sum())
-    if not power > 0.0:
-        return math.nan, math.inf, 0.0
-    return -along / power, 1.0 / math.sqrt(power), along**2 / power
+    )
+    if not by_misfit or by_misfit[0][0] > (1.0 - LIMITS.explained_share) * JUDGE.misfit(case):
+        return None
+    least, _, best = by_misfit[0]
+    alike = tuple(fit[-1] for misfit, _, fit in by_misfit[1:] if misfit < least + LIMITS.small_alike_misfit)
+    return [*best[:-1], replace(best[-1], alike=alike)]
 
 
-def _axis(k: int) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
+def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
+    """Errors that may be looked for; none where the case fits."""
+    recording, settings = case
+    now = fit_quality(recording, settings)
+    if now.fits:
+        return
+    there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
+    for error in (_axis, _scale, _bias, _position):
+        for k in there:
+            yield error(settings, k)
+    yield _pivot()
+    yield _gravity(settings)
+    if not recording.spatial:
+        yield _yaw(now.theta)
+        yield _roll()
+
+
+def _error(
+    name: str,
+    code: str,
+    without: Callable[[Recording, AoaSettings, float], Case],
+    says: Callable[[float], str],
+    step: float,
+    bounds: tuple[float, float],
+) -> Hypothesis[Case]:
+    """An error of one constant [SI]."""
+
+    def sentence(fit: Fitted[Case]) -> str:
+        return says(float(fit.values[0]))
+
+    def corrected(case: Case, values: Array) -> Case:
+        return without(*case, float(values[0]))
+
+    return Hypothesis(name, code, sentence, corrected, (name,), step, bounds, harm=("theta",))
+
+
+def _axis(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """An axis at lambda plus the value [rad]."""
+    name, stated = settings.layout.names[k], float(settings.layout.angle[k])
 
-    def taken_out(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         angle = settings.layout.angle.copy()
         angle[k] += value
         return recording, replace(settings, layout=replace(settings.layout, angle=angle))
 
-    return taken_out
+    def says(value: float) -> str:
+        advice = f'write angle = "{math.degrees(stated + value):.4g} deg" under [sensors.{name}]'
+        return f"the axis of {name} looks turned by {math.degrees(value):.3g} deg: {advice}"
+
+    return _error(f"axis {name}", "unmodelled", without, says, 1e-5, (-0.7, 0.7))
 
 
-def _scale(k: int) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
+def _scale(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """A sensor that reads 1 + value times what it should."""
+    name = settings.layout.names[k]
 
-    def taken_out(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         acc = recording.acc.copy()
         acc[:, k] /= 1.0 + value
         return replace(recording, acc=acc), settings
 
-    return taken_out
+    def says(value: float) -> str:
+        what = f"{name} looks to read {1.0 + value:.5g} times what it should"
+        return f"{what}: correct the scale under [sensors.{name}]"
+
+    return _error(f"scale {name}", "unmodelled", without, says, 1e-5, (-0.3, 0.3))
 
 
-def _bias(k: int) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
+def _bias(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """A sensor that reads more by the value [m/s^2]."""
+    name = settings.layout.names[k]
 
-    def taken_out(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         acc = recording.acc.copy()
         acc[:, k] -= value
         return replace(recording, acc=acc), settings
 
-    return taken_out
+    def says(value: float) -> str:
+        what = f"the bias of {name} looks to be {1e3 * value / STANDARD_GRAVITY:.3g} mg"
+        return f"{what}: state a bias under [sensors.{name}], or a larger accelerometer_bias"
+
+    return _error(f"bias {name}", "prior_suspect", without, says, 1e-4, (-5.0, 5.0))
 
 
-def _position(k: int | slice) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
-    """A sensor, or all of them, further ahead of the pivot by the value [m]."""
+def _position(settings: AoaSettings, k: int) -> Hypothesis[Case]:
+    """A sensor further ahead of the pivot by the value [m]."""
+    name, stated = settings.layout.names[k], float(settings.layout.r[k])
 
-    def taken_out(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
-        r = settings.layout.r.copy()
-        r[k] += value
-        return recording, replace(settings, layout=replace(settings.layout, r=r))
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
+        return recording, _further_ahead(settings, k, value)
 
-    return taken_out
+    def says(value: float) -> str:
+        what = f"{name} looks to sit {1e3 * value:.3g} mm further ahead than stated"
+        return f'{what}: write r = "{stated + value:.4g} m" under [sensors.{name}]'
+
+    return _error(f"position {name}", "prior_suspect", without, says, 1e-4, (-1.0, 1.0))
 
 
-def _gravity(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+def _pivot() -> Hypothesis[Case]:
+    """All sensors further ahead of the pivot by the value [m]."""
+
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
+        return recording, _further_ahead(settings, slice(None), value)
+
+    def says(value: float) -> str:
+        what = f"the pivot looks to be {1e3 * value:.3g} mm further back than stated"
+        return f"{what}: correct the positions r of all sensors"
+
+    return _error("pivot", "prior_suspect", without, says, 1e-4, (-1.0, 1.0))
+
+
+def _further_ahead(settings: AoaSettings, k: int | slice, value: float) -> AoaSettings:
+    """A study with a sensor, or all of them, further ahead by the value [m]."""
+    r = settings.layout.r.copy()
+    r[k] += value
+    return replace(settings, layout=replace(settings.layout, r=r))
+
+
+def _gravity(settings: AoaSettings) -> Hypothesis[Case]:
     """Gravity larger by the value [m/s^2]."""
-    site = replace(settings.site, gravity=settings.site.gravity + value)
-    return recording, replace(settings, site=site)
+    stated = settings.site.gravity
+
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
+        site = replace(settings.site, gravity=settings.site.gravity + value)
+        return recording, replace(settings, site=site)
+
+    def says(value: float) -> str:
+        advice = f"stated are {stated:.6g} m/s^2, correct gravity or latitude and height under [site]"
+        return f"gravity looks to be {stated + value:.5g} m/s^2: {advice}"
+
+    return _error("gravity", "site_suspect", without, says, 1e-4, (-0.5, 0.5))
 
 
-def _yaw(theta: Array) -> Callable[[Recording, AoaSettings, float], tuple[Recording, AoaSettings]]:
+def _yaw(theta: Array) -> Hypothesis[Case]:
     """Yaw about the vertical of the mean square rate ``value`` [rad^2/s^2]: f_x is less by r cos^2, f_z more by
-    r sin cos of it."""
+    r sin cos of it; ``theta`` (m,) [rad] as the fusion has it."""
 
-    def taken_out(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         layout = settings.layout
         s, c = np.sin(theta)[:, None], np.cos(theta)[:, None]
         shown = -layout.r * value * (c * c * np.cos(layout.angle) + s * c * np.sin(layout.angle))
         return replace(recording, acc=recording.acc - shown), settings
 
-    return taken_out
+    def says(value: float) -> str:
+        what = f"the model looks to yaw to and fro by {math.degrees(math.sqrt(value)):.2g} deg/s rms"
+        return f"{what}: no sensor here sees that, record gyro_roll and gyro_yaw"
+
+    return _error("yaw", "unmodelled", without, says, 1e-4, (0.0, 100.0))
 
 
-def _roll(recording: Recording, settings: AoaSettings, value: float) -> tuple[Recording, AoaSettings]:
+def _roll() -> Hypothesis[Case]:
     """Roll of the mean square ``value`` [rad^2], all the time or to and fro: f_z is less by its mean cosine."""
-    stated = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
-    turned = math.acos(math.cos(stated) * math.cos(math.sqrt(max(value, 0.0))))
-    roll = Quantity(turned, 0.0, parse_unit("rad"), "")
-    return recording, replace(settings, attitude=replace(settings.attitude, roll=roll))
+
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
+        stated = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
+        turned = math.acos(math.cos(stated) * math.cos(math.sqrt(max(value, 0.0))))
+        roll = Quantity(turned, 0.0, parse_unit("rad"), "")
+        return recording, replace(settings, attitude=replace(settings.attitude, roll=roll))
+
+    def says(value: float) -> str:
+        what = f"the model looks rolled by {math.degrees(math.sqrt(value)):.2g} deg, all the time or rms"
+        return f"{what}: state roll under [model], or record gyro_roll and gyro_yaw where it changes"
+
+    return _error("roll", "unmodelled", without, says, 1e-4, (0.0, 1.0))

@@ -92,18 +92,20 @@ def frozen(column: Column) -> list[Finding]:
     long = (ends - starts >= 5) & (starts >= 10) & (ends + 10 < step.size)
     starts, ends = starts[long], ends[long]
     leap = np.abs(step[ends]) > 3.0 * np.maximum(np.abs(step[starts - 1]), np.abs(step[ends + 1]))
-    found = []
+    standstills = []
     for start, end in zip(starts[leap], ends[leap], strict=True):
         around = np.concatenate([step[start - 10 : start], step[end + 1 : end + 11]])
         rate = float(np.median(around))
         steady = np.abs(around - rate).max() < 0.5 * abs(rate)
         lost = (end - start + 1) * rate
         if steady and abs(step[end] - lost) < 0.3 * abs(lost):
-            found.append(np.arange(start, end + 1))
-    if not found:
+            standstills.append(np.arange(start, end + 1))
+    if not standstills:
         return []
-    text = f"{column.name}: stands still {counted(len(found), 'time')} amid steady motion, then catches up"
-    return [Finding("stuck_encoder", text, places("row", rows[np.concatenate(found)] + 1))]
+    text = (
+        f"{column.name}: stands still {counted(len(standstills), 'time')} amid steady motion, then catches up"
+    )
+    return [Finding("stuck_encoder", text, places("row", rows[np.concatenate(standstills)] + 1))]
 
 
 def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: bool) -> list[Finding]:
@@ -136,16 +138,16 @@ def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: boo
     speed = np.abs(np.diff(mean(np.unwrap(th, axis=0)), axis=0)).max(axis=1) / dt
     still = np.maximum(np.append(speed, 0.0), np.append(0.0, speed)) < 0.1 * limit
     rate = mean(rate)
-    found = []
+    turns_missed = []
     for stay in _runs(still):
         centre = np.median(rate[stay], axis=0) if biased else 0.0
         away = np.linalg.norm(rate[stay] - centre, axis=1)
-        found += [
+        turns_missed += [
             stay[turn] for turn in _runs(away > limit) if away[turn].sum() * np.median(dt) >= 5.0 * _DEG
         ]
-    if not found:
+    if not turns_missed:
         return []
-    at = np.concatenate([rows[turn[0] * size : (turn[-1] + 1) * size] for turn in found])
+    at = np.concatenate([rows[turn[0] * size : (turn[-1] + 1) * size] for turn in turns_missed])
     who = "gyro" if biased else "command"
     text = f"th: no angle moves while the platform turns according to the {who}"
     return [Finding("stuck_encoder", text, places("row", at + 1))]
@@ -210,11 +212,11 @@ def _gimbals(
     None where not all are there, on one clock that goes forward.
     """
     names = [f"{each}_{axis}" for each in ("th", sensor) for axis in "xyz"]
-    found = [columns[name] for name in names if name in columns]
-    dimensions = [column.unit.dimension for column in found]
-    if dimensions != ["angle"] * 3 + ["rate"] * 3 or any(column.t is not found[0].t for column in found):
+    present = [columns[name] for name in names if name in columns]
+    dimensions = [column.unit.dimension for column in present]
+    if dimensions != ["angle"] * 3 + ["rate"] * 3 or any(column.t is not present[0].t for column in present):
         return None
-    table = np.column_stack([found[0].t, *(column.si() for column in found)])
+    table = np.column_stack([present[0].t, *(column.si() for column in present)])
     rows = np.flatnonzero(np.isfinite(table).all(axis=1))
     table = table[rows]
     if len(table) < 50 or not np.median(np.diff(table[:, 0])) > 0:

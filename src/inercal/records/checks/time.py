@@ -80,8 +80,8 @@ def _rate_change(
         return []
     first = kept[changed[0]]
     text = f"{subject}: the rate goes from {1 / means[0]:.5g} Hz to {1 / means[changed[0]]:.5g} Hz"
-    found = rows[ends[first] - len(parts[first]) : ends[first] + 1]
-    return [Finding("rate_change", text, places("row", found + 1))]
+    late_rows = rows[ends[first] - len(parts[first]) : ends[first] + 1]
+    return [Finding("rate_change", text, places("row", late_rows + 1))]
 
 
 def time_unit(t: Array, subject: str = "t") -> list[Finding]:

@@ -89,12 +89,12 @@ def outlying(values: Array) -> NDArray[np.int64]:
     noise = max(np.median(usual) / 0.674, usual.min(initial=np.inf, where=usual > 0))
     suspects = np.flatnonzero(height > 12.0 * noise)
     windows = sliding_window_view(size, _AROUND)
-    found = []
+    peaks = []
     for some in np.array_split(suspects, suspects.size // SAMPLE + 1):
         near = windows[np.clip(some - _AROUND // 2, 0, len(windows) - 1)]
         moved = np.partition(near, _AROUND - 5, axis=1)[:, _AROUND - 5] / 1.645
-        found.append(some[height[some] > 12.0 * moved])
-    return np.asarray(rows[np.concatenate(found) + 1], dtype=np.int64)
+        peaks.append(some[height[some] > 12.0 * moved])
+    return np.asarray(rows[np.concatenate(peaks) + 1], dtype=np.int64)
 
 
 def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
@@ -104,20 +104,20 @@ def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
         return []
     if any(is_dead(axis.values) for axis in axes):  # what is left of gravity tells no unit
         return []
-    stated = axes[0].unit
+    given = axes[0].unit
     norms = np.sqrt(sum(thinned(axis.values) ** 2 for axis in axes))
     norms = norms[np.isfinite(norms)]
-    if stated.dimension != "acceleration" or norms.size == 0:
+    if given.dimension != "acceleration" or norms.size == 0:
         return []
     norm = float(np.median(norms))
     fitting = [
         unit
-        for unit in (stated, *(parse_unit(text) for text in ("g", "m/s^2", "mg", "ug", "cm/s^2")))
+        for unit in (given, *(parse_unit(text) for text in ("g", "m/s^2", "mg", "ug", "cm/s^2")))
         if 0.8 < norm * unit.factor / STANDARD_GRAVITY < 1.2
     ]
-    if not fitting or stated in fitting:
+    if not fitting or given in fitting:
         return []
-    text = f"acc: a median norm of {norm:.4g} {stated.symbol} looks like {fitting[0].symbol}"
+    text = f"acc: a median norm of {norm:.4g} {given.symbol} looks like {fitting[0].symbol}"
     return [Finding("unit_suspect", text)]
 
 

@@ -148,8 +148,8 @@ def _tables(
     sizes = [sum(file.stat().st_size for file in _files(path)) for path, _ in jobs]
     tables: list[FileTable] = []
     for index, (path, part) in enumerate(jobs):
-        told = partial(_tell, progress, sum(sizes[:index]), sum(sizes))
-        tables += _read_one(formats[index], path, part, told)
+        share = partial(_tell, progress, sum(sizes[:index]), sum(sizes))
+        tables += _read_one(formats[index], path, part, share)
     return tables, record_map
 
 
@@ -241,10 +241,10 @@ def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], No
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
     if changed:
-        said = Finding(
+        finding = Finding(
             "file_changed", "the file was written to while it was read: the checksum is not of its rows"
         )
-        tables = [replace(table, findings=(*table.findings, said)) for table in tables]
+        tables = [replace(table, findings=(*table.findings, finding)) for table in tables]
     return [FileTable(path, source, part, table) for table in tables]
 
 
@@ -268,8 +268,8 @@ def format_of(path: Path) -> Format:
         if name.endswith(suffix):
             if not path.is_file():
                 there = "a pipe or a device" if is_pipe(path) else "no such file"
-                found = "a folder" if path.is_dir() else there
-                raise RecordError(path, f"found {found}, expected a recording in a file")
+                kind = "a folder" if path.is_dir() else there
+                raise RecordError(path, f"found {kind}, expected a recording in a file")
             return _module(module)
     if path.is_dir():
         raise RecordError(

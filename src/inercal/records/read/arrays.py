@@ -1,4 +1,4 @@
-"""What all formats of named arrays share: from the arrays of an open file to the columns wanted."""
+"""Named arrays, as all formats of arrays share them: from the arrays of an open file to the columns wanted."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Contents:
 
     @property
     def words(self) -> str:
-        """What the file holds, in words."""
+        """The contents of the file in words."""
         if self.described:
             return self.described
         if self.tabular:
@@ -103,9 +103,9 @@ class ArrayFormat:
         """Read the wanted columns, or those that canonical names and units tell."""
         with self._lent(path) as contents:
             wanted = self_named(contents, path) if channels is None else channels
-            found = tables(contents, options, wanted, path, mapped=channels is not None)
+            wanted_tables = tables(contents, options, wanted, path, mapped=channels is not None)
         progress(path.stat().st_size)
-        return found
+        return wanted_tables
 
     def header(self, path: Path) -> tuple[Channel, ...]:
         """The channels that canonical names and units tell; raises `InputError` where there are none."""
@@ -142,7 +142,7 @@ def guarded(path: Path, name: str) -> Iterator[None]:
 
 
 def reason(error: Exception) -> str:
-    """What an error of a library says, on one line."""
+    """The message of a library error on one line."""
     return " ".join(str(error).split())[:200] or type(error).__name__
 
 
@@ -163,10 +163,10 @@ def tables(
     A wanted column t is the clock of all arrays with as many rows, of those that state a clock only if it
     was ``mapped`` by hand. Raises `RecordError` where columns of one clock have different lengths.
     """
-    found = {channel: place for channel in channels if (place := _place(channel, contents, options, path))}
+    placed = {channel: place for channel in channels if (place := _place(channel, contents, options, path))}
     groups: dict[str | None, dict[Channel, tuple[str, int]]] = {}
-    for channel, clock in _clocks(found, contents.arrays, mapped).items():
-        groups.setdefault(clock, {})[channel] = found[channel]
+    for channel, clock in _clocks(placed, contents.arrays, mapped).items():
+        groups.setdefault(clock, {})[channel] = placed[channel]
     if not groups:
         return [Table((), {}, contents.words, 0, (), contents.findings)]
     parts = [_table(contents, group, clock, path) for clock, group in groups.items()]
@@ -179,7 +179,7 @@ def tables(
 def samples(contents: Contents) -> list[Sample]:
     """A first look at the arrays: single columns by length, with their names, and each table."""
     arrays = {name: array for name, array in contents.arrays.items() if array.rows > 1}
-    found = []
+    looks = []
     for rows in dict.fromkeys(array.rows for array in arrays.values()):
         single = {name: each for name, each in arrays.items() if each.columns == 1 and each.rows == rows}
         if single:
@@ -187,31 +187,31 @@ def samples(contents: Contents) -> list[Sample]:
                 [np.full(rows, np.nan) if each.text else _numbers(each.load(0)) for each in single.values()]
             )
             units = tuple(each.unit for each in single.values())
-            found.append(Sample(values, tuple(single), FileOptions(), units=units))
+            looks.append(Sample(values, tuple(single), FileOptions(), units=units))
     for name, array in arrays.items():
         if array.columns > 1 and not array.text:
             values = np.column_stack([_numbers(array.load(column)) for column in range(array.columns)])
-            found.append(Sample(values, (), FileOptions(), name))
-    return found
+            looks.append(Sample(values, (), FileOptions(), name))
+    return looks
 
 
 def _clocks(
-    found: Mapping[Channel, tuple[str, int]], arrays: Mapping[str, NamedArray], mapped: bool
+    placed: Mapping[Channel, tuple[str, int]], arrays: Mapping[str, NamedArray], mapped: bool
 ) -> dict[Channel, str | None]:
     """Name of the clock of each channel; None for the column t, and for what goes with it."""
-    t = next((name for channel, (name, _) in found.items() if channel.name == "t"), None)
+    t = next((name for channel, (name, _) in placed.items() if channel.name == "t"), None)
     clocks: dict[Channel, str | None] = {}
     homeless = []
-    for channel, (name, _) in found.items():
+    for channel, (name, _) in placed.items():
         array = arrays[name]
         alike = t is not None and array.rows == arrays[t].rows and (mapped or array.clock is None)
         clocks[channel] = None if alike or t in (name, array.clock) else array.clock
         if not alike and array.clock is None:
             homeless.append(channel)
-    stated = {clock: arrays[clock].rows for clock in clocks.values() if clock is not None}
+    lengths = {clock: arrays[clock].rows for clock in clocks.values() if clock is not None}
     for channel in homeless:
-        rows = arrays[found[channel][0]].rows
-        clocks[channel] = next((clock for clock, length in stated.items() if length == rows), None)
+        rows = arrays[placed[channel][0]].rows
+        clocks[channel] = next((clock for clock, length in lengths.items() if length == rows), None)
     return clocks
 
 
@@ -293,10 +293,10 @@ def _single(contents: Contents, options: FileOptions, path: Path) -> str | None:
 def _numbers(column: NDArray[Any]) -> Array:
     """As float64, dates as seconds since 1970; NaN where infinite or beyond `LARGEST`."""
     if column.dtype.kind in "Mm":
-        known = ~np.isnat(column)
+        dated = ~np.isnat(column)
         kind = "datetime64[ns]" if column.dtype.kind == "M" else "timedelta64[ns]"
         whole, rest = np.divmod(column.astype(kind).astype(np.int64), 10**9)
-        return np.where(known, whole + 1e-9 * rest, np.nan)
+        return np.where(dated, whole + 1e-9 * rest, np.nan)
     numbers = np.ascontiguousarray(column, dtype=np.float64)
     return np.where(np.abs(numbers) < LARGEST, numbers, np.nan)
 

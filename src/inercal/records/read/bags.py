@@ -55,7 +55,7 @@ class _Bag:
 
     @property
     def words(self) -> str:
-        """What the bag holds, in words."""
+        """The contents of the bag in words."""
         return f"the topics {', '.join(f'{name} ({topic.kind})' for name, topic in self.topics.items())}"
 
     def place(self, name: str) -> tuple[str, str] | None:
@@ -117,11 +117,11 @@ def _opened(path: Path) -> Iterator[_Bag]:
         AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader,
     ):
         topics = {}
-        for name, found in reader.topics.items():
+        for name, topic in reader.topics.items():
             definitions = reader.typestore.fielddefs
-            if found.msgtype in definitions and found.msgcount:
-                fields = dict(_fields(definitions, found.msgtype)) | {_RECORDED: "time"}
-                topics[name] = _Topic(found.msgtype, tuple(found.connections), found.msgcount, fields)
+            if topic.msgtype in definitions and topic.msgcount:
+                fields = dict(_fields(definitions, topic.msgtype)) | {_RECORDED: "time"}
+                topics[name] = _Topic(topic.msgtype, tuple(topic.connections), topic.msgcount, fields)
         if not topics:
             raise RecordError(path, "found no topic with messages of a known type, expected one at least")
         yield _Bag(reader, topics)
@@ -148,8 +148,8 @@ def _imu(bag: _Bag, path: Path) -> tuple[Channel, ...]:
     """The channels of the only topic of `sensor_msgs/Imu`."""
     topics = [name for name, topic in bag.topics.items() if topic.kind == _IMU]
     if len(topics) != 1:
-        found = f"the topics {' and '.join(topics)} of {_IMU}" if topics else f"{bag.words}, none of {_IMU}"
-        raise RecordError(path, f"found {found}, expected one, or a column map")
+        there = f"the topics {' and '.join(topics)} of {_IMU}" if topics else f"{bag.words}, none of {_IMU}"
+        raise RecordError(path, f"found {there}, expected one, or a column map")
     return tuple(
         Channel(name, f"{topics[0]}/{field}", parse_unit(unit)) for name, (field, unit) in _CHANNELS.items()
     )
@@ -206,8 +206,8 @@ def _collect(
     try:
         for connection, recorded, raw in bag.reader.messages(connections=connections):
             message = bag.reader.deserialize(raw, connection.msgtype)
-            found = [get(message) for get, _ in take[connection.topic]]
-            for (_, column), value in zip(take[connection.topic], found, strict=True):
+            values = [get(message) for get, _ in take[connection.topic]]
+            for (_, column), value in zip(take[connection.topic], values, strict=True):
                 column.append(value)
             wanted[connection.topic][_RECORDED].append(recorded)
             done += 1

@@ -40,13 +40,13 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
         Something else than a unit.
     """
     channels: dict[str, Channel] = {}
-    found = []
-    for origin, title, stated in titles:
-        found.append(title)
+    titles_read = []
+    for origin, title, unit_beside in titles:
+        titles_read.append(title)
         match = _TITLE.fullmatch(title)
         if match is None or not is_channel(name := match[1]):
             continue
-        unit_text = stated if match[2] is None else match[2]
+        unit_text = unit_beside if match[2] is None else match[2]
         if name in channels:
             raise RecordError(where, f"found {name} twice, expected each column once")
         if unit_text is None and needs_unit(name):
@@ -61,7 +61,7 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
     if not channels.keys() - {"label"}:
         raise RecordError(
             where,
-            f"found the columns {counted_names(found, 8)}, expected known ones as in {EXAMPLE}, or a map "
+            f"found the columns {counted_names(titles_read, 8)}, expected known ones as in {EXAMPLE}, or a map "
             "(`inercal new imu` writes one)",
         )
     return tuple(channels.values())

@@ -115,7 +115,7 @@ def _field(dataset: Any, field: str, _: int) -> NDArray[Any]:
 
 
 def _reader_of_text(dataset: Any, matlab: str | None) -> Callable[[int], NDArray[Any]] | None:
-    """What reads the strings of a dataset; None where it holds none."""
+    """The reader of the strings of a dataset; None if the dataset holds no strings."""
     import h5py
 
     shape, dtype = dataset.shape, dataset.dtype

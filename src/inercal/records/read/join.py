@@ -66,9 +66,9 @@ def check_present(files: Sequence[FileTable], map_path: Path) -> None:
     """Each mapped column must be in one file at least, and each file must hold one at least."""
     for part in {id(file.part): file.part for file in files}.values():
         read = [file for file in files if file.part is part]
-        found = {channel.name for file in read for channel in file.table.channels}
+        present = {channel.name for file in read for channel in file.table.channels}
         for channel in part.channels or ():
-            if channel.name not in found:
+            if channel.name not in present:
                 table = f"file.{part.name}.columns" if part.name else "columns"
                 held = "; ".join(f"{file.path} ({file.table.contents})" for file in read)
                 origin = list(channel.origin) if isinstance(channel.origin, tuple) else channel.origin
@@ -106,10 +106,10 @@ def _time_axis(file: FileTable, files: Sequence[FileTable], rate: float | None) 
     if len(same) == 1:
         return _seconds(same[0])
     if timed:
-        found = " and ".join(f"{other.table.rows} in {other.path}" for other in timed)
+        stamps = " and ".join(f"{other.table.rows} in {other.path}" for other in timed)
         raise RecordError(
             file.path,
-            f"found {table.rows} rows without t, and stamps for {found}, expected one with as many rows, or a "
+            f"found {table.rows} rows without t, and stamps for {stamps}, expected one with as many rows, or a "
             "[file.NAME] for each file with its own t",
         )
     lengths = sorted({other.table.rows for other in files if other.source == file.source})
@@ -147,7 +147,7 @@ def _seconds(file: FileTable) -> Array:
 
 
 def conversion(channel: Channel, interval: float = 0.0) -> tuple[tuple[float, ...], Unit]:
-    """What raw values of a channel are multiplied by, one after the other, and the unit they then have.
+    """Factors of the raw values of a channel, applied one after the other, and the unit that results.
 
     The time becomes seconds, increments over an ``interval`` [s] become rates; other units are kept.
     """

@@ -23,7 +23,7 @@ _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
 
 @dataclass(frozen=True)
 class Layout:
-    """How the lines of a file are to be read.
+    """Layout of the lines of a text file.
 
     ``delimiter`` None is any run of blanks; ``decimal`` is empty as long as no number has told; ``width`` is the
     number of fields of a row; ``header`` is empty where there is none and stands in line ``header_line``; ``first``
@@ -125,7 +125,7 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
 
 
 def comment_marks(options: FileOptions) -> tuple[str, ...]:
-    """What a line begins with that is passed over."""
+    """The text with which a line begins that the reader passes over."""
     if options.comment is None:
         return ("#", "%")
     return (options.comment,) if options.comment else ()

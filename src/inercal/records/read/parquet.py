@@ -23,7 +23,7 @@ def _opened(path: Path) -> Iterator[Contents]:
         raise MissingExtraError("Reading Parquet files", "files") from error
     with parquet.ParquetFile(path) as file:
         rows = file.metadata.num_rows
-        columns = [found for field in file.schema_arrow for found in _leaves(field)]
+        columns = [leaf for field in file.schema_arrow for leaf in _leaves(field)]
         yield Contents(
             {
                 name: NamedArray(rows, 1, partial(_column, file, name), text, unit)

@@ -1,4 +1,4 @@
-"""What a reader is asked for and what it gives back: the contract of the formats."""
+"""The contract of the file formats: the request to a reader, and the table that it returns."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from inercal.findings import Finding
 from inercal.records.channels import Channel
 
 LARGEST = 1e30
-"""What no sensor reads, in any unit: it counts as missing, as infinity does, and its powers overflow nowhere."""
+"""Limit that no sensor reads in any unit: a larger value counts as missing, as infinity does, and powers of it do not
+overflow."""
 
 
 @dataclass(frozen=True)
 class FileOptions:
-    """How a file is laid out, where it was said; None is found out from the file.
+    """Stated layout of a file; the reader finds out from the file what is None.
 
     ``delimiter`` " " is any run of blanks; ``comment`` begins lines to pass over (``#`` and ``%`` if None);
     ``skip`` counts lines before the header; ``variable`` is the array of a file that holds several.

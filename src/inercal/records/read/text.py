@@ -51,9 +51,9 @@ def read(
         stream = blocks(file, path)
         head = next(stream)
         layout = find_layout(head.lines, options, path)
-        found = locate(channels, layout, head.lines, path)
-        numbers = {channel.name: index for channel, index in found.items() if channel.name != "label"}
-        label = next((index for channel, index in found.items() if channel.name == "label"), None)
+        located = locate(channels, layout, head.lines, path)
+        numbers = {channel.name: index for channel, index in located.items() if channel.name != "label"}
+        label = next((index for channel, index in located.items() if channel.name == "label"), None)
         if not numbers:
             return [Table((), {}, contents(layout), 0)]
 
@@ -84,7 +84,7 @@ def read(
     count = len(next(iter(values.values())))
     findings = _findings(flaws, tuple(numbers), block, layout.width)
     findings += tuple(too_long(name, "line", lines) for name, lines in rounded.items() if lines)
-    return [Table(tuple(found), values, contents(layout), count, tuple(labels), findings)]
+    return [Table(tuple(located), values, contents(layout), count, tuple(labels), findings)]
 
 
 def header(path: Path) -> tuple[Channel, ...]:
@@ -161,7 +161,7 @@ def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
 
 
 def contents(layout: Layout) -> str:
-    """What the file holds, in words."""
+    """The contents of the file in words."""
     return (
         f"columns {', '.join(layout.header)}" if layout.header else f"{layout.width} columns without a header"
     )
@@ -194,11 +194,11 @@ def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
         if not layout.is_row(line):
             continue
         fields = layout.fields(line)
-        found = [None] if fields is None else [layout.number(fields[index]) for index in indices]
-        if None in found:
+        numbers = [None] if fields is None else [layout.number(fields[index]) for index in indices]
+        if None in numbers:
             bad.append(number)
         if fields is not None:
-            rows[len(lines)] = [math.nan if value is None else value for value in found]
+            rows[len(lines)] = [math.nan if value is None else value for value in numbers]
         lines.append(number)
     rows = rows[: len(lines)]
     place, badly = np.array(lines, np.int64), np.array(bad, np.int64)
@@ -228,7 +228,7 @@ def _labels(block: Block, layout: Layout, index: int) -> list[str]:
 def _findings(
     flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, width: int
 ) -> tuple[Finding, ...]:
-    """What to say of rows that could not be read, and of a file that ends too soon."""
+    """Findings on rows that cannot be read, and on a file that ends too soon."""
     none = np.empty(0, np.int64)
     bad = np.concatenate([none, *(flaw.bad for flaw in flaws)])
     findings = []

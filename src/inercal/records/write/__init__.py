@@ -80,7 +80,7 @@ def titles(record: Record) -> list[str]:
 
 
 def attributes(column: Column) -> dict[str, str]:
-    """What a file says of a column, beside its values."""
+    """The attributes of a column in a file, beside its values."""
     return {
         "units": column.unit.symbol,
         "sensor": column.sensor,
@@ -90,7 +90,7 @@ def attributes(column: Column) -> dict[str, str]:
 
 
 def origin(record: Record) -> dict[str, str]:
-    """Where a record comes from, for the attributes of a file: plain ASCII, the lists as JSON."""
+    """The origin of a record, for the attributes of a file: plain ASCII, the lists as JSON."""
     from inercal import __version__
 
     return {

@@ -1,117 +1,242 @@
-"""Gross faults of a recording: proposals of what happened to it, each with the recording as it would be without.
+"""Gross faults of a recording or its study: signs, units and order of rates, angles and accelerometers; another path.
 
-A proposal is judged by a filter, not here: it must lower the sum of normalised innovations squared by more than its
-``cost``. Where the recording is sound that happens with a probability of at most `RISK` for all proposals of a
-kind: the likelihood ratio of two models exceeds 1/r by chance with probability r at most (Markov's inequality), and
-twice its logarithm is the change of that sum. Scalars that a proposal leaves out count 1 each.
-
-Angles and commands are compared from row to row: `Turning` holds what each says of the rotation in between.
+Before anything is filtered they are seen roughly, to some per cent: enough to tell wrong units, exchanged or reversed
+axes and another path from the coefficients that are to be found, which are a hundred times smaller. What the whole
+recording is about is compared, so that single bad stretches stay with the tests of the filters' innovations. Of these
+the axes of the accelerometers are one hypothesis (`reordered_accelerometers`).
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import permutations, product
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.findings import Finding
-from inercal.geometry.rotations import boxminus, conjugate, rotate
-from inercal.records.places import counted, places
-from inercal.selfcal.filters.filter_result import Problem
+from inercal.errors import RecordError
+from inercal.estimate.hypotheses import Hypothesis
+from inercal.findings import EVERYTHING, Finding
+from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
+from inercal.selfcal.diagnosis.fit_quality import Case
 from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.platform.rig import JOINTS, Gimbals, World
+from inercal.selfcal.settings import SelfcalSettings
 
-RISK = 1e-3
-"""Accepted probability of a false finding, of each kind."""
-
-SHIFTS = (-3, -2, -1, 1, 2, 3)
-"""Rows by which a command log may be shifted."""
-
-_LEAST = 3
-"""Rows for which an encoder must stand still."""
-
-_SAME = 20
-"""Rows for which it must repeat one reading to the last digit, where its joint is not told to turn."""
+#: ratio of rates to angles -> units that look exchanged
+_EXCHANGED = {
+    180.0 / math.pi: "degrees and radians",
+    60.0: "per second and per minute, or minutes of arc and degrees",
+    3600.0: "per second and per hour, or seconds of arc and degrees",
+    3600.0 * 180.0 / math.pi: "deg/h and rad/s",
+    1000.0: "thousandths and wholes",
+}
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
-    """A ``finding`` and the ``recording`` as it would be without the fault; ``cost`` as in the module."""
+class _Motion:
+    """Motion in each of m steps between rows whose angles are known.
 
-    finding: Finding
-    recording: Recording
-    cost: float
+    ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
+    space, in p, that the rates tell of; ``stretch`` (m,) the stretch that each step belongs to; ``told`` (m,) whether
+    all rates in it were recorded.
+    """
 
+    th: Array
+    dt: Array
+    rate: Array
+    stretch: NDArray[np.int64]
+    told: NDArray[np.bool_]
 
-@dataclass(frozen=True, eq=False)
-class Turning:
-    """Rotation from row to row, rad about the axes of p at the start of each: ``seen`` (n - 1, 3) by the encoders (NaN
-    where a reading is missing), ``told`` (n - 1, 3) by the commands; the same about the joints in ``moved`` and
-    ``sent`` (n - 1, 3); ``of_earth`` (n - 1, 3) the part of earth rate; ``up`` (n, 3) m/s^2 in p at the encoders'
-    attitude; ``noise`` [rad] standard deviation of a difference of two encoder readings."""
+    def turned(self, world: World) -> Array:
+        """(s, 3) rad: turns of the stretches against inertial space, in p, that the angles tell of such a rig."""
+        q, _ = gimbals(self.th, world)
+        of_earth = rotate(conjugate(q[:-1]), world.earth) * self.dt[:, None]
+        return self.summed(log(multiply(conjugate(q[:-1]), q[1:])) + of_earth)
 
-    seen: Array
-    told: Array
-    moved: Array
-    sent: Array
-    of_earth: Array
-    up: Array
-    noise: float
-
-    @property
-    def jumps(self) -> NDArray[np.bool_]:
-        """(n - 1,) where the encoders turn otherwise than told by more than noise and half of what was told."""
-        off = np.linalg.norm(self.seen - self.told, axis=1)
-        return np.asarray(off > 10.0 * self.noise + 0.5 * np.linalg.norm(self.told, axis=1))
+    def summed(self, steps: Array) -> Array:
+        """(s, 3) of each stretch, without steps whose rates are a guess."""
+        return np.stack([np.bincount(self.stretch, steps[:, k] * self.told) for k in range(3)], axis=-1)
 
 
-def turning(recording: Recording, problem: Problem) -> Turning:
-    """Compare encoders and commands from row to row."""
-    q, joints = gimbals(recording.th, problem.world)
-    dt = recording.dt[:, None]
-    # where a reading is missing the last known attitude does for the small part of earth rate
-    known = np.isfinite(recording.th).all(axis=1)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(q)), 0))
-    of_earth = rotate(conjugate(q[last]), problem.world.earth)[:-1] * dt
-    told = recording.rate * dt - of_earth
-    # at gimbal lock the joints of a rotation are not unique, and the shortest motion is taken
-    sent = np.einsum("kij,kj->ki", np.linalg.pinv(joints[last][:-1], rcond=1e-3), told)
-    return Turning(
-        boxminus(q[1:], q[:-1]),
-        told,
-        np.diff(recording.th, axis=0),
-        sent,
-        of_earth,
-        rotate(conjugate(q), problem.world.up),
-        math.sqrt(2.0) * problem.noise.encoder,
+def implausible(recording: Recording, settings: SelfcalSettings, where: object) -> list[Finding]:
+    """What does not fit together: rates, angles, accelerometers.
+
+    Codes are ``sign_suspect`` and ``channel_swap`` of gimbals, rates and accelerometers, ``contradiction``,
+    ``unit_suspect``, and ``at_prior`` without any motion. ``where`` is named in the error.
+
+    Raises
+    ------
+    RecordError
+        Rates many times as fast as the angles, or the reverse: a unit is wrong, and nothing can be computed.
+    """
+    findings: list[Finding] = []
+    known = np.flatnonzero(np.isfinite(recording.th).all(axis=1))
+    if known.size < 2:
+        raise RecordError(where, "found one row with all angles th_x, th_y, th_z, expected more")
+    motion = _motion(recording, known)
+    moved = np.linalg.norm(motion.summed(np.diff(motion.th, axis=0)), axis=1)
+    commanded = motion.summed(motion.rate)
+    noise = LIMITS.noise_sigmas * settings.noise.encoder
+    if moved.max() < noise:
+        still = (
+            "th: the platform does not turn, expected turns: most coefficients stay as they were known before"
+        )
+        findings.append(Finding("at_prior", still))
+    else:
+        _units(commanded, moved, noise, where)
+        findings += _rig(motion, commanded, settings, "gyro" if recording.measured else "wc")
+    if all(finding.code not in ("channel_swap", "sign_suspect", "contradiction") for finding in findings):
+        findings += _accelerometers(recording, settings, known)
+    return findings
+
+
+def _motion(recording: Recording, known: NDArray[np.int64]) -> _Motion:
+    """Motion between the rows whose angles are ``known``."""
+    t = recording.t
+    gained = np.vstack([np.zeros(3), np.cumsum(recording.rate * recording.dt[:, None], axis=0)])
+    part = (t[known[:-1]] - t[known[0]]) / (t[known[-1]] - t[known[0]])
+    _, numbered = np.unique((LIMITS.compared_stretches * part).astype(np.int64), return_inverse=True)
+    held = np.zeros(len(t), dtype=np.int64)
+    held[np.array(recording.held, dtype=np.int64) + 1] = 1
+    told = np.diff(np.cumsum(held)[known]) == 0
+    return _Motion(recording.th[known], np.diff(t[known]), np.diff(gained[known], axis=0), numbered, told)
+
+
+def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
+    """Refuse rates that turn the platform many times as fast as the angles do, or the reverse."""
+    turned = np.linalg.norm(commanded, axis=1)
+    moving = (turned > 0.3 * turned.max()) & (moved > noise)
+    if not moving.any():
+        return
+    ratio = float(np.median(turned[moving] / moved[moving]))
+    factor = max(ratio, 1.0 / ratio)
+    if factor < LIMITS.unit_ratio:
+        return
+    words = next((units for of, units in _EXCHANGED.items() if 0.8 < factor / of < 1.25), "units")
+    raise RecordError(
+        where,
+        f"the rates turn the platform {ratio:.4g} times as far as the angles say, expected the same: {words} look "
+        "exchanged",
     )
 
 
-def proposals(recording: Recording, problem: Problem) -> Iterator[Proposal]:
-    """All gross faults that the recording may have."""
-    turn = turning(recording, problem)
-    yield from _accelerometer_axes(recording, turn)
-    yield from _shifts(recording, turn)
-    yield from _late_accelerometers(recording, turn)
-    yield from _frozen(recording)
-    yield from _stuck(recording, turn)
-    yield from _missing_rows(recording, turn)
+def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
+    """Rates against angles: gimbals of another order or with other signs, exchanged or reversed rates."""
+    world, noise = settings.world, 2.0 * settings.noise.encoder
+    turned = motion.turned(world)
+    misfit = _misfit(turned, commanded, noise)
+    if misfit < LIMITS.rough_misfit:
+        return []
+    for other in _other_gimbals(settings.gimbals):
+        tried = replace(world, axes=other.index, signs=other.sign)
+        if _misfit(motion.turned(tried), commanded, noise) < LIMITS.rough_fit:
+            code = "sign_suspect" if other.axes == settings.gimbals.axes else "channel_swap"
+            text = f"th: the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
+            return [Finding(code, f"{text} of the rig, not with those of the study", harm=EVERYTHING)]
+    for order in itertools.permutations(range(3)):
+        exchanged = replace(motion, th=motion.th[:, order])
+        if _misfit(exchanged.turned(world), commanded, noise) < LIMITS.rough_fit:
+            names = ", ".join(
+                f"th_{axis} looks like th_{'xyz'[order.index(k)]}"
+                for k, axis in enumerate("xyz")
+                if order[k] != k
+            )
+            return [Finding("channel_swap", f"th: {names}, as the rates have it", harm=EVERYTHING)]
+    return _exchanged(sensor, commanded, turned, noise) or [
+        Finding(
+            "contradiction",
+            f"th: the angles do not follow the rates {sensor}_x..z, off by {100.0 * misfit:.3g} % of the motion",
+        )
+    ]
 
 
-def _cost(alternatives: float, left_out: int = 0) -> float:
-    """Change of the sum of NIS that chance explains, for so many alternatives."""
-    return 2.0 * math.log(alternatives / RISK) + left_out
+def _other_gimbals(stated: Gimbals) -> list[Gimbals]:
+    """All other orders and signs, the fewest changes first."""
+    found = [
+        Gimbals(axes, (outer, inner, platform))
+        for axes in itertools.permutations(get_args(Axis))
+        for outer, inner, platform in itertools.product((1, -1), repeat=3)
+    ]
+    now = (*stated.axes, *stated.signs)
+
+    def changes(other: Gimbals) -> int:
+        return sum(a != b for a, b in zip((*other.axes, *other.signs), now, strict=True))
+
+    return sorted(found, key=changes)[1:]
 
 
-def _accelerometer_axes(recording: Recording, turn: Turning) -> Iterator[Proposal]:
+def _accelerometers(
+    recording: Recording, settings: SelfcalSettings, known: NDArray[np.int64]
+) -> list[Finding]:
+    """Accelerometers against the specific force at the angles: wrong units, exchanged or reversed axes."""
+    world = settings.world
+    whole = known[np.isfinite(recording.acc[known]).all(axis=1)]
+    if not whole.size:
+        return []
+    acc, g0 = recording.acc[whole], float(np.linalg.norm(world.up))
+    norm = float(np.median(np.linalg.norm(acc, axis=1)))
+    if not abs(norm / g0 - 1.0) < LIMITS.gravity_share:
+        if any(
+            finding.code == "unit_suspect" and finding.message.startswith("acc")
+            for finding in recording.findings
+        ):
+            return []
+        text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
+        return [Finding("unit_suspect", text, harm=EVERYTHING)]
+    force = rotate(conjugate(gimbals(recording.th[whole], world)[0]), world.up)
+    noise = 2.0 * settings.noise.accelerometer
+    misfit = _misfit(acc, force, noise)
+    if misfit < LIMITS.rough_misfit:
+        return []
+    return _exchanged("acc", acc, force, noise) or [
+        Finding(
+            "contradiction",
+            f"acc: specific force does not follow the angles, off by {100.0 * misfit:.3g} % of gravity",
+        )
+    ]
+
+
+def _misfit(a: Array, b: Array, noise: float) -> float:
+    """Root mean square of a - b (s, 3), less that of the ``noise`` of an axis, over that of b; inf where b is 0."""
+    left = max(float(np.sum((a - b) ** 2)) - 3.0 * len(a) * noise**2, 0.0)
+    whole = float(np.sum(b**2))
+    return math.sqrt(left / whole) if whole > 0.0 else math.inf if left > 0.0 else 0.0
+
+
+def _exchanged(sensor: str, found: Array, expected: Array, noise: float) -> list[Finding]:
+    """``channel_swap`` or ``sign_suspect`` where axes (s, 3) of a sensor fit in another order or with other signs."""
+    fits = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            changed = found[:, list(order)] * signs
+            changes = sum(k != j for k, j in enumerate(order)) + signs.count(-1.0)
+            if (misfit := _misfit(changed, expected, noise)) < LIMITS.rough_fit:
+                fits.append((changes, misfit, order, signs))
+    if not fits:
+        return []
+    _, _, order, signs = min(fits)
+    words = ", ".join(
+        f"{sensor}_{axis} should be {'-' if sign < 0.0 else ''}{sensor}_{'xyz'[k]}"
+        for axis, k, sign in zip("xyz", order, signs, strict=True)
+        if "xyz"[k] != axis or sign < 0.0
+    )
+    code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
+    return [Finding(code, f"{sensor}: {words}, as the angles have it", harm=EVERYTHING)]
+
+
+def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
     """Accelerometers exchanged or reversed: the signed permutation nearest to what they say against the encoders."""
-    acc, up = recording.acc[1:], turn.up[1:]
+    recording, problem = case
+    q, _ = gimbals(recording.th, problem.world)
+    acc, up = recording.acc[1:], rotate(conjugate(q), problem.world.up)[1:]
     both = np.isfinite(acc).all(axis=1) & np.isfinite(up).all(axis=1)
     match = acc[both].T @ up[both]
     sensors = (0, 1, 2)
@@ -119,7 +244,7 @@ def _accelerometer_axes(recording: Recording, turn: Turning) -> Iterator[Proposa
     def fit(order: tuple[int, ...], signs: tuple[float, ...]) -> float:
         return float(sum(signs[i] * match[i, order[i]] for i in sensors))
 
-    ways = list(product(permutations(sensors), product((1.0, -1.0), repeat=3)))
+    ways = list(itertools.product(itertools.permutations(sensors), itertools.product((1.0, -1.0), repeat=3)))
     order, signs = max(ways, key=lambda way: fit(*way))
     said = []
     for i in sensors:
@@ -129,156 +254,45 @@ def _accelerometer_axes(recording: Recording, turn: Turning) -> Iterator[Proposa
             said.append(f"acc_{'xyz'[i]} looks reversed")
     if not said:
         return
-    right = np.empty_like(recording.acc)
-    for i in sensors:
-        right[:, order[i]] = signs[i] * recording.acc[:, i]
-    code = "sign_suspect" if order == sensors else "channel_swap"
-    yield Proposal(Finding(code, ", ".join(said)), replace(recording, acc=right), _cost(len(ways) - 1))
+
+    def without(case: Case, _: Array) -> Case:
+        recording, problem = case
+        right = np.empty_like(recording.acc)
+        for i in sensors:
+            right[:, order[i]] = signs[i] * recording.acc[:, i]
+        return replace(recording, acc=right), problem
+
+    code, text = "sign_suspect" if order == sensors else "channel_swap", ", ".join(said)
+    yield Hypothesis(text, code, text, without, alternatives=len(ways) - 1, harm=EVERYTHING)
 
 
-def _shifts(recording: Recording, turn: Turning) -> Iterator[Proposal]:
-    """A command log shifted by some rows, throughout or from a row on."""
-    n = len(recording.rate)
-    rows = np.arange(n)
+def off_the_path(
+    recording: Recording, plan: Plan, world: World, began: float, rows: NDArray[np.int64]
+) -> list[Finding]:
+    """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s].
 
-    def off(shift: int) -> Array:
-        told = recording.rate[np.clip(rows + shift, 0, n - 1)] * recording.dt[:, None] - turn.of_earth
-        return np.asarray(np.nan_to_num(np.square(turn.seen - told).sum(axis=1)))
-
-    plain = off(0)
-    by_shift = {shift: off(shift) for shift in SHIFTS}
-    whole = min(SHIFTS, key=lambda shift: by_shift[shift].sum())
-    yield _shifted(recording, whole, 0, _cost(len(SHIFTS)))
-    # squares before a row without the shift, from it on with it
-    gain = {shift: np.cumsum((plain - squares)[::-1])[::-1] for shift, squares in by_shift.items()}
-    part = max(SHIFTS, key=lambda shift: gain[shift].max())
-    # where rates are steady a shift hardly shows: the last row from which it may begin, and some before
-    last = int(np.flatnonzero(gain[part] >= gain[part].max() - (10.0 * turn.noise) ** 2)[-1])
-    for first in last - np.append(0, 5 * 2 ** np.arange(10)):
-        if first > 0:
-            yield _shifted(recording, part, int(first), _cost(len(SHIFTS) * n))
-
-
-def _shifted(recording: Recording, shift: int, first: int, cost: float) -> Proposal:
-    """The recording with its commands from row ``first`` on taken ``shift`` rows further down."""
-    rate = recording.rate.copy()
-    last = len(rate) - 1
-    rate[first:] = recording.rate[np.clip(np.arange(first, last + 1) + shift, 0, last)]
-    how = "later" if shift > 0 else "earlier"
-    text = f"commands are logged {counted(abs(shift), 'row')} {how} than the platform acts on them"
-    where = places("row", np.arange(first, last + 1) + 1) if first else ""
-    return Proposal(Finding("command_shift", text, where), replace(recording, rate=rate), cost)
-
-
-def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Proposal]:
-    """Accelerometers logged some rows late or early: the shift nearest to what the encoders say."""
-    moved = {shift: _by_rows(recording.acc, shift) for shift in SHIFTS}
-
-    def off(shift: int) -> float:
-        apart = moved[shift] - turn.up
-        return float(np.nanmean(np.square(apart))) if np.isfinite(apart).any() else math.inf
-
-    shift = min(SHIFTS, key=off)
-    how = "late" if shift > 0 else "early"
-    text = f"accelerometers are logged {counted(abs(shift), 'row')} {how}, against angles and commands"
-    left_out = int(np.isfinite(recording.acc).sum() - np.isfinite(moved[shift]).sum())
-    cost = _cost(len(SHIFTS), left_out)
-    yield Proposal(Finding("command_shift", text), replace(recording, acc=moved[shift]), cost)
-
-
-def _by_rows(values: Array, shift: int) -> Array:
-    """Each row (n, m) replaced by that ``shift`` rows further down, NaN where there is none."""
-    out = np.full_like(values, np.nan)
-    if shift > 0:
-        out[:-shift] = values[shift:]
-    else:
-        out[-shift:] = values[:shift]
-    return out
-
-
-def _frozen(recording: Recording) -> Iterator[Proposal]:
-    """Readings that repeat, of all sensors, the accelerometers, or one of them: the longest run, as a coarse one has
-    many."""
-    n = len(recording.acc)
-    read = np.hstack([recording.acc, recording.th])
-    same = np.diff(read, axis=0) == 0.0
-    for columns in ([0, 1, 2, 3, 4, 5], [0, 1, 2], [0], [1], [2]):
-        runs = _runs(same[:, columns].all(axis=1))
-        start, end = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
-        if end > start:
-            rows = np.arange(start + 1, end + 1)
-            known = read.copy()
-            known[rows[:, None], columns] = np.nan
-            which = (
-                "accelerometers and angles"
-                if len(columns) == 6
-                else ", ".join(f"acc_{'xyz'[i]}" for i in columns)
-            )
-            text = f"{which} repeat{'' if len(columns) > 1 else 's'} one reading in {counted(len(rows) + 1, 'row')}"
-            cost = _cost(2.5 * n * n, len(rows) * len(columns))
-            without = replace(recording, acc=known[:, :3], th=known[:, 3:])
-            yield Proposal(Finding("dead_channel", text, places("row", rows + 1)), without, cost)
-
-
-def _stuck(recording: Recording, turn: Turning) -> Iterator[Proposal]:
-    """An encoder that stands still while its joint is told to turn."""
-    n = len(recording.th)
-    for joint, name in enumerate(JOINTS):
-        sent, moved = np.abs(turn.sent[:, joint]), np.abs(turn.moved[:, joint])
-        still = (sent > 10.0 * turn.noise) & (moved < 0.1 * sent)
-        for start, end in _runs(still):
-            rows = np.arange(start + 1, end + 1)
-            degrees = math.degrees(float(turn.sent[start:end, joint].sum()))
-            text = f"{name} stands still while it is told to turn by {degrees:.3g} deg"
-            found = Finding("stuck_encoder", text, places("row", rows + 1))
-            yield _without_angles(recording, rows, found, 3.0 * n * n)
-            later = Finding("stuck_encoder", f"{text}, and is wrong from then on", found.where)
-            yield _without_angles(recording, np.arange(start + 1, n), later, 3.0 * n)
-        # at rest only the noise tells: the longest run, as a coarse encoder has many
-        start, end = max(_runs(turn.moved[:, joint] == 0.0), key=lambda run: run[1] - run[0], default=(0, 0))
-        if end - start >= _SAME and not still[start:end].any():
-            rows = np.arange(start + 1, end + 1)
-            text = f"{name} repeats one reading in {counted(len(rows) + 1, 'row')}"
-            found = Finding("stuck_encoder", text, places("row", rows + 1))
-            yield _without_angles(recording, rows, found, 3.0 * n * n)
-
-
-def _runs(true: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and end of each run of True of at least `_LEAST`."""
-    edges = np.flatnonzero(np.diff(np.pad(true.astype(np.int8), 1)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= _LEAST]
-
-
-def _without_angles(
-    recording: Recording, rows: NDArray[np.int64], finding: Finding, alternatives: float
-) -> Proposal:
-    """The recording without the angles of some rows."""
-    th = recording.th.copy()
-    left_out = int(np.isfinite(th[rows]).sum())
-    th[rows] = np.nan
-    return Proposal(finding, replace(recording, th=th), _cost(alternatives, left_out))
-
-
-def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Proposal]:
-    """Rows that are missing though time goes on evenly: a step of the angles that is a multiple of that told."""
-    size = np.square(turn.told).sum(axis=1)
-    fast = turn.jumps & (size > (10.0 * turn.noise) ** 2)
-    along = np.divide((turn.seen * turn.told).sum(axis=1), size, out=np.ones_like(size), where=fast)
-    more = np.rint(along - 1.0)
-    miss = np.linalg.norm(turn.seen - (1.0 + more[:, None]) * turn.told, axis=1)
-    lost = fast & (more >= 1.0) & (miss < 0.1 * np.sqrt(size) * (1.0 + more))
-    if not lost.any():
-        return
-    rows = np.flatnonzero(lost)
-    # the time that they took, with the commands of the rows before them held
-    t = recording.t + np.append(0.0, np.cumsum(np.where(lost, more * recording.dt, 0.0)))
-    cost = len(rows) * _cost(len(size) * len(SHIFTS))
-    text = f"about {counted(int(more[lost].sum()), 'row')} missing though time goes on: the angles leap along the turn"
-    where = places("row", rows + 2)
-    yield Proposal(Finding("gap", text, where), replace(recording, t=t), cost)
-    # the commands went on being logged
-    n = len(recording.rate)
-    lag = np.append(0, np.cumsum(np.where(lost, more, 0.0)).astype(np.int64)[:-1])
-    rate = recording.rate[np.minimum(np.arange(n) + lag, n - 1)]
-    finding = Finding("gap", f"{text}; the commands have them", where)
-    yield Proposal(finding, replace(recording, t=t, rate=rate), cost)
+    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it: at gimbal lock they are not
+    unique.
+    """
+    t = recording.t - began
+    findings = []
+    if t[-1] < plan.duration - 1.5 * plan.step:
+        text = f"the recording ends after {t[-1]:.6g} s, the study's path takes {plan.duration:.6g} s"
+        findings.append(Finding("truncated", text))
+    nominal = plan.angles()
+    then = plan.step * np.arange(len(nominal))
+    expected = np.stack([np.interp(t, then, nominal[:, k]) for k in range(3)], axis=-1)
+    away = np.abs(np.remainder(recording.th - expected + math.pi, 2.0 * math.pi) - math.pi)
+    there, planned = (gimbals(np.nan_to_num(th), world)[0] for th in (recording.th, expected))
+    turned = attitude_difference(planned, there)[:, None]
+    away = np.where(
+        np.isfinite(recording.th).all(axis=1, keepdims=True) & (turned > LIMITS.off_the_path), away, 0.0
+    )
+    if away.max() > LIMITS.off_the_path:
+        first, joint = divmod(int(np.argmax(away > LIMITS.off_the_path)), 3)
+        text = (
+            f"{JOINTS[joint]} leaves the study's path at {t[first]:.6g} s; the angles are up to "
+            f"{math.degrees(away.max()):.3g} deg away from it"
+        )
+        findings.append(Finding("contradiction", text, f"row {rows[first] + 1}"))
+    return findings

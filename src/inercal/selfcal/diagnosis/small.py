@@ -1,247 +1,150 @@
-"""Small constant errors that the model leaves out, found in the innovations of the error-state filter.
+"""Constant errors that the model leaves out, found in the innovations of the error-state filter.
 
-Innovations change linearly with such an error: ``z = z_0 + Z theta``, where column i of Z is the change when the
-recording is corrected by a small theta_i and filtered again. What makes them smallest is least squares, and the sum of
-squares that it takes away is chi-square where there is no error: the filter with theta as further states, without a
-prior, would find the same (Friedland, IEEE Trans. Automatic Control 14 (1969) 359). One kind of error after the other
-is taken in, the one that explains most first, together with those found before. What a study states with an
-uncertainty may be wrong by about that: it is fitted along with all, its uncertainty for a prior.
+Each is a hypothesis with some parameters, tested by the score test (`inercal.estimate.hypotheses`): the filter with
+them as further states, without a prior, would find the same. What a study states with an uncertainty may be wrong by
+about that: it is fitted along with all, its uncertainty for a prior.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, refitted, search, sigmas, tried
+from inercal.findings import EVERYTHING
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import boxminus, exp, rotate
-from inercal.selfcal.diagnosis.gross import RISK
+from inercal.records.places import counted
+from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, regular
+from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import Filtered, Problem
 from inercal.selfcal.filters.residuals import gimbals
-from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
 
-Case = tuple[Recording, Problem]
-
-ORDERS = np.arange(1, 65)
-"""Periods per turn that an error of an encoder is looked for at."""
-
-LEAST_COSINE = 0.2
-"""Rows with a smaller |cos thy| are left out: near gimbal lock innovations are smaller than stated."""
-
-LEAST_SIGMAS = 4.0
-"""Standard uncertainties by which one parameter of an error must still differ from 0 beside errors found later."""
-
-_MOST, _ROUNDS = 5, 10
-_FLAT = 1e-12
+Stated = Hypothesis[Case] | None
+"""Errors of what a study states with an uncertainty."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cause:
-    """A kind of error: ``names`` of its parameters, a small ``step`` of each, the case ``corrected`` by values of
-    them, of how many alternatives it was picked, and the standard deviation ``prior`` of each parameter about 0."""
-
-    kind: str
-    names: tuple[str, ...]
-    step: float
-    corrected: Callable[[Recording, Problem, Array], Case]
-    alternatives: int = 1
-    prior: float = math.inf
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """An error that is there: its ``values`` (m,) and their standard uncertainties ``u`` (m,), in SI."""
-
-    cause: Cause
-    values: Array
-    u: Array
-
-
-def filtered(case: Case) -> Filtered:
-    """What the error-state filter makes of a case."""
-    return estimate(*case, "error-state")
-
-
-def regular(recording: Recording, found: Filtered) -> Array:
-    """Normalised innovations (n - 1, 6), NaN near gimbal lock."""
-    near = ~(np.abs(np.cos(recording.th[1:, 1])) >= LEAST_COSINE)
-    innovations = found.innovations.copy()
-    innovations[near & np.isfinite(recording.th[1:, 1])] = np.nan
-    return innovations
-
-
-def likely(recording: Recording, problem: Problem, stated: Cause | None) -> Problem:
+def likely(recording: Recording, problem: Problem, stated: Stated) -> Problem:
     """The problem with what is ``stated`` moved, within its uncertainty, to where the recording fits best.
 
-    Where one of it would have to move further than chance takes it, at a risk of `RISK` over all, the recording
-    contradicts what is stated, and nothing is moved.
+    Where one of it would have to move further than chance takes it, the recording contradicts what is stated, and
+    nothing is moved.
     """
-    from scipy.special import ndtri
-
     if stated is None:
         return problem
-    fit = _fitted((recording, problem), [_none_of(stated)])[0]
-    limit = -float(ndtri(0.5 * RISK / len(fit.values)))
+    case = recording, problem
+    (fit,) = refitted(case, [tried(stated, case)], JUDGE)
+    limit = sigmas(LIMITS.risk, len(fit.values))
     if not np.abs(fit.values).max() <= limit * stated.prior:
         return problem
-    return _corrected((recording, problem), [fit])[1]
+    return fit.case[1]
 
 
-def search(recording: Recording, problem: Problem, stated: Cause | None = None) -> tuple[list[Found], Case]:
-    """Find what the model leaves out, and what is ``stated`` does not explain within its uncertainty.
+def small_errors(case: Case, stated: Stated = None) -> tuple[Fits[Case], Case]:
+    """What the model leaves out, beside what is ``stated``; and the case without all of it."""
+    return search(case, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, stated)
 
-    Returns
-    -------
-    found : list of `Found`
-    case : (Recording, Problem)
-        Corrected by all of it.
-    """
-    causes, base, taken = _causes(problem), (recording, problem), list[Found]()
-    if stated is not None:
-        taken = _fitted(base, [_none_of(stated)])
-    case = _corrected(base, taken)
+
+def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
+    """What may be wrong of the site, the base, the gyros, the encoders and the clock of the commands."""
     now = filtered(case)
-    for _ in range(_MOST):
-        if not now.converged:
-            break
-        z = regular(case[0], now)
-        held = [_slopes(case, each.cause, z) for each in taken]
-        kinds = {each.cause.kind for each in taken}
-        tried = [cause for cause in (*causes, *_harmonics(case, now, z)) if cause.kind not in kinds]
-        gains = [_gain(z, taken, held, cause, _slopes(case, cause, z), len(tried)) for cause in tried]
-        if not max(gains, default=0.0) > 0.0:
-            break
-        cause = tried[int(np.argmax(gains))]
-        fitted = _fitted(base, [*taken, _none_of(cause)])
-        # earlier ones that were taken for a part of this one
-        last = fitted.pop()
-        taken = [*(each for each in fitted if each.cause is stated or _clear(each)), last]
-        if len(taken) <= len(fitted):
-            taken = _fitted(base, taken)
-        case = _corrected(base, taken)
-        now = filtered(case)
-    return [each for each in taken if each.cause is not stated], case
-
-
-def _none_of(cause: Cause) -> Found:
-    """An error of which nothing is known yet."""
-    return Found(cause, np.zeros(len(cause.names)), np.ones(len(cause.names)))
-
-
-def _clear(found: Found) -> bool:
-    """Whether a parameter of an error differs from 0."""
-    return bool(np.abs(found.values / found.u).max() > LEAST_SIGMAS)
-
-
-def _fitted(base: Case, taken: Sequence[Found]) -> list[Found]:
-    """All errors together by least squares, linearised again where they are large."""
-    found = list(taken)
-    for _ in range(_ROUNDS):
-        case = _corrected(base, found)
-        z = regular(case[0], filtered(case))
-        Z = np.concatenate([_slopes(case, each.cause, z) for each in found], axis=-1)
-        fit = _least_squares(Z, z, found)
-        ends = np.cumsum([len(each.values) for each in found])[:-1]
-        parts = zip(found, np.split(fit.change, ends), np.split(fit.u, ends), strict=True)
-        found = [Found(each.cause, each.values + by, u) for each, by, u in parts]
-        if np.all(np.abs(fit.change) < 0.1 * fit.u):
-            break
-    return found
-
-
-def _corrected(base: Case, taken: Sequence[Found]) -> Case:
-    """The case without the errors found."""
-    for each in taken:
-        base = each.cause.corrected(*base, each.values)
-    return base
-
-
-def _slopes(case: Case, cause: Cause, z: Array) -> Array:
-    """(n - 1, 6, m) derivative of the innovations by the parameters of a cause."""
-    columns = []
-    for values in cause.step * np.eye(len(cause.names)):
-        changed = cause.corrected(*case, values)
-        columns.append((regular(changed[0], filtered(changed)) - z) / cause.step)
-    return np.stack(columns, axis=-1)
-
-
-class _Fit(NamedTuple):
-    """Least squares: ``change`` (m,) of the parameters, its ``u`` (m,), mean square ``left`` and sum of squares
-    ``gained``."""
-
-    change: Array
-    u: Array
-    left: float
-    gained: float
-
-
-def _least_squares(Z: Array, z: Array, at: Sequence[Found]) -> _Fit:
-    """Change from the values of errors ``at`` that makes ``z + Z change`` and their misfit to their priors smallest;
-    combinations without effect stay as they are."""
-    used = np.isfinite(z) & np.isfinite(Z).all(axis=-1)
-    scatter = math.sqrt(max(1.0, float(np.mean(np.square(z[used]))))) if used.any() else 1.0
-    weight = scatter * np.concatenate([np.full(len(each.values), 1.0 / each.cause.prior) for each in at])
-    known = weight * np.concatenate([each.values for each in at])
-    columns, values = np.vstack([Z[used], np.diag(weight)]), np.append(z[used], known)
-    size = np.sqrt(np.square(columns).sum(axis=0))
-    without = size == 0.0
-    size[without] = 1.0
-    columns = columns / size
-    strength, ways = np.linalg.eigh(columns.T @ columns)
-    ways[without] = 0.0  # eigenvectors have them in other combinations by rounding
-    inverse = np.where(strength > _FLAT, 1.0 / np.maximum(strength, _FLAT), 0.0)
-    along = ways.T @ (columns.T @ values)
-    gained = float(along @ (inverse * along))
-    # innovations larger than stated, for whatever reason, must not make errors of the model
-    left = max(1.0, (float(values @ values) - gained) / max(int(used.sum()), 1))
-    u = np.sqrt(left * (np.square(ways) @ inverse)) / size
-    return _Fit(-(ways @ (inverse * along)) / size, u + np.finfo(float).tiny, left, gained)
-
-
-def _gain(
-    z: Array, taken: Sequence[Found], held: Sequence[Array], cause: Cause, slopes: Array, tried: int
-) -> float:
-    """Sum of squares that a cause takes away beyond those taken already, above what chance does."""
-    from scipy.special import chdtri
-
-    after = _least_squares(np.concatenate([*held, slopes], axis=-1), z, [*taken, _none_of(cause)])
-    before = _least_squares(np.concatenate(held, axis=-1), z, taken).gained if held else 0.0
-    chance = float(chdtri(slopes.shape[-1], RISK / (tried * cause.alternatives)))
-    return (after.gained - before) / after.left - chance
-
-
-def _causes(problem: Problem) -> tuple[Cause, ...]:
-    """What may be wrong of the site, the base, the gyros and the clock of the commands."""
-    general = (
-        Cause("latitude", ("north", "up"), 1e-3 * EARTH_RATE, _other_earth),
-        Cause("delay", ("delay",), 0.01, _delayed),
-        Cause("mounting", ("gamma_x", "gamma_y", "gamma_z"), 1e-5, _other_mounting),
+    if not now.converged:
+        return
+    yield Hypothesis(
+        "latitude",
+        "site_suspect",
+        _latitude,
+        _other_earth,
+        ("north", "up"),
+        1e-3 * EARTH_RATE,
+        harm=EVERYTHING,
     )
-    if len(problem.prior) > len(NAMES):
-        return general
+    yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
+    yield _vector(
+        "mounting",
+        "gamma",
+        _other_mounting,
+        "rad",
+        "the sensors are turned on the platform, against the axis of its joint",
+        "the angles are not those of the sensors' axes: align them, or take the turn out of the angles",
+    )
+    if len(case[1].prior) == len(NAMES):
+        yield _vector(
+            "base",
+            "beta",
+            _other_base,
+            "rad",
+            "the base or the zero of the encoders is turned",
+            "set extended = true under [filter], or correct heading and tilt under [rig]",
+        )
+        yield _vector(
+            "scale",
+            "kg1",
+            _other_scale,
+            "1",
+            "the gyros have scale errors",
+            "set extended = true under [filter]",
+        )
+    yield from _harmonics(case, now)
+
+
+def _vector(
+    name: str, symbol: str, without: Callable[[Case, Array], Case], dimension: str, what: str, advice: str
+) -> Hypothesis[Case]:
+    """An error about three axes, of an SI unit."""
+    parameters = tuple(f"{symbol}_{axis}" for axis in "xyz")
+    unit, size = shown_unit(dimension)
+
+    def says(fit: Fitted[Case]) -> str:
+        seen = [
+            f"{parameter} = {value / size:.3g} +- {u / size:.1g} {unit}"
+            for parameter, value, u in zip(parameters, fit.values, fit.u, strict=True)
+            if abs(value) > LIMITS.shown_sigmas * u
+        ] or [f"{', '.join(parameters)} together"]
+        return f"{what}, which the model leaves out: {', '.join(seen)}; {advice}"
+
+    return Hypothesis(name, "unmodelled", says, without, parameters, 1e-5)
+
+
+def _delay(fit: Fitted[Case]) -> str:
+    """The finding of late commands."""
+    rows, dt = float(fit.values[0]), float(np.median(fit.case[0].dt))
+    how = "later" if rows > 0.0 else "earlier"
+    return f"the platform acts {1e3 * abs(rows) * dt:.3g} ms {how} than its commands are logged"
+
+
+def _latitude(fit: Fitted[Case]) -> str:
+    """The finding of earth rate that is not that of the stated latitude."""
+    world = fit.case[1].world
+    north, up = directions(world)
+    seen = math.atan2(float(world.earth @ up), float(world.earth @ north))
+    stated_earth = world.earth - fit.values[0] * north - fit.values[1] * up
+    stated = math.atan2(float(stated_earth @ up), float(stated_earth @ north))
+    u = float(np.hypot(fit.u[0] * math.sin(seen), fit.u[1] * math.cos(seen))) / EARTH_RATE
     return (
-        *general,
-        Cause("base", ("beta_x", "beta_y", "beta_z"), 1e-5, _other_base),
-        Cause("scale", ("kg1_x", "kg1_y", "kg1_z"), 1e-5, _other_scale),
+        f"the earth rate seen is that of latitude {math.degrees(seen):.2f} +- {math.degrees(u):.1g} deg, stated is "
+        f"{math.degrees(stated):.2f} deg: check latitude and heading"
     )
 
 
-def _other_mounting(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_mounting(case: Case, values: Array) -> Case:
     """Sensors turned by gamma [rad] against the axes that the encoders tell of: ``q_bp = q_encoders qexp(gamma)``."""
+    recording, problem = case
     turn = exp(values)
     return replace(recording, acc=rotate(turn, recording.acc), rate=rotate(turn, recording.rate)), problem
 
 
-def _other_earth(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_earth(case: Case, values: Array) -> Case:
     """Earth rate with other north and upward parts [rad/s]."""
+    recording, problem = case
     north, up = directions(problem.world)
     earth = problem.world.earth + values[0] * north + values[1] * up
     return recording, replace(problem, world=replace(problem.world, earth=earth))
@@ -257,8 +160,9 @@ def directions(world: World) -> tuple[Array, Array]:
     return level / np.linalg.norm(level), up
 
 
-def _delayed(recording: Recording, problem: Problem, values: Array) -> Case:
+def _delayed(case: Case, values: Array) -> Case:
     """Commands that act later by a part of a row."""
+    recording, problem = case
     part = float(values[0])
     before = np.vstack([recording.rate[:1], recording.rate[:-1]])
     after = np.vstack([recording.rate[1:], recording.rate[-1:]])
@@ -266,34 +170,35 @@ def _delayed(recording: Recording, problem: Problem, values: Array) -> Case:
     return replace(recording, rate=recording.rate + abs(part) * (other - recording.rate)), problem
 
 
-def _other_base(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_base(case: Case, values: Array) -> Case:
     """A base turned by beta [rad]."""
+    recording, problem = case
     q, world = exp(values), problem.world
     turned = replace(world, earth=rotate(q, world.earth), up=rotate(q, world.up))
     return recording, replace(problem, world=turned)
 
 
-def _other_scale(recording: Recording, problem: Problem, values: Array) -> Case:
+def _other_scale(case: Case, values: Array) -> Case:
     """Gyros with scale errors."""
+    recording, problem = case
     return replace(recording, rate=recording.rate * (1.0 + values)), problem
 
 
-def _harmonics(case: Case, now: Filtered, z: Array) -> list[Cause]:
+def _harmonics(case: Case, now: Filtered) -> Iterator[Hypothesis[Case]]:
     """Errors periodic in the angle of a joint: of each joint the order that its innovations show most."""
     angles, joints = _found_angles(case, now)
+    orders_tried, z = np.arange(1, LIMITS.harmonic_orders + 1), regular(case[0], now)
     th = angles[1:]
     size = np.sqrt(np.square(joints[1:]).sum(axis=2))
     by_joint = np.einsum("kij,kj->ki", np.linalg.pinv(joints[1:], rcond=1e-3), z[:, 3:] * size)
-    causes = []
     for joint in range(3):
         used = np.isfinite(by_joint[:, joint] + th[:, joint])
         angle, missed = th[used, joint], by_joint[used, joint]
         # half a period is the least from which an order is told from a constant
-        orders = ORDERS[ORDERS * np.ptp(angle) > math.pi] if used.any() else ORDERS[:0]
+        orders = orders_tried[orders_tried * np.ptp(angle) > math.pi] if used.any() else orders_tried[:0]
         if len(orders):
             powers = np.abs(np.exp(1j * orders[:, None] * angle) @ missed)
-            causes.append(_harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint]))
-    return causes
+            yield _harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint])
 
 
 def _found_angles(case: Case, now: Filtered) -> tuple[Array, Array]:
@@ -306,13 +211,20 @@ def _found_angles(case: Case, now: Filtered) -> tuple[Array, Array]:
     return recording.th - np.einsum("kij,kj->ki", np.linalg.pinv(joints, rcond=1e-3), off), joints
 
 
-def _harmonic(joint: int, order: int, angle: Array) -> Cause:
+def _harmonic(joint: int, order: int, angle: Array) -> Hypothesis[Case]:
     """An error ``a sin(k th) + b cos(k th)`` of an encoder at angles th (n,)."""
     waves = np.stack([np.sin(order * angle), np.cos(order * angle)])
 
-    def corrected(recording: Recording, problem: Problem, values: Array) -> Case:
-        th = recording.th.copy()
+    def without(case: Case, values: Array) -> Case:
+        th = case[0].th.copy()
         th[:, joint] -= values @ waves
-        return replace(recording, th=th), problem
+        return replace(case[0], th=th), case[1]
 
-    return Cause(f"harmonic {order} of {JOINTS[joint]}", ("sin", "cos"), 1e-6, corrected, len(ORDERS))
+    def says(fit: Fitted[Case]) -> str:
+        amplitude, periods = math.degrees(float(np.hypot(*fit.values))) * 3600.0, counted(order, "period")
+        return f"{JOINTS[joint]} errs periodically with its angle: {amplitude:.2g} arcsec, {periods} a turn"
+
+    name = f"harmonic {order} of {JOINTS[joint]}"
+    return Hypothesis(
+        name, "unmodelled", says, without, ("sin", "cos"), 1e-6, alternatives=LIMITS.harmonic_orders
+    )

@@ -18,7 +18,7 @@ from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen, singular, useless
-from inercal.selfcal.diagnosis.small import filtered as judging
+from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
 from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import Filtered, problem

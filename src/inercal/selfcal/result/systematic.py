@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from inercal.arrays import Array
-from inercal.selfcal.diagnosis.small import Cause
-from inercal.selfcal.filters.filter_result import Problem
-from inercal.selfcal.platform.recording import Recording
+from inercal.estimate.hypotheses import Hypothesis
+from inercal.selfcal.diagnosis.fit_quality import Case
 from inercal.selfcal.settings import SelfcalSettings
 
 _DEG = math.radians(1.0)
@@ -82,7 +81,7 @@ def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
     )
 
 
-def stated_errors(settings: SelfcalSettings) -> Cause | None:
+def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
     """Errors of what is stated with an uncertainty, in units of it; None where nothing is.
 
     They are small enough for changes of earth rate and gravity to add up.
@@ -92,7 +91,8 @@ def stated_errors(settings: SelfcalSettings) -> Cause | None:
         return None
     here = settings.world
 
-    def corrected(recording: Recording, problem: Problem, values: Array) -> tuple[Recording, Problem]:
+    def without(case: Case, values: Array) -> Case:
+        recording, problem = case
         earth, up = problem.world.earth, problem.world.up
         for statement, value in zip(uncertain, values, strict=True):
             if value == 0.0:
@@ -101,4 +101,7 @@ def stated_errors(settings: SelfcalSettings) -> Cause | None:
             earth, up = earth + there.earth - here.earth, up + there.up - here.up
         return recording, replace(problem, world=replace(problem.world, earth=earth, up=up))
 
-    return Cause("stated", tuple(each.name for each in uncertain), 0.1, corrected, prior=1.0)
+    names = tuple(each.name for each in uncertain)
+    return Hypothesis(
+        "stated", "site_suspect", "what is stated of site and base", without, names, 0.1, prior=1.0
+    )

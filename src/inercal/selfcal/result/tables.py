@@ -17,7 +17,7 @@ from inercal.selfcal.result.comparison import short
 if TYPE_CHECKING:
     from inercal.selfcal.before.bounds import Bounds
     from inercal.selfcal.before.path_design import Designed
-    from inercal.selfcal.campaign import Campaign
+    from inercal.selfcal.monte_carlo import Campaign
 
 _WEAKEST = 6
 """Combinations that a page lists, unless more are left at their prior."""

@@ -1,4 +1,4 @@
-"""One simulated calibration on a table, for campaigns that ask whether the stated uncertainties are true."""
+"""The gyrowheel on a table of the validation: its study, and one simulated calibration against the truth."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def drawn_instrument(rng: np.random.Generator) -> dict[str, float]:
 
 
 def settings_of(coefficients: dict[str, float], noise: float | None, latitude: float) -> TurntableSettings:
-    """A study of the campaign; ``noise`` [deg/h]."""
+    """A study of the test; ``noise`` [deg/h]."""
     unit = parse_unit("deg/h")
     return TurntableSettings(
         site=Site(9.8, (), latitude, LATITUDE_U),
@@ -94,8 +94,8 @@ def _one(rng: np.random.Generator, noise: float, known: bool) -> dict[str, Array
     """A simulated calibration with that noise [deg/h], of which it is told if ``known``."""
     real = settings_of(drawn_instrument(rng), noise, rng.normal(LATITUDE, LATITUDE_U))
     record = simulate(real, rng)
-    told = settings_of({}, noise if known else None, LATITUDE)
-    estimate = calibrate(record, told).estimate
+    settings = settings_of({}, noise if known else None, LATITUDE)
+    estimate = calibrate(record, settings).estimate
     true = real.instrument.coefficients
     return {
         "error": estimate.values - np.array([true[name] for name in estimate.names]),

@@ -1,0 +1,1 @@
+"""Simulated calibrations, one a call, that the campaigns repeat: are the stated uncertainties true?"""

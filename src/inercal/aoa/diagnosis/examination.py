@@ -1,0 +1,244 @@
+"""What is wrong with a recording of a model or its study: all hypotheses asked in order, before and after filtering.
+
+Before any angle is believed (`implausible`) gross faults are looked for: wrong signs, units and positions, exchanged
+sensors, clocks. They are told from the errors that the fusion allows for by the size of the contradiction: the
+liveliest stretch is filtered with all nuisances, and again without each fault (`inercal.aoa.diagnosis.gross`). A fault
+that alone makes the recording fit is named; where several do, because the motion is too slow to tell, all of them are.
+Faults that no sensor contradicts cannot be seen: at rest the gyro's sign and unit, positions, and the sign of an
+accelerometer along the model.
+
+Afterwards (`diagnose`) noise is looked at on its own (`inercal.aoa.diagnosis.noise_check`), a motion that is too lively
+and a model that is too small, and where innovations or coefficients are beyond what noise and priors explain, constant
+errors that the model leaves out (`inercal.aoa.diagnosis.small`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inercal.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, of_rows, stretch
+from inercal.aoa.diagnosis.gross import OTHER_CHANNEL, gross_faults
+from inercal.aoa.diagnosis.noise_check import misstated
+from inercal.aoa.diagnosis.small import small_errors
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import STATES, AoaSettings
+from inercal.estimate.hypotheses import Fitted, tried
+from inercal.findings import Finding
+
+THETA = ("theta",)
+
+#: number of states -> what those with so many have beside the ones with fewer
+_BESIDE = {
+    11: "errors of the lever arms",
+    15: "flexure of the sting",
+    19: "heights of the sensors or a gyro scale",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Explanation:
+    """Faults taken out together, and how well what is left fits."""
+
+    faults: tuple[Fitted[Case], ...]
+    quality: FitQuality
+
+    @property
+    def misfit(self) -> float:
+        """Misfit that is left."""
+        return self.quality.misfit
+
+    @property
+    def upright(self) -> bool:
+        """True where the model does not lie on its back."""
+        return _upright(self.quality) > LIMITS.upside_down_cosine
+
+    @property
+    def unlikely(self) -> bool:
+        """True where any other is likelier."""
+        return self.faults[-1].hypothesis.name == OTHER_CHANNEL
+
+
+def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
+    """What does not fit together, with what to write instead; empty for a sound recording.
+
+    Codes are ``sign_suspect``, ``channel_swap``, ``unit_suspect`` and ``command_shift``; ``not_stated`` of a model on
+    its back, which may be as it is.
+
+    Raises
+    ------
+    RecordError
+        A clock that was set back.
+    """
+    part = stretch(recording)
+    now = fit_quality(part, settings)
+    if now.misfit <= LIMITS.sound_misfit:
+        return _on_its_back(recording, settings) if _upright(now) <= LIMITS.upside_down_cosine else []
+    return [fault.finding for fault in _explaining((part, settings), now)]
+
+
+def _explaining(
+    case: Case, now: FitQuality, given: Sequence[tuple[Fitted[Case], ...]] = ((),)
+) -> list[Fitted[Case]]:
+    """Faults that make a case fit, with all that do as well; first alone, then two together, beside ``given`` ones."""
+    explanations = [each for before in given for each in _explanations(case, before)]
+    most = (1.0 - LIMITS.explained_share) * now.misfit
+    fitting = [each for each in explanations if each.misfit <= min(LIMITS.sound_misfit, most)]
+    if any(not each.unlikely for each in fitting) or (fitting and _loud(case)):
+        fitting = [each for each in fitting if not each.unlikely]
+    if fitting:
+        least = min(each.misfit for each in fitting)
+        alike = [each for each in fitting if each.misfit <= least + LIMITS.gross_alike_misfit]
+        # a model in a tunnel lies on its back only by intention
+        alike = [each for each in alike if each.upright] or alike
+        alike.sort(key=lambda each: each.misfit)
+        *earlier, last = alike[0].faults
+        others = tuple(each.faults[-1] for each in alike[1:] if each.faults[:-1] == alike[0].faults[:-1])
+        return [*earlier, replace(last, alike=others)]
+    if any(given) or now.misfit < LIMITS.two_faults_misfit:
+        return []
+    explanations.sort(key=lambda each: each.misfit)
+    first = explanations[: LIMITS.first_faults]
+    better = [each.faults for each in first if each.misfit < most and not each.unlikely]
+    seconds = _without_gyro(case) or better
+    return _explaining(case, now, seconds) if seconds else []
+
+
+def _explanations(case: Case, before: tuple[Fitted[Case], ...] = ()) -> Iterator[_Explanation]:
+    """Each fault taken out of a case, beside others that were taken out ``before``."""
+    for each in before:
+        case = each.hypothesis.without(case, each.values)
+    for hypothesis in gross_faults(case):
+        if not before or hypothesis.name != OTHER_CHANNEL:
+            one = tried(hypothesis, case)
+            yield _Explanation((*before, one), fit_quality(*one.case))
+
+
+def _without_gyro(case: Case) -> list[tuple[Fitted[Case], ...]]:
+    """Faults without which the accelerometers fit each other: what is left then is the gyro's."""
+    part, settings = case
+    blind = replace(part, gyro=np.full_like(part.gyro, np.nan))
+    fitting = [each for each in _explanations((blind, settings)) if each.misfit <= LIMITS.sound_misfit]
+    return [each.faults for each in sorted(fitting, key=lambda each: each.misfit)[: LIMITS.first_faults]]
+
+
+def _loud(case: Case) -> bool:
+    """True where noise above what is stated explains all."""
+    return fit_quality(case[0], misstated(*case)[1]).misfit <= LIMITS.sound_misfit
+
+
+def _upright(quality: FitQuality) -> float:
+    """Cosine of theta in all but one in a hundred rows or less; the largest is the most upright."""
+    cosine = np.cos(quality.theta[np.isfinite(quality.theta)])
+    return float(np.quantile(cosine, 0.99)) if cosine.size else 1.0
+
+
+def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
+    """``not_stated``: a model that seems to fly on its back all the time, which no sensor contradicts."""
+    now = fit_quality(of_rows(recording, later(recording.t)), settings, 8)
+    if _upright(now) > LIMITS.upside_down_cosine:
+        return []
+    middle = math.degrees(float(np.nanmedian(np.remainder(now.theta, 2.0 * math.pi))))
+    text = (
+        f"theta is about {middle:.0f} deg, the model on its back: exchange or reverse the accelerometers across it, or "
+        'state roll = "180 deg" under [model] if it was mounted so'
+    )
+    return [Finding("not_stated", text)]
+
+
+def diagnose(
+    recording: Recording, settings: AoaSettings, gross: Sequence[Finding] | None = None
+) -> list[Finding]:
+    """Name what is wrong with a recording; nothing for a sound one, nor where it is implausible as a whole.
+
+    ``gross`` is what `implausible` said, where it was asked already.
+
+    Codes are ``excess_scatter``, ``low_scatter``, ``unmodelled``, ``site_suspect``, ``prior_suspect`` and, where no one
+    error explains what the sensors say, ``contradiction``.
+    """
+    part = stretch(recording)
+    noise, fair = misstated(part, settings)
+    now = fit_quality(part, fair)
+    if now.misfit > LIMITS.sound_misfit and (implausible(recording, settings) if gross is None else gross):
+        return []
+    if now.fits:
+        return [*noise, *_too_small(part, fair)]
+    return [*noise, *(_too_fast(part, fair, now) or _errors(part, fair, now))]
+
+
+def _too_fast(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
+    """``unmodelled``: a motion livelier than the study's snap allows, which some sensor shows."""
+    if now.white:
+        return []
+    for factor in (1e2, 1e4):
+        snap = factor * settings.estimator.density
+        then = fit_quality(part, _livelier(settings, snap))
+        if (then.fits or then.misfit <= LIMITS.sound_misfit) and then.misfit < (
+            1.0 - LIMITS.explained_share
+        ) * now.misfit:
+            return [_of_snap(settings, snap)]
+    return []
+
+
+def _livelier(settings: AoaSettings, snap: float) -> AoaSettings:
+    """A study with another snap."""
+    return replace(settings, estimator=replace(settings.estimator, snap=snap))
+
+
+def _of_snap(settings: AoaSettings, snap: float) -> Finding:
+    """``unmodelled``: a larger snap makes a recording fit."""
+    text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
+    return Finding("unmodelled", f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]', harm=THETA)
+
+
+def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
+    """``unmodelled``: the whole model fits, the study's smaller one does not."""
+    stated = settings.estimator.states
+    larger = [states for states in STATES if states > stated]
+    if not larger or fit_quality(part, settings, stated).fits:
+        return []
+    # of more states more snap is usual
+    usual = replace(settings.estimator, states=19).density
+    if fit_quality(part, _livelier(settings, usual), stated).fits:
+        return [_of_snap(settings, usual)]
+    enough = next((states for states in larger if fit_quality(part, settings, states).fits), 19)
+    at_least = "" if enough == 19 else f" ({enough} at least)"
+    text = (
+        f"the recording shows {_BESIDE[enough]}, which {stated} states leave out: their angle is wrong by more than it "
+        f"claims, write states = 19{at_least} under [estimator]"
+    )
+    return [Finding("unmodelled", text, harm=THETA)]
+
+
+def _errors(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
+    """Constant errors that explain what is left over; what does not make the recording fit is no advice."""
+    found, left = small_errors((part, settings))
+    then = fit_quality(*left)
+    if then.fits or then.misfit <= LIMITS.sound_misfit:
+        return [each.finding for each in found]
+    return [_contradiction(part, settings, now)]
+
+
+def _contradiction(part: Recording, settings: AoaSettings, now: FitQuality) -> Finding:
+    """What no one error explains: the accelerometer without which the rest fits, or no more than that."""
+    names = settings.layout.names
+    for k, name in enumerate(names):
+        others = [i for i in range(len(names)) if i != k and np.isfinite(part.acc[:, i]).any()]
+        if others and settings.layout.of(*others).spans:
+            acc = part.acc.copy()
+            acc[:, k] = np.nan
+            if fit_quality(replace(part, acc=acc), settings).fits:
+                text = f"{name} contradicts the others, which fit without it: check its channel, axis and position"
+                return Finding("contradiction", text, harm=THETA)
+    worst = (*names, "gyro")[int(np.argmax(now.by_sensor))]
+    motion = "" if part.spatial else ", or the model rolls or yaws, which only gyro_roll and gyro_yaw tell"
+    text = (
+        f"the sensors contradict each other, {worst} most, and no single error explains it: check the study's axes, "
+        f"positions and noise{motion}"
+    )
+    return Finding("contradiction", text, harm=THETA)

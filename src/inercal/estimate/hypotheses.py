@@ -1,0 +1,328 @@
+"""Hypotheses about a measurement: what may have happened to it, and one search for what did.
+
+A case is a recording with its study. A hypothesis says what may have happened, and gives the case as it would be
+without that. A judge turns a case into residuals z: normalised, white, of variance 1 where the case holds.
+
+An error with parameters theta changes the residuals linearly where it is small: ``z = z_0 + Z theta``, where column i
+of Z is the change of z when a small theta_i is taken out of the case. Least squares gives theta, and the sum of squares
+that it takes away is chi-square where there is no error: the score test (Breusch and Pagan, Review of Economic Studies
+47 (1980) 239; of filters Friedland, IEEE Trans. Automatic Control 14 (1969) 359, Willsky and Jones, ibid. 21 (1976)
+108). What a study states with an uncertainty has that for a prior. A hypothesis without parameters, such as a reversed
+sign, is tried as it is: the likelihood ratio of two models exceeds 1/r by chance with probability r at most (Markov's
+inequality), and twice its logarithm is the fall of the sum of squares.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.findings import Finding
+
+Case = TypeVar("Case")
+Judged = TypeVar("Judged", contravariant=True)
+
+CLEAR = 4.0
+"""Standard uncertainties by which one parameter of an error must still differ from 0 beside errors found later."""
+
+CLOSE = 0.1
+"""Change of a parameter over its standard uncertainty at which a fit ends."""
+
+ROUNDS = 10
+"""Linearisations of a fit at most."""
+
+FLAT = 1e-12
+"""Strength of a combination of parameters, over that of each alone, below which it has no effect."""
+
+SHOWN = 3
+"""Hypotheses named at most as equally possible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis(Generic[Case]):
+    """What may have happened to a case.
+
+    Attributes
+    ----------
+    name : str
+        Of the hypothesis; each is looked for once.
+    code : str
+        Of its finding.
+    says : str or callable
+        The finding's sentence, or that of what was fitted; the part up to a colon says what, the rest what to do.
+    without : callable
+        The case as it would be without an error of some ``parameters`` (m,), each near 0.
+    parameters : tuple of str
+        Names of the parameters; a hypothesis may have none.
+    step : float [SI]
+        Change of a parameter for the derivative.
+    bounds : (float, float) [SI]
+        Values of the parameters that are believed.
+    prior : float [SI]
+        Standard deviation of each parameter about 0; infinite where nothing is known of it.
+    alternatives : float
+        Number of hypotheses of which it was picked.
+    times : int
+        How often it happened, each time picked of so many.
+    left_out : int
+        Scalars that the case without it leaves out, each of which counts 1.
+    where, harm
+        Of the finding.
+    """
+
+    name: str
+    code: str
+    says: str | Callable[[Fitted[Case]], str]
+    without: Callable[[Case, Array], Case]
+    parameters: tuple[str, ...] = ()
+    step: float = 1.0
+    bounds: tuple[float, float] = (-math.inf, math.inf)
+    prior: float = math.inf
+    alternatives: float = 1.0
+    times: int = 1
+    left_out: int = 0
+    where: str = ""
+    harm: tuple[str, ...] = ()
+
+    def chance(self, risk: float) -> float:
+        """Fall of the sum of squares that chance exceeds with the probability ``risk`` at most."""
+        from scipy.special import chdtri
+
+        if self.parameters:
+            return float(chdtri(len(self.parameters), risk / self.alternatives))
+        return self.left_out + 2.0 * self.times * math.log(self.alternatives / risk)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted(Generic[Case]):
+    """A hypothesis with the ``values`` (m,) of its parameters and their standard uncertainties ``u`` (m,), in SI.
+
+    ``case`` is what is left without it and without what was found beside it; ``alike`` are others equally possible.
+    """
+
+    hypothesis: Hypothesis[Case]
+    values: Array
+    u: Array
+    case: Case
+    alike: tuple[Fitted[Case], ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What happened, by how much, and what to do about it."""
+        says = self.hypothesis.says
+        return says if isinstance(says, str) else says(self)
+
+    @property
+    def finding(self) -> Finding:
+        """The sentence, with what is equally possible."""
+        others = dict.fromkeys(each.sentence.split(":")[0] for each in self.alike)
+        also = f"; as well possible: {'; '.join([*others][:SHOWN])}" if others else ""
+        of = self.hypothesis
+        return Finding(of.code, self.sentence + also, of.where, of.harm)
+
+
+class Judge(Protocol[Judged]):
+    """How well a case fits."""
+
+    def residuals(self, case: Judged) -> Array:
+        """Normalised residuals of any shape, always the same; NaN where one does not count."""
+
+    def misfit(self, case: Judged) -> float:
+        """Sum of squares, or what stands for it; infinite where nothing can be made of a case."""
+
+
+def tried(hypothesis: Hypothesis[Case], case: Case) -> Fitted[Case]:
+    """A hypothesis at zero, which one without parameters takes out as a whole."""
+    m = len(hypothesis.parameters)
+    none = np.zeros(m)
+    return Fitted(hypothesis, none, np.ones(m), hypothesis.without(case, none))
+
+
+def likeliest(
+    case: Case, hypotheses: Iterable[Hypothesis[Case]], judge: Judge[Case], risk: float
+) -> Fitted[Case] | None:
+    """The hypothesis without parameters that explains most, if it explains more than chance does."""
+    best, least = None, judge.misfit(case)
+    for each in hypotheses:
+        one = tried(each, case)
+        if (misfit := judge.misfit(one.case) + each.chance(risk)) < least:
+            best, least = one, misfit
+    return best
+
+
+Fits = list[Fitted[Case]]
+
+
+def search(
+    case: Case,
+    table: Callable[[Case], Iterable[Hypothesis[Case]]],
+    judge: Judge[Case],
+    risk: float,
+    most: int,
+    stated: Hypothesis[Case] | None = None,
+    choose: Callable[[Case, Iterator[Fits[Case]]], Fits[Case] | None] = lambda _, fits: next(fits, None),
+) -> tuple[Fits[Case], Case]:
+    """Find what happened to a case, one hypothesis after the other, all that were found fitted together.
+
+    Parameters
+    ----------
+    case
+        A recording with its study.
+    table : callable
+        Hypotheses about a case.
+    judge : Judge
+    risk : float
+        Probability at each step that any hypothesis is found in a sound case.
+    most : int
+        Steps at most.
+    stated : Hypothesis, optional
+        Errors of what is stated, with their prior: fitted along with all, never found.
+    choose : callable
+        Which fit is taken, the new hypothesis last in each, the likeliest fit first; None to end. The likeliest if
+        absent.
+
+    Returns
+    -------
+    found : list of `Fitted`
+    case
+        Without what was found, and with what is stated where it is likeliest.
+    """
+    found = [] if stated is None else refitted(case, [tried(stated, case)], judge)
+    now = found[-1].case if found else case
+    for _ in range(most):
+        ranked = _ranked(now, table, judge, risk, found)
+        fits = (refitted(case, [*found, tried(each, now)], judge) for each in ranked)
+        chosen = choose(now, (each for each in fits if _believed(each[-1])))
+        if chosen is None:
+            break
+        *earlier, last = chosen
+        # earlier ones that were taken for a part of this one
+        found = [*(each for each in earlier if each.hypothesis is stated or _clear(each)), last]
+        if len(found) <= len(earlier):
+            found = refitted(case, found, judge)
+        now = found[-1].case
+    return [each for each in found if each.hypothesis is not stated], now
+
+
+def _ranked(
+    case: Case,
+    table: Callable[[Case], Iterable[Hypothesis[Case]]],
+    judge: Judge[Case],
+    risk: float,
+    found: Sequence[Fitted[Case]],
+) -> list[Hypothesis[Case]]:
+    """Hypotheses that explain more than chance, beside what was found already; the likeliest first."""
+    names = {each.hypothesis.name for each in found}
+    asked = [each for each in table(case) if each.name not in names]
+    if not asked:
+        return []
+    z, share = judge.residuals(case), risk / len(asked)
+    held = [slopes(case, each.hypothesis, z, judge) for each in found]
+    before = _least_squares_of(held, z, found).gained if held else 0.0
+
+    def surplus(each: Hypothesis[Case]) -> float:
+        one = tried(each, case)
+        if not each.parameters:
+            return judge.misfit(case) - judge.misfit(one.case) - each.chance(share)
+        after = _least_squares_of([*held, slopes(case, each, z, judge)], z, [*found, one])
+        return (after.gained - before) / after.left - each.chance(share)
+
+    gains = [surplus(each) for each in asked]
+    order = sorted(range(len(asked)), key=lambda k: -gains[k])
+    return [asked[k] for k in order if gains[k] > 0.0]
+
+
+def _believed(fit: Fitted[Case]) -> bool:
+    """True where all values are within their bounds."""
+    least, most = fit.hypothesis.bounds
+    return bool(np.all((least <= fit.values) & (fit.values <= most)))
+
+
+def _clear(fit: Fitted[Case]) -> bool:
+    """True where a parameter differs from 0; a hypothesis without parameters was tried as a whole."""
+    return not len(fit.values) or bool(np.abs(fit.values / fit.u).max() > CLEAR)
+
+
+def refitted(case: Case, found: Sequence[Fitted[Case]], judge: Judge[Case]) -> Fits[Case]:
+    """All hypotheses together by least squares, linearised again where they are large."""
+    fits = list(found)
+    now = _without(case, fits)
+    ends = np.cumsum([len(each.values) for each in fits])[:-1]
+    for _ in range(ROUNDS):
+        z = judge.residuals(now)
+        fit = _least_squares_of([slopes(now, each.hypothesis, z, judge) for each in fits], z, fits)
+        parts = zip(fits, np.split(fit.change, ends), np.split(fit.u, ends), strict=True)
+        fits = [Fitted(each.hypothesis, each.values + change, u, case) for each, change, u in parts]
+        now = _without(case, fits)
+        # far beyond its bounds an error has no likely value
+        far = any(np.any(np.abs(each.values) > 2.0 * each.hypothesis.bounds[1]) for each in fits)
+        if far or np.all(np.abs(fit.change) < CLOSE * fit.u):
+            break
+    return [Fitted(each.hypothesis, each.values, each.u, now) for each in fits]
+
+
+def _without(case: Case, found: Sequence[Fitted[Case]]) -> Case:
+    """A case without what was found."""
+    for each in found:
+        case = each.hypothesis.without(case, each.values)
+    return case
+
+
+def slopes(case: Case, hypothesis: Hypothesis[Case], z: Array, judge: Judge[Case]) -> Array:
+    """Derivative (..., m) of the residuals ``z`` (...) of a case by the parameters of a hypothesis."""
+    m, step = len(hypothesis.parameters), hypothesis.step
+    columns = [(judge.residuals(hypothesis.without(case, values)) - z) / step for values in step * np.eye(m)]
+    return np.stack(columns, axis=-1) if columns else np.empty((*z.shape, 0))
+
+
+class LeastSquares(NamedTuple):
+    """Least squares: ``change`` (m,) of the parameters, its ``u`` (m,), mean square ``left`` and sum of squares
+    ``gained``."""
+
+    change: Array
+    u: Array
+    left: float
+    gained: float
+
+
+def _least_squares_of(parts: Sequence[Array], z: Array, found: Sequence[Fitted[Case]]) -> LeastSquares:
+    """Least squares of what was found, with its priors."""
+    values = np.concatenate([each.values for each in found])
+    prior = np.concatenate([np.full(len(each.values), each.hypothesis.prior) for each in found])
+    return least_squares(np.concatenate(parts, axis=-1), z, values, prior)
+
+
+def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquares:
+    """Change from ``values`` (m,) that makes ``z + Z change`` and their misfit to their ``prior`` (m,) smallest.
+
+    ``z`` (...) and ``Z`` (..., m) may hold NaN; combinations without effect stay as they are.
+    """
+    used = np.isfinite(z) & np.isfinite(Z).all(axis=-1)
+    scatter = math.sqrt(max(1.0, float(np.mean(np.square(z[used]))))) if used.any() else 1.0
+    weight = scatter / prior
+    columns, goal = np.vstack([Z[used], np.diag(weight)]), np.append(z[used], weight * values)
+    size = np.sqrt(np.square(columns).sum(axis=0))
+    without = size == 0.0
+    size[without] = 1.0
+    columns = columns / size
+    strength, ways = np.linalg.eigh(columns.T @ columns)
+    ways[without] = 0.0  # eigenvectors have them in other combinations by rounding
+    inverse = np.where(strength > FLAT, 1.0 / np.maximum(strength, FLAT), 0.0)
+    along = ways.T @ (columns.T @ goal)
+    gained = float(along @ (inverse * along))
+    # residuals larger than stated, for whatever reason, must not make errors of the model
+    left = max(1.0, (float(goal @ goal) - gained) / max(int(used.sum()), 1))
+    u = np.sqrt(left * (np.square(ways) @ inverse)) / size
+    return LeastSquares(-(ways @ (inverse * along)) / size, u + np.finfo(float).tiny, left, gained)
+
+
+def sigmas(risk: float, alternatives: int = 1) -> float:
+    """Standard deviations that normal variables keep to, all of so many, but for the probability ``risk``."""
+    from scipy.special import ndtri
+
+    return -float(ndtri(0.5 * risk / alternatives))

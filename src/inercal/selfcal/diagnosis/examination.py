@@ -1,0 +1,144 @@
+"""What is wrong with a recording that contradicts the model: all hypotheses asked in order, each named with its place.
+
+Units, signs and order were seen roughly when the recording was read (`inercal.selfcal.diagnosis.gross`). Then come
+gross faults of the accelerometers and of rows (`inercal.selfcal.diagnosis.rows`), each judged by what the error-state
+filter makes of the recording without it; single rows far off come last of these. Of what then is left, constant errors
+that the model leaves out (`inercal.selfcal.diagnosis.small`), and last the size and the whiteness of the innovations
+(`inercal.selfcal.diagnosis.noise_check`). Every limit keeps a risk of a false finding of about 1e-3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.hypotheses import Hypothesis, likeliest, sigmas
+from inercal.estimate.result import rounded
+from inercal.findings import EVERYTHING, Finding
+from inercal.selfcal.before.observability import UNOBSERVABLE
+from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, sound, sum_of_squares, white
+from inercal.selfcal.diagnosis.gross import reordered_accelerometers
+from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
+from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
+from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
+from inercal.selfcal.display import shown_unit
+from inercal.selfcal.filters.filter_result import Filtered, Problem
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.coefficients import names, units
+from inercal.selfcal.platform.recording import Recording
+
+_BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
+"""Findings of the reading of a recording beyond which nothing else can be told of it."""
+
+
+def diagnose(recording: Recording, problem: Problem, found: Filtered, stated: Stated = None) -> list[Finding]:
+    """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
+
+    Parameters
+    ----------
+    recording : Recording
+    problem : Problem
+    found : Filtered
+        What the estimator of the study made of it; the error-state filter judges the recording itself.
+    stated : Hypothesis, optional
+        What the study states with an uncertainty: no error within that is named.
+    """
+    if any(finding.code in _BEYOND for finding in recording.findings) or not found.dims.any():
+        return []
+    repaired, fair, findings = _without_faults(recording, problem, stated)
+    if not findings or not sound(filtered((repaired, fair))):
+        findings += _remaining((repaired, problem), fair, stated)
+    if findings or sound(found):
+        return findings
+    # where what is stated is wrong within its uncertainty all estimators have large innovations
+    if not found.converged or sound(filtered((recording, problem))):
+        text = (
+            f"the error-state filter finds no contradiction in this recording: the {found.kind} fails on it"
+        )
+        findings.append(Finding("filter_fails", text, harm=EVERYTHING))
+    return findings
+
+
+def _fair(problem: Problem, moved: Problem, found: Filtered) -> Problem:
+    """The problem as it may be meant: what is stated ``moved`` to where the recording fits best, and no prior that is
+    in the way of what the filter then ``found``."""
+    if not found.converged:
+        return problem
+    u, prior = np.sqrt(np.diag(found.covariance)), problem.prior
+    # values are distributed about 0 with this variance where the prior holds
+    spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
+    far = (u < UNOBSERVABLE * prior) & ~(
+        np.abs(found.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread
+    )
+    return replace(moved, prior=np.where(far, 10.0 * np.maximum(np.abs(found.coefficients), prior), prior))
+
+
+def _remaining(case: Case, meant: Problem, stated: Stated) -> list[Finding]:
+    """What the model leaves out, a prior that is too narrow, and noise that is not what is stated; ``meant`` as of
+    `_fair`."""
+    recording, problem = case
+    fair = (recording, meant)
+    errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), stated)
+    now = filtered(corrected)
+    # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
+    if errors and not white(corrected, now) and (walk := restless_gyros(fair)) is not None:
+        return [walk]
+    rest = misstated(corrected, now)
+    if errors and any(finding.code == "contradiction" for finding in rest):
+        return misstated(fair, filtered(fair))  # errors that leave a contradiction are none
+    return [*(each.finding for each in errors), *_beyond_prior(now, problem.prior), *rest]
+
+
+def _beyond_prior(found: Filtered, prior: Array) -> list[Finding]:
+    """Coefficients further from 0 than their prior [SI] allows, found with a wider one."""
+    if not found.converged:
+        return []
+    values, variance, p = found.coefficients, np.diag(found.covariance), len(prior)
+    findings = []
+    far = ~(np.abs(values) <= sigmas(LIMITS.risk, p) * np.sqrt(prior**2 + variance))
+    for i in np.flatnonzero(far):
+        name, (unit, size) = names(p)[i], shown_unit(units(p)[i])
+        value, u = rounded(values[i] / size, math.sqrt(variance[i]) / size)
+        text = f"{name}: the recording says {value} +- {u} {unit}, its prior is {prior[i] / size:.3g}"
+        findings.append(Finding("prior_suspect", f"{text} {unit}: state a wider one", harm=(name,)))
+    return findings
+
+
+def _gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
+    """Faults of the accelerometers' axes and of rows."""
+    yield from reordered_accelerometers(case)
+    yield from faults_of_rows(case)
+
+
+def _without_faults(
+    recording: Recording, problem: Problem, stated: Stated
+) -> tuple[Recording, Problem, list[Finding]]:
+    """The recording without its gross faults, the problem as it may then be meant (`_fair`), and these faults."""
+    findings = list[Finding]()
+    of = likely(recording, problem, stated)
+    now = filtered((recording, of))
+    while len(findings) < LIMITS.gross_faults and not sound(now):
+        case, before = (recording, of), sum_of_squares(now)
+        best = likeliest(case, _gross_faults(case), JUDGE, LIMITS.risk)
+        then = now if best is None else filtered(best.case)
+        if not sound(then) and not sum_of_squares(then) < LIMITS.plain_misfit_ratio * before:
+            fair = _fair(problem, of, now)
+            if sound(filtered((recording, fair))):
+                break
+            single = likeliest(case, single_readings(case, now), JUDGE, LIMITS.risk)
+            if single is not None and sound(after := filtered(single.case)):
+                best, then = single, after
+            elif sound(filtered(small_errors((recording, replace(problem, prior=fair.prior)), stated)[1])):
+                break
+        # what explains less than half is not what happened
+        if best is None or not sum_of_squares(then) < LIMITS.explained_ratio * before:
+            break
+        recording = best.case[0]
+        of = likely(recording, problem, stated)
+        now = filtered((recording, of))
+        findings.append(best.finding)
+    return recording, _fair(problem, of, now), findings

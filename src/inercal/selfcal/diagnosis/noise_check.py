@@ -1,0 +1,118 @@
+"""The noise that sensors show in the innovations of the error-state filter, beside what the study states of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.consistency import whiteness
+from inercal.estimate.hypotheses import sigmas
+from inercal.findings import EVERYTHING, Finding
+from inercal.records.places import places
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, white
+from inercal.selfcal.filters.filter_result import Filtered
+from inercal.selfcal.limits import LIMITS
+
+_SENSORS = ("accelerometers", "encoders")
+
+
+def misstated(case: Case, now: Filtered) -> list[Finding]:
+    """Innovations larger or smaller than the stated noise has them, or correlated in time."""
+    if not now.converged:
+        return [Finding("contradiction", f"the error-state filter fails on this recording: {now.message}")]
+    z = regular(case[0], now)
+    findings, wide = [], False
+    for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
+        known = columns[np.isfinite(columns)]
+        if len(known) < LIMITS.scatter_scalars:
+            continue
+        mean, error = float(np.mean(np.square(known))), math.sqrt(2.0 / len(known))
+        factor = math.sqrt(mean)
+        if mean > 1.0 + LIMITS.nis_sigmas * error:
+            wide = True
+            if _even(columns, mean) and whiteness(columns) > LIMITS.risk:
+                text = f"{sensor}: noise is {factor:.3g} times what is stated, evenly over the recording"
+                findings.append(Finding("excess_scatter", text, harm=EVERYTHING))
+        elif mean < 1.0 - LIMITS.nis_sigmas * error and factor * LIMITS.low_noise_ratio < 1.0:
+            text = f"{sensor}: noise is only {factor:.2g} of what is stated; the uncertainties are too large"
+            findings.append(Finding("low_scatter", text))
+    if findings:
+        return findings
+    if not wide and whiteness(z) > LIMITS.risk:
+        return []
+    return [restless_gyros(case) or _unexplained(z)]
+
+
+def _even(columns: Array, mean: float) -> bool:
+    """True where the mean square is the same over all parts of the recording."""
+    limit = sigmas(LIMITS.risk, LIMITS.even_parts)
+    for part in np.array_split(columns, LIMITS.even_parts):
+        known = part[np.isfinite(part)]
+        if len(known) and abs(np.mean(np.square(known)) / mean - 1.0) > limit * math.sqrt(2.0 / len(known)):
+            return False
+    return True
+
+
+def restless_gyros(case: Case) -> Finding | None:
+    """Gyro noise other than stated, where that explains the innovations."""
+    for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
+        fitting = list[float]()
+        for factor in 2.0**octaves:
+            if _explained_by_walk(case, factor):
+                fitting.append(float(factor))
+            elif fitting:
+                break
+        if fitting:
+            about = _two_digits(math.sqrt(fitting[0] * fitting[-1]))
+            text = f"the gyros' angle random walk looks about {about} times what is stated"
+            low, high = sorted((fitting[0], fitting[-1]))
+            more = f" ({_two_digits(low)} to {_two_digits(high)})" if len(fitting) > 1 else ""
+            if octaves[0] > 0.0:
+                return Finding("excess_scatter", text + more, harm=EVERYTHING)
+            return Finding("low_scatter", text + more)
+    return None
+
+
+def _two_digits(factor: float) -> str:
+    """A number to two digits, without an exponent."""
+    return f"{float(f'{factor:.2g}'):g}"
+
+
+def _explained_by_walk(case: Case, factor: float) -> bool:
+    """True where a walk of the gyros, larger by a factor, leaves innovations white."""
+    recording, problem = case
+    noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
+    tried = (recording, replace(problem, noise=noise))
+    now = filtered(tried)
+    # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
+    return white(tried, now) and float(np.nanmean(np.square(now.innovations[:, 3:]))) > 0.5
+
+
+def _unexplained(z: Array) -> Finding:
+    """Innovations that no known fault explains, with the part of the recording where they are largest."""
+    parts = np.array_split(np.arange(len(z)), 20)
+    squares = np.square(z)
+    size = [float(np.nanmean(squares[part])) if np.isfinite(squares[part]).any() else 0.0 for part in parts]
+    worst = parts[int(np.argmax(size))]
+    text = (
+        f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1{_correlated(z)})"
+    )
+    return Finding(
+        "contradiction", f"{text}, and no fault that is looked for explains them", places("row", worst + 2)
+    )
+
+
+def _correlated(z: Array) -> str:
+    """Correlation from one row to the next of the sensors that have it, in words."""
+    words = ""
+    for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
+        products = columns[1:] * columns[:-1]
+        count = int(np.isfinite(products).sum())
+        if count and abs(
+            share := float(np.nanmean(products) / np.nanmean(np.square(columns)))
+        ) > LIMITS.nis_sigmas / math.sqrt(count):
+            words += f"; {sensor}: correlated from row to row, by {share:.2g}"
+    return words or ", or correlated in time"
