@@ -22,7 +22,7 @@ Samples = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class Correction:
-    """How the samples of a record are corrected, or made into outputs of the instrument.
+    """Correction of the samples of a record, or its inverse, from corrected samples to outputs of the instrument.
 
     ``work`` takes samples by sensor, times ``factors``, to results in ``units``; ``settings`` hold all that decides
     them.

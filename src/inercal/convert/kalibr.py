@@ -104,7 +104,7 @@ def _term_units(units: Units) -> Units:
 
 
 def _notes(terms: Terms) -> tuple[Finding, ...]:
-    """What the frame is, and where the biases are."""
+    """Notes about the frame and the biases."""
     turn = np.arccos(np.clip((np.trace(terms["C_i_b"]) - 1.0) / 2.0, -1.0, 1.0))
     return (
         Finding(

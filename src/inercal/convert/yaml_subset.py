@@ -53,7 +53,7 @@ def _block(lines: list[Line], where: object, depth: int) -> tuple[Any, list[Line
 
 
 def _item(line: Line) -> Line | None:
-    """What follows the dash of a list's item, indented as deep as it stands; None for anything else."""
+    """The text after the dash of an item of a list, indented as deep as it stands; None for anything else."""
     number, indent, content = line
     if content != "-" and not content.startswith("- "):
         return None

@@ -21,7 +21,7 @@ from inercal.records.record import Record
 
 @dataclass(frozen=True)
 class Recording:
-    """The triads of a record, and what its initial static period says about their noise.
+    """The triads of a record, and their noise in its initial static period.
 
     ``restlessness`` holds, for each triad, the windowed variance over that of the initial static period, on
     the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it,
@@ -113,7 +113,7 @@ def _complete(triad: Triad) -> NDArray[np.bool_]:
 
 
 def _kept(triad: Triad, rows: NDArray[np.bool_]) -> Triad:
-    """Those rows of a triad; the triad itself if these are all."""
+    """A triad with these rows alone; the triad itself if these are all."""
     return triad if rows.all() else replace(triad, t=triad.t[rows], values=triad.values[rows])
 
 
@@ -214,7 +214,7 @@ def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
 
 
 def unit_words(triad: Triad, model: TriadModel) -> str:
-    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
+    """A wrong unit of physical outputs, in words, by scale factors far from nominal; empty if they are near."""
     if triad.unit.dimension in ("count", "voltage"):
         return ""
     nominal = 1.0 / triad.unit.factor

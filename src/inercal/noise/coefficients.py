@@ -180,7 +180,7 @@ def _tried(whole: Curve, columns: list[int], cut: bool) -> list[tuple[Curve, Arr
 
 
 def _improbable(chi2: float, dof: int) -> bool:
-    """Whether the residuals are larger than chance lets them be."""
+    """True if the residuals are larger than chance lets them be."""
     from scipy.special import chdtrc
 
     return dof > 0 and bool(chdtrc(dof, chi2) < MISFIT)
@@ -196,7 +196,7 @@ def _nothing(deviation: AllanDeviation, terms: tuple[str, ...], why: Finding) ->
 
 
 def _in_seconds(interval: float) -> Array:
-    """What N, B, K, R and Q per sample are in seconds."""
+    """N, B, K, R and Q in seconds, from those per sample."""
     return np.array([np.sqrt(interval), 1.0, 1.0 / np.sqrt(interval), 1.0 / interval, interval])
 
 
@@ -220,7 +220,7 @@ def _uncertain(
 
 
 def _findings(span: tuple[float, float], cut: bool, inflation: float) -> list[Finding]:
-    """What is to be said of a fit."""
+    """Findings about a fit."""
     findings = []
     if cut:
         findings.append(

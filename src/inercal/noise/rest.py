@@ -29,7 +29,7 @@ _MEDIAN_OF_A_SQUARE = 0.455  # of a standard normal variable
 
 @dataclass(frozen=True)
 class Unrest:
-    """What disturbs a channel.
+    """Disturbances of a channel.
 
     ``pieces`` of ``of`` pieces, each ``tau`` [s] long, are restless, the ``first`` and the last one from and to these
     times [s] from the start; ``factor`` is the deviation of adjacent means over ``tau`` with them, over that without.

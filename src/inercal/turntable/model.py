@@ -1,4 +1,4 @@
-"""What the instrument on the table should indicate, and how the table's errors change that."""
+"""Model of an instrument on a table: its outputs, and their change by the errors of the table."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ class TableModel:
     channels : tuple of ChannelModel
         Their terms are those to be estimated.
     stated : tuple of Stated
-        Of each channel what is known and not estimated; empty where there is nothing.
+        Terms of each channel that are stated and not estimated.
     references : tuple of Reference
-        What a and w are uncertain by.
+        Uncertain inputs of a and w.
     """
 
     chain: Chain
@@ -88,7 +88,7 @@ class TableModel:
 
     @property
     def blocks(self) -> tuple[slice, ...]:
-        """Where the terms of each channel stand among `symbols`."""
+        """Places of the terms of each channel among `symbols`."""
         ends = np.cumsum([len(channel.symbols) for channel in self.channels]).tolist()
         return tuple(slice(a, b) for a, b in zip([0, *ends], ends, strict=False))
 
@@ -106,7 +106,7 @@ class TableModel:
         return made
 
     def outputs(self, angles: Array, c: Array, errors: Array | None = None) -> Array:
-        """Outputs (*batch, channels) for linear coefficients ``c`` (p,), what is stated included."""
+        """Outputs (*batch, channels) for linear coefficients ``c`` (p,), stated terms included."""
         a, w = self.inputs(angles, errors)
         made = [
             channel.regressors(a, w) @ c[block]
@@ -200,7 +200,7 @@ def table_model(
 
 
 def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel) -> Stated:
-    """What the study states of the terms in ``rest``, of a channel whose whole ``model`` it is a part of."""
+    """Stated values of the terms in ``rest``, a part of the whole ``model`` of a channel."""
     values = stated_values(settings, model)
     linear, typed = model.linear(values), settings.instrument.coefficients_u
     # a relative term enters times the stated scale factor: what is fitted of that changes it to second order
@@ -217,7 +217,7 @@ def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel
 
 
 def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
-    """What gravity and earth rate are uncertain by."""
+    """Uncertain inputs of gravity and earth rate."""
     site, still = settings.site, np.zeros(3)
     assert site.latitude is not None
     # in units of the site's gravity, gravity is one whatever its value

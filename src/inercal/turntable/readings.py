@@ -31,7 +31,7 @@ class Readings:
     samples : (n,) rows behind each reading
     u_mean : (c,) standard deviation of a reading that the scatter within the dwells explains if it is white,
         in the unit of y; NaN where a reading is a single row
-    findings : what is to be said of the record
+    findings : about the record
     """
 
     angles: Array
@@ -149,8 +149,10 @@ def _by_angle(angles: Array) -> tuple[list[NDArray[np.int64]], list[NDArray[np.i
 
 
 def _at_rest(angles: Array) -> bool:
-    """Whether most of three rows or more stand still: those of a turn take all the room that a position has, which puts
-    their median a quarter of it from the middle one."""
+    """True if most of three rows or more stand still.
+
+    Rows of a turn fill the whole angle of a position, so that their median lies a quarter of it from the middle one.
+    """
     away = np.abs(_apart(angles, angles[len(angles) // 2]))
     return len(angles) > 2 and bool(np.median(away, axis=0).max() < 0.15 * LIMITS.position_angle)
 

@@ -46,10 +46,10 @@ class Regression:
     angles : (n, joints) rad
     c : (p,) linear coefficients [output per monomial]
     covariance : (p, p) of them
-    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less what is stated
+    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less the stated terms
     residuals : (n, c) readings minus model at the nominal attitudes
     chi2, dof : weighted sum of squares, prior of the constant errors included, and its degrees of freedom
-    noise : (c,) standard deviation of a reading that is not the table's doing
+    noise : (c,) standard deviation of a reading beside the table's part
     noise_dof : (c,) its degrees of freedom; inf where it was stated
     slopes : (n, c, k) derivatives of the readings with respect to all errors of the table
     beside : (n, c, b) change of the readings by one standard uncertainty of each input beside the table
@@ -95,7 +95,7 @@ class Solution:
 
 @dataclass(frozen=True)
 class Identified:
-    """What the plan lets a channel say: rank and null vectors of its terms, ``words`` for each null vector."""
+    """Identifiability of the terms of a channel: rank and null vectors, ``words`` for each null vector."""
 
     identifiability: Identifiability
     words: tuple[str, ...]

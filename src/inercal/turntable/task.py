@@ -1,4 +1,4 @@
-"""What the commands run on a turntable study: a calibration of a record, a simulated record, a design."""
+"""The tasks of a turntable study: a calibration of a record, a simulated record, a design."""
 
 from __future__ import annotations
 

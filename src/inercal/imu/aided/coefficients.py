@@ -1,4 +1,4 @@
-"""From the unknowns of the fit to the coefficients of the instrument, with everything that makes them uncertain."""
+"""The coefficients of the instrument from the unknowns of the fit, with their sources of uncertainty."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]
 
 
 def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[TypeA]:
-    """What the noise in the data does to the coefficients: white noise and the wander of the biases, by triad.
+    """Uncertainties of the coefficients by noise in the data: white noise and wander of the biases, by triad.
 
     ``rows`` (p, n) derivatives of the coefficients ``names`` (p,) by the unknowns of the fit; ``own`` (p,) variance
     that a coefficient has beside them.
@@ -100,11 +100,12 @@ def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[Ty
 def type_b(
     fit: Fit, rows: Array, names: tuple[str, ...], values: Array, site: Site, clock_u: float
 ) -> list[TypeB]:
-    """What is known from elsewhere: gravity and the clock, earth rate, the errors of the table.
+    """Uncertainties of the coefficients by inputs: gravity, the clock, earth rate, the errors of the table.
 
-    Gravity sets the scale of specific force, the clock, known to the part ``clock_u``, that of rate. Earth rate and the
-    errors of the table are unknowns of the fit with a prior; what the data do not tell of them is left here. ``rows``
-    and ``names`` as in `type_a`, ``values`` (p,) of the coefficients in SI.
+    Gravity sets the scale of specific force, the clock, with the relative standard uncertainty ``clock_u``, that of
+    rate. Earth rate and the errors of the table are unknowns of the fit with a prior; the part of their uncertainty
+    that the data leave is listed here. ``rows`` and ``names`` as in `type_a`, ``values`` (p,) of the coefficients in
+    SI.
     """
 
     def scaled(factor: float, *prefixes: str) -> Array:

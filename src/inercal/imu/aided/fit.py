@@ -58,7 +58,7 @@ class Sensor:
 class Fit:
     """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, three of each triad.
 
-    ``references`` by triad; ``identified`` by triad what the test, on a perfect table, tells of its gains.
+    ``references`` by triad; ``identified`` by triad the identifiability of its gains on a perfect table.
     """
 
     unknowns: Unknowns
@@ -176,7 +176,7 @@ def _stacked(sensors: Sequence[Sensor], layout: Unknowns, from_mean: Array) -> t
 def _identified(
     sensors: Sequence[Sensor], layout: Unknowns, triad: str, names: Mapping[str, tuple[str, ...]]
 ) -> Identifiability:
-    """What the test tells of the gains of a triad, whatever the other unknowns are within their priors.
+    """Identifiability of the gains of a triad, the other unknowns free within their priors.
 
     Errors of the table do not count: a large one, such as that of the mounting, which turns the frame of all sensors,
     makes the uncertainties large, but no motion would help.

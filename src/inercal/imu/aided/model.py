@@ -1,4 +1,4 @@
-"""Everything that is not known of an IMU on a table, and the linear equations of each sensor in it.
+"""The unknowns of an IMU on a table, and the linear equations of each sensor in them.
 
     accelerometer i :  y = B_i (f + A r_i) + bias ,    gyro i :  y = B_i (omega + C h) + G_i f + bias
 
@@ -26,7 +26,7 @@ from inercal.imu.aided_settings import AidedSettings
 Indices = NDArray[np.int64]
 
 SHIFT_U = 1.0
-"""Prior standard deviation [s] of what the angles come late by, after a search in whole blocks."""
+"""Prior standard deviation [s] of the delay of the angles, after a search in whole blocks."""
 
 ARM_U = 0.5
 """Prior standard deviation [m] of the place of a sensor beside the crossing of the axes, along each axis."""

@@ -56,7 +56,7 @@ def _holds(acc: Triad, gyro: Triad) -> tuple[Dwell, ...]:
 
 
 def _calm(variance: Array) -> NDArray[np.bool_]:
-    """Where the variance is near that of the calm parts."""
+    """True (n,) where the variance is near that of the calm parts."""
     finite = variance[np.isfinite(variance)]
     return (
         variance <= LIMITS.hold_variance * float(np.quantile(finite, LIMITS.calm_quantile))
@@ -100,12 +100,12 @@ def _without_hand(acc: Triad, hold: Dwell) -> tuple[int, int]:
 
 
 def _cuts(acc: Triad) -> NDArray[np.int64]:
-    """Where the time axis breaks."""
+    """Samples at which the time axis breaks."""
     return breaks(acc.t, 0.5 * window_samples(acc.rate) / acc.rate)
 
 
 def _long_enough(holds: list[Dwell]) -> list[Dwell]:
-    """Those at least half as long as the longest."""
+    """The holds at least half as long as the longest."""
     longest = max((hold.samples for hold in holds), default=0)
     return [hold for hold in holds if 2 * hold.samples >= longest]
 

@@ -1,7 +1,8 @@
 """Scale factors of the gyro without the turns: by gravity, carried from rest to rest through all motion between.
 
-Where several motions may have been the turn, that says which. The verticals are those of the accelerometers, whose
-misalignments are known as well as the positions were upright: both triads' misalignments are unknowns with a prior.
+Where several motions may have been the turn, the transfer of gravity tells which. The verticals are those of the
+accelerometers, whose misalignments are as uncertain as the positions: the misalignments of both triads are unknowns
+with a prior.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def carry(acc: Triad, gyro: Triad, detected: Detected) -> Carried:
 
 
 def _at_rest(acc: Triad, gyro: Triad, detected: Detected) -> Matrices:
-    """What the positions say, in units of g."""
+    """Biases and g-sensitivity by the positions, in units of g."""
     spans = [detected.positions[name] for name in POSITIONS]
     force = np.array([np.nanmean(acc.values[start:stop], axis=0) for start, stop in spans])
     rate = np.array([np.nanmean(part(gyro, acc, *span)[1], axis=0) for span in spans])

@@ -1,4 +1,4 @@
-"""What the sections say: mean outputs, integrals of the turns, the noise at rest, and what is wrong with them."""
+"""Readings of the sections: mean outputs, integrals of the turns, noise at rest, and findings about the sections."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _noise(triad: Triad, parts: list[Array]) -> AllanFit:
 
 
 def _cells(t: Array) -> Array:
-    """What each sample stands for [s]: half the way to its neighbours, at the ends a whole interval as inside.
+    """Length of time of each sample [s]: half the way to its neighbours, at the ends a whole interval as inside.
 
     With even stamps all are equal, and the integral is the sum over the rate, as Ferraris and imucal take it.
     """
@@ -122,7 +122,7 @@ def _moving(at_rest: dict[str, list[Array]]) -> Iterator[Finding]:
 
 
 def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) -> Iterator[Finding]:
-    """What is wrong with a turn: ``rate`` (n, 3) its output less the bias, ``longest`` step of time [s] allowed."""
+    """Findings about a turn: ``rate`` (n, 3) its output less the bias, ``longest`` step of time [s] allowed."""
     where = f"t {t[0]:.2f} to {t[-1]:.2f} s"
     steps = np.diff(t)
     if not np.all((steps > 0.0) & (steps <= longest)):

@@ -1,4 +1,4 @@
-"""Eighteen equations for twelve unknowns in the positions of each sensor: what the six that are left over say.
+"""Scatter of the positions by the six equations that are left over of eighteen, for twelve unknowns of each sensor.
 
 The two positions of an axis have one mean, the bias, also in the outputs of the other axes. There the accelerometers
 show how far the positions were from upright: their scatter is the alignment. The gyro's show whether its bias stayed.
@@ -28,7 +28,7 @@ _ACROSS = ~np.eye(3, dtype=bool)
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """What the positions scatter by.
+    """Scatter of the positions.
 
     ``tilt`` [rad] the standard uncertainty of the direction of a position and ``tilt_dof`` its degrees of freedom, inf
     where it is stated; ``means`` the variances (6, 3) [output squared] of the mean outputs by sensor and ``dof`` theirs
@@ -122,7 +122,7 @@ def _left_over(outputs: Array, bias: Array) -> Array:
 
 
 def _beyond_chance(ratio: float, dof: float) -> bool:
-    """Whether a ratio of variances of `DOF` and so many degrees of freedom is too large for chance (F test)."""
+    """True if a ratio of variances of `DOF` and ``dof`` degrees of freedom is too large for chance (F test)."""
     from scipy.special import chdtrc, fdtrc
 
     p = chdtrc(DOF, DOF * ratio) if np.isinf(dof) else fdtrc(DOF, dof, ratio)

@@ -1,6 +1,6 @@
-"""Between the positions the instrument was turned over: whether its gyro then moved the vertical as it should.
+"""Gravity carried from position to position through the gyro: a check of the sense of the turns.
 
-That tells in which sense the turns were made, which they cannot tell themselves.
+The turns themselves cannot tell in which sense they were made.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One covariance for all coefficients: every error of the readings and of what is known, carried through the method.
+"""One covariance for all coefficients: every error of the readings and inputs, carried through the method.
 
 The derivatives of the closed form take each error to the coefficients. Alignment also acts in second order: a position
 tilted by d shows g cos d along its own axis, a turn about a tilted axis its angle times cos d. The method does not
@@ -40,7 +40,7 @@ def propagation(readings: Readings, solution: Matrices, scatter: Scatter) -> Pro
 
 
 def type_a(p: Propagation, acc_unit: str, gyro_unit: str) -> list[TypeA]:
-    """What the noise of the sensors and, where no alignment is stated, the scatter of the positions do."""
+    """Uncertainties by noise of the sensors and, where no alignment is stated, by scatter of the positions."""
     readings, scatter = p.readings, p.scatter
     rest = scatter.means["gyro"]
     noise = readings.noise["gyro"]
@@ -66,7 +66,7 @@ def _noise(source: str, by: Array, variance: Array, dof: float, unit: str) -> Ty
 
 
 def noise_covariance(p: Propagation) -> Array:
-    """(33, 33): what the noise of the sensors by its Allan fit alone would do."""
+    """(33, 33): covariance by the noise of the sensors alone, as their Allan fits have it."""
     readings, x = p.readings, p.readings.inputs
     rows = (
         ("force", "acc", readings.lengths),
@@ -106,7 +106,7 @@ def alignment(p: Propagation, tilt: float) -> Array:
 def type_b(
     p: Propagation, site: Site, time_base_u: float, options: FerrarisSettings, acc_unit: str, gyro_unit: str
 ) -> list[TypeB]:
-    """What gravity, the angle of the turns, alignment, the clock, earth rate and coarse outputs do."""
+    """Uncertainties by gravity, the angle of the turns, alignment, the clock, earth rate and coarse outputs."""
     by, scatter = p.by, p.scatter
     sources = [TypeB(i.source, i.u, i.unit, by["gravity"] * i.sensitivity) for i in site.inputs]
     if options.turn_u > 0.0:
@@ -132,7 +132,7 @@ def type_b(
 
 
 def doubtful_turns(p: Propagation, doubt: Array) -> list[TypeB]:
-    """What it does that a turn may have been by up to ``doubt`` (3,) [rad] more or less (GUM F.2.3.3)."""
+    """Uncertainty by turns that may have been up to ``doubt`` (3,) [rad] larger or smaller (GUM F.2.3.3)."""
     u = doubt / math.sqrt(3.0)
     size = float(np.max(u))
     return (
@@ -168,7 +168,7 @@ def _coarse(p: Propagation, acc_unit: str, gyro_unit: str) -> list[TypeB]:
 
 
 def _unequal_holds(p: Propagation) -> list[TypeB]:
-    """What is left of the g-sensitivity in the gyro's bias where the positions are not equally long.
+    """Uncertainty by the g-sensitivity that stays in the gyro's bias where the positions are not equally long.
 
     The bias is the mean of all samples, as in the method; the mean specific force over them is known, but nothing is
     taken off for it.

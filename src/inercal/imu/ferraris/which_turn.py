@@ -1,4 +1,4 @@
-"""Which of the motions about an axis was the turn, and what speaks against each of them."""
+"""Choice of the turn among the motions about each axis, with findings that speak against it."""
 
 from __future__ import annotations
 

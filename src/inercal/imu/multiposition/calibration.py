@@ -113,7 +113,7 @@ def _gyro_means(recording: Recording, poses: Poses) -> Array:
 
 
 def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | None, list[Finding]]:
-    """The turns between neighbouring poses that can be integrated, and what is said of the others."""
+    """The turns between neighbouring poses that can be integrated, and findings about the others."""
     gyro = recording.gyro
     assert gyro is not None
     longest = LIMITS.motion_gap / gyro.rate
@@ -149,7 +149,7 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
 def _calibrate_gyro(
     recording: Recording, poses: Poses, scatter: Scatter, settings: ImuSettings
 ) -> tuple[GyroFit | None, list[Finding]]:
-    """The gyro's fit, if it can be made, and what is to be said of it."""
+    """The gyro's fit, if it can be made, and findings about it."""
     if recording.gyro is None:
         text = "the record has no gyro: only the accelerometers are calibrated"
         return None, [Finding("gyro_missing", text)]

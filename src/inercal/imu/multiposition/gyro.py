@@ -66,7 +66,7 @@ def regress_static(means: Array, regressors: Array) -> StaticRegression:
 class GyroFit:
     """The triad ``model``, ``drift`` (3, q) [output/driver], and how they came about.
 
-    ``x`` (p,) are the parameters ``names``; ``geometry`` tells what turns and poses can tell of them, whatever
+    ``x`` (p,) are the parameters ``names``; ``geometry`` is their identifiability by turns and poses, whatever
     the noise. ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain``
     (p, 3 m + 3 n) takes errors of the carried verticals (turn by turn, [rad]) and of the pose means (pose by
     pose, [output]) to errors of the parameters, ``rate_gain`` (p, q) the unknown parts of earth rate, each in
@@ -122,9 +122,9 @@ def fit_gyro(
     start : TriadModel
         First guess (see `first_guess`).
     drivers : Drivers
-        What the bias may depend on, in the poses; the same as in ``turns``.
+        Drivers of the bias, in the poses; the same as in ``turns``.
     earth : EarthRate
-        What is known of earth rate at the site.
+        Earth rate at the site.
     """
     names = GYRO_TRIAD + drivers.names
     p = len(names)
@@ -249,7 +249,7 @@ def _geometry(
     typical: Array,
     names: tuple[str, ...],
 ) -> Identifiability:
-    """What the turns and poses can tell whatever the noise: misses in radians, rates at rest in radians a turn."""
+    """Identifiability by turns and poses, whatever the noise: misses in radians, rates at rest in radians a turn."""
     by_parameter = carried_with_derivatives(turns, verticals, model, drift)[1]
     per_turn = float(np.median(turns.durations)) / np.tile(model.scale, len(verticals))
     J = np.concatenate([by_parameter.reshape(-1, len(names)), design * per_turn[:, None]])

@@ -141,7 +141,7 @@ def _part_means(values: Array) -> Array:
 
 
 def branches(temperature: Array) -> Array:
-    """+1/2 where it gets warmer, -1/2 where it gets colder, 0 where it does hardly either (n,)."""
+    """+1/2 (n,) on rising temperature, -1/2 on falling, 0 where it hardly changes."""
     slope = np.gradient(_part_means(temperature))
     sign = np.where(np.abs(slope) > LIMITS.flat_temperature * np.max(np.abs(slope)), np.sign(slope), 0.0)
     return np.repeat(0.5 * sign, [len(part) for part in np.array_split(temperature, PARTS)])

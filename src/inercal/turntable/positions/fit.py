@@ -1,4 +1,4 @@
-"""From readings to a fit: which terms the positions allow, and what is stated of the rest."""
+"""From readings to a fit: the terms that the positions identify, with stated values of the others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from inercal.turntable.settings import TurntableSettings
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
-    """What a plan allows, and the fit if it allows one.
+    """The terms that a plan identifies, and the fit if it identifies all.
 
     ``identified`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
     identified, and where the weights of the readings do not settle.
@@ -62,7 +62,7 @@ def fit_readings(means: Readings, settings: TurntableSettings) -> Fitting:
 def choose_terms(
     settings: TurntableSettings, channels: Sequence[str], angles: Array
 ) -> tuple[TableModel, tuple[Identified, ...], str]:
-    """The terms to be fitted at these positions, and what these tell of them.
+    """The terms to be fitted at these positions, and their identifiability.
 
     The terms of the earth rate are among them as the study says; where it says nothing, if the positions identify
     them. Where they do not, the third is the combination that would be free, in words.

@@ -39,7 +39,7 @@ REFERENCES = (
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A plan and what it is worth.
+    """A plan and its figures of merit.
 
     ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``model`` with the terms that ``figures.u``
     is of; ``drift_shares`` of the table's errors, as in `inercal.turntable.positions.tolerance.drift_shares`.
@@ -58,7 +58,7 @@ class Judged:
 
     @property
     def earth_rate(self) -> str:
-        """Whether the terms of the earth rate are fitted, or stated because the plan does not identify them."""
+        """``fitted``, or ``stated`` where the plan does not identify the terms of the earth rate."""
         return earth_rate_of(self.model)
 
 
@@ -79,7 +79,7 @@ class Designed:
     message : str
         What was searched, in words.
     findings : tuple of Finding
-        What is to be known about it.
+        Findings about the plan.
     result : mapping
         The command's part of the JSON result.
     """
@@ -109,7 +109,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     Parameters
     ----------
     settings : TurntableSettings
-        The instrument with its expected coefficients and noise; what the table's errors do depends on them.
+        The instrument with its expected coefficients and noise; the effect of the table's errors depends on them.
     progress : callable
         Told, in words, what is being done.
 
@@ -260,7 +260,7 @@ def _samples(settings: TurntableSettings, angles: Array) -> NDArray[np.int64]:
 def _candidates(
     model: TableModel, angles: Array, c: Array, settings: TurntableSettings, table_errors: bool
 ) -> Candidates:
-    """What each position tells, with the table's errors or without."""
+    """Candidates with their regressors and covariances, with the table's errors or without."""
     noise = np.full(len(model.channels), settings.instrument.noise)
     std = None if table_errors else np.zeros(len(model.chain.errors))
     table = weights(model, angles, c, np.zeros_like(noise), std, _samples(settings, angles))

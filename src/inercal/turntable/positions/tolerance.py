@@ -1,4 +1,4 @@
-"""Which error of the table matters for which coefficient, and what halving it would bring.
+"""Share of each error of the table in each coefficient, and the effect of halving it.
 
 Goal-oriented shares: the part of the variance of a coefficient, or of the mean square of the predicted output
 over the sphere, that each error of the table causes. For one that stays constant it is
@@ -114,7 +114,7 @@ class Alternatives:
 
 
 def alternatives(fit: Regression, slope: Array) -> Alternatives:
-    """What halving each tolerance would bring, and what the scopes mean; the fit is weighted anew each time.
+    """Uncertainties with each tolerance halved, and with other scopes; the fit is weighted anew each time.
 
     ``slope`` (p, p) of the terms as reported by the linear coefficients; u is of those, in the unit of the fit.
     """

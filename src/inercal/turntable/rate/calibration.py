@@ -1,4 +1,4 @@
-"""Calibration of gyros by a rate test: what the record holds, what its rates can tell, and the fit."""
+"""Calibration of gyros by a rate test: readings, identifiability of the terms, and the fit."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class RateFit:
     residuals : (n,) readings minus the best straight line
     remainder : (n, n) how each reading enters each residual
     noise : float
-        Standard deviation of a reading that is not the table's doing; ``noise_dof`` inf where it was stated.
+        Standard deviation of a reading beside the table's part; ``noise_dof`` inf where it was stated.
     chi2, dof : weighted sum of squares of the fit, and its degrees of freedom
     """
 
@@ -80,7 +80,7 @@ def symbols(axis: str, order: int, asymmetry: bool) -> tuple[str, ...]:
 
 
 def separable(rate: Array, axis: str, order: int, asymmetry: bool) -> Identifiability:
-    """What the rates let the terms say.
+    """Identifiability of the terms by the rates.
 
     By the rates of the table alone, rounded to what counts as one rate: earth rate and jitter would make terms
     seem known that hang on a millionth of the rate.

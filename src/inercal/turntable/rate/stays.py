@@ -169,7 +169,7 @@ def over_turn(of_angles: Callable[[Array], Array], angles: Array, joint: int, tu
 
 
 def beyond(chain: Chain, joint: str) -> tuple[Chain, Array]:
-    """What the joint turns: the chain after it, and the turning axis (3,) in the frame it starts from."""
+    """The chain after a joint, and the turning axis (3,) in the frame it starts from."""
     k = next(i for i, each in enumerate(chain.elements) if isinstance(each, Joint) and each.name == joint)
     turning = chain.elements[k]
     assert isinstance(turning, Joint)
@@ -207,7 +207,7 @@ def sensed(
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Something the sensed rate is uncertain by.
+    """A source of uncertainty of the sensed rate.
 
     ``shift`` (n, q) [rad/s]: change of each reading's input for one standard deviation of q independent
     components; ``redrawn`` if these take new values at each stay. ``u`` [``unit``] of the source itself.

@@ -81,7 +81,7 @@ class Analysed:
 
     @property
     def message(self) -> str:
-        """What was found, in a sentence."""
+        """The result in a sentence."""
         indices = self.indices
         size = (
             f"{counted(len(indices.factors), 'error')}, {counted(len(indices.outputs), 'output')}, "
