@@ -57,7 +57,7 @@ def rows(quick: bool) -> list[Row]:
         1 if quick else 30,
     )
     info = theirs()
-    away = float(np.max(np.abs(whole.found.force_gain / (info.K_a @ info.R_a) - 1)))
+    away = float(np.max(np.abs(whole.solution.force_gain / (info.K_a @ info.R_a) - 1)))
     what, size, peer, unit = "Ferraris calibration", f"{len(data)} rows", named("imucal"), ("ms", 1e3)
     return [
         row(f"{what}, with uncertainties", size, unit, seconds["whole"], peer, seconds["theirs"]),

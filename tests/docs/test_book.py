@@ -12,11 +12,13 @@ from urllib.parse import unquote
 
 import pytest
 
+from inercal.aoa import limits as aoa
 from inercal.cli.tree import COMMANDS
 from inercal.findings import CODES
 from inercal.imu import limits as imu
 from inercal.instruments.terms import NOISE_TERMS, TERMS
 from inercal.records.channels import _EXAMPLES
+from inercal.selfcal import limits as selfcal
 from inercal.turntable import limits as turntable
 
 ROOT = Path(__file__).parents[2]
@@ -173,7 +175,9 @@ def test_the_reference_has_every_command_term_code_channel_and_limit(book):
         "commands": [f"<h2>{' '.join(words).strip()}<" for words in COMMANDS],
         "results": [f">{name}</span>" for name in [*TERMS, *NOISE_TERMS, *CODES]],
         "records": [f">{name}</span>" for name in _EXAMPLES if not re.fullmatch(r"a[34]", name)],
-        "limits": [f">{name}</span>" for name in (*vars(imu.LIMITS), *vars(turntable.LIMITS))],
+        "limits": [
+            f">{name}</span>" for module in (aoa, imu, selfcal, turntable) for name in vars(module.LIMITS)
+        ],
     }
     for page, names in wanted.items():
         assert [name for name in names if name not in text[page]] == [], page

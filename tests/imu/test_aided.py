@@ -385,6 +385,6 @@ def test_pictures_of_sound_and_failed_calibrations(noisy):
         found = calibrate_aided(record, settings(), AidedSettings(CHAIN))
         drawn = pictures(found)
         assert drawn[0].title == "The table"
-        assert len(drawn) == (1 if found.fit is None else 3 + len(found.fit.known))
+        assert len(drawn) == (1 if found.fit is None else 3 + len(found.fit.identified))
         assert all(len(picture.svg) < 300_000 for picture in drawn)
         render(found.estimate, drawn, "Table")

@@ -25,7 +25,7 @@ from inercal.rigs.chain import Scope
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, listed, named
 from inercal.turntable.model import table_model
-from inercal.turntable.regression import fit, known
+from inercal.turntable.regression import fit, identify_channels
 from inercal.turntable.weights import weights
 
 K_X = ("k_x", "k_y", "k_z")
@@ -47,7 +47,7 @@ def true_c(model, coefficients=WHEEL):
 
 def rank(plan, terms, latitude=LATITUDE):
     model = model_of(plan, terms=terms, site=Site(9.8, (), latitude))
-    return known(model, plan.angles)[0]
+    return identify_channels(model, plan.angles)[0]
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_perfect_readings_give_the_coefficients_back(kind, unit, seed, positions
     size = np.abs(rows).max(axis=(0, 1))
     c = rng.normal(size=len(size)) / size
     found = fit(model, plan.angles, model.outputs(plan.angles, c), [noise] * len(CHANNELS[kind]))
-    condition = max(each.identifiability.condition for each in known(model, plan.angles))
+    condition = max(each.identifiability.condition for each in identify_channels(model, plan.angles))
     assert_allclose(found.c * size, c * size, atol=1e-13 * condition * np.sqrt(positions))
 
 

@@ -1,4 +1,4 @@
-"""How other tools write an instrument down: what every such convention is made of.
+"""Conventions of other tools for the coefficients of an instrument: the parts that each of them has.
 
 A convention names its matrices (its *terms*), makes them of an `ImuModel` and an `ImuModel` of them, and writes
 and reads its tool's own files. Vectors are (3,), matrices (3, 3), rows the sensor axes x, y, z.

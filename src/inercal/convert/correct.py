@@ -22,7 +22,7 @@ Samples = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class Correction:
-    """How the samples of a record are corrected, or made into outputs of the instrument.
+    """Correction of the samples of a record, or its inverse, from corrected samples to outputs of the instrument.
 
     ``work`` takes samples by sensor, times ``factors``, to results in ``units``; ``settings`` hold all that decides
     them.
@@ -111,7 +111,7 @@ class ImuModel:
 
         def work(samples: Samples) -> Samples:
             results = zip(("acc", "gyro"), both(samples["acc"], samples.get("gyro")), strict=True)
-            return {sensor: found for sensor, found in results if found is not None}
+            return {sensor: corrected for sensor, corrected in results if corrected is not None}
 
         triads = {"acc": self.accelerometer, **({} if self.gyro is None else {"gyro": self.gyro})}
         settings = {**triads, "g": self.g_sensitivity, "units": self.units, "invert": invert}
@@ -131,8 +131,8 @@ def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
     axes = [f"{scale}_{axis}" for scale in ("K1", "S") if f"{scale}_x" in values for axis in "xyz"]
     complete = "K1_x" in values and values.keys() >= set(axes) and isinstance(units, Mapping)
     if not complete or not np.all(np.isfinite(estimate.values)):
-        found = ", ".join(estimate.names) or "no coefficients"
-        raise InputError(where, f"found {found}, expected the coefficients of an IMU")
+        names = ", ".join(estimate.names) or "no coefficients"
+        raise InputError(where, f"found {names}, expected the coefficients of an IMU")
     accelerometer = triad_from_terms(values, "K1", "M", "K0")
     gyro = triad_from_terms(values, "S", "T", "D_F") if "S_x" in values else None
     for name, triad in (("accelerometers", accelerometer), ("gyro", gyro)):
@@ -181,10 +181,10 @@ def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
     """
     correct = model.correction(record, invert)
     triads = [record.triad(sensor) for sensor in correct.units]
-    found = correct({triad.sensor: triad.values for triad in triads})
+    corrected = correct({triad.sensor: triad.values for triad in triads})
     columns = dict(record.columns)
     for triad in triads:
         for i, axis in enumerate("xyz"):
-            name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(found[triad.sensor][:, i])
+            name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(corrected[triad.sensor][:, i])
             columns[name] = Column(name, correct.units[triad.sensor], values, triad.t, triad.source)
     return Record(columns, record.findings, record.sources, record.labels)

@@ -38,7 +38,7 @@ from inercal.errors import InputError
 
 def terms(model: ImuModel) -> Terms:
     """``T_a, K_a, b_a`` and, where there is a gyro, ``T_g, K_g, b_g``; it has no place for g-sensitivity."""
-    found: Terms = {}
+    by_name: Terms = {}
     for letter, triad in (("a", model.accelerometer), ("g", model.gyro)):
         if triad is not None:
             A = np.linalg.inv(triad.gain)
@@ -47,8 +47,8 @@ def terms(model: ImuModel) -> Terms:
                 raise InputError(
                     "imu_tk", "found exchanged axes, for which it has no place, expected x, y, z"
                 )
-            found |= {f"T_{letter}": A / K, f"K_{letter}": np.diag(K), f"b_{letter}": triad.bias}
-    return found
+            by_name |= {f"T_{letter}": A / K, f"K_{letter}": np.diag(K), f"b_{letter}": triad.bias}
+    return by_name
 
 
 def model(terms: Terms, units: Units) -> ImuModel:
@@ -85,7 +85,7 @@ def _text(terms: Terms, letter: str, words: str) -> str:
 
 def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     """Terms, and the units that are stated, of the accelerometers' file and perhaps the gyro's."""
-    found: Terms = {}
+    by_name: Terms = {}
     units: Units = {}
     if len(texts) > 2:
         raise InputError("imu_tk", f"found {len(texts)} files, expected the accelerometers' and the gyro's")
@@ -98,15 +98,15 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
             raise InputError(where, f"{error}, {expected}") from error
         if len(numbers) < 21:
             raise InputError(where, f"found {len(numbers)} numbers, {expected}")
-        stated = units_in(text)
-        if stated and sensor not in stated:
+        in_file = units_in(text)
+        if in_file and sensor not in in_file:
             raise InputError(
-                where, f"found the file of the {next(iter(stated))}, expected that of the {sensor}"
+                where, f"found the file of the {next(iter(in_file))}, expected that of the {sensor}"
             )
-        units |= stated
+        units |= in_file
         T, K, b = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3), numbers[18:]
-        found |= {f"T_{letter}": T, f"K_{letter}": K, f"b_{letter}": b}
-    return found, units
+        by_name |= {f"T_{letter}": T, f"K_{letter}": K, f"b_{letter}": b}
+    return by_name, units
 
 
 CONVENTION = Convention(

@@ -109,10 +109,10 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
             raise ValueError(f"found the format version {version!r}")
         if data["cal_type"] not in ("Ferraris", "Turntable"):
             raise ValueError(f"found the calibration type {data['cal_type']!r}")
-        found = {name: np.array(data[name], dtype=float) for name in _SHAPES}
+        matrices = {name: np.array(data[name], dtype=float) for name in _SHAPES}
         for name, shape in _SHAPES.items():
-            if found[name].shape != shape:
-                raise ValueError(f"{name} is of shape {found[name].shape}")
+            if matrices[name].shape != shape:
+                raise ValueError(f"{name} is of shape {matrices[name].shape}")
         to_force, to_rate = str(data["acc_unit"]), str(data["gyr_unit"])
     except KeyError as error:
         raise InputError(where, f"the key {error} is missing, {expected}") from error
@@ -125,14 +125,14 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
         raise InputError(
             where, f"found corrected samples in {to_force} and {to_rate}, expected {FORCE} and {DEG}"
         )
-    found["K_a"] /= force.factor
-    found["K_ga"] /= force.factor
-    found["K_g"] /= rate.factor / _DEG
+    matrices["K_a"] /= force.factor
+    matrices["K_ga"] /= force.factor
+    matrices["K_g"] /= rate.factor / _DEG
     units: Units = {}
     for sensor, key in (("acc", "from_acc_unit"), ("gyro", "from_gyr_unit")):
         with suppress(InputError):
             units[sensor] = output_unit(sensor, str(data.get(key)), where)
-    return found, units
+    return matrices, units
 
 
 CONVENTION = Convention(

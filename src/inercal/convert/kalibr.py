@@ -104,7 +104,7 @@ def _term_units(units: Units) -> Units:
 
 
 def _notes(terms: Terms) -> tuple[Finding, ...]:
-    """What the frame is, and where the biases are."""
+    """Notes about the frame and the biases."""
     turn = np.arccos(np.clip((np.trace(terms["C_i_b"]) - 1.0) / 2.0, -1.0, 1.0))
     return (
         Finding(
@@ -149,7 +149,7 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
             where, f"found {len(imus)} keys imu0, imu1, ..., expected one with what belongs to it"
         )
     imu = whole[imus[0]]
-    found = {"C_i_b": _array(imu.get("T_i_b", np.eye(4).tolist()), (4, 4), "T_i_b", where)[:3, :3]}
+    matrices = {"C_i_b": _array(imu.get("T_i_b", np.eye(4).tolist()), (4, 4), "T_i_b", where)[:3, :3]}
     for term, (place, key) in _PLACES.items():
         part = imu.get(place)
         if not isinstance(part, Mapping):
@@ -158,7 +158,7 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
                 f"found no {place} in the model {imu.get('model', 'without name')!r}, expected scale-misalignment",
             )
         if key in part:
-            found[term] = _array(part[key], (3,) if key == "b" else (3, 3), f"{place} {key}", where)
+            matrices[term] = _array(part[key], (3,) if key == "b" else (3, 3), f"{place} {key}", where)
         elif key != "b":
             raise InputError(where, f"found no {key} among the {place}, expected M, A and C_gyro_i")
     arms = [
@@ -171,10 +171,10 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
             "place, expected the model scale-misalignment",
         )
     for key in ("C_i_b", "C_gyro_i"):
-        C = found[key]
+        C = matrices[key]
         if np.abs(C @ C.T - np.eye(3)).max() > _TOLERANCE or np.linalg.det(C) < 0:
             raise InputError(where, f"found a {key} that is no rotation, expected one")
-    return found, {"acc": FORCE, "gyro": RATE} | units_in(text)
+    return matrices, {"acc": FORCE, "gyro": RATE} | units_in(text)
 
 
 def _array(value: Any, shape: tuple[int, ...], key: str, where: object) -> Array:

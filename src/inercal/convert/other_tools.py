@@ -155,12 +155,12 @@ def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None 
         The files are not what was said, hold what a triad cannot, or the units are neither stated nor given.
     """
     convention = CONVENTIONS[name]
-    terms, stated = convention.parse([(path, _text(path, name)) for path in paths])
+    terms, in_files = convention.parse([(path, _text(path, name)) for path in paths])
     try:
-        model = convention.model(terms, stated)
+        model = convention.model(terms, in_files)
     except InputError as error:
         raise InputError(paths[0], error.message) from error
-    outputs = _outputs(stated, units or {}, model.gyro is not None, paths)
+    outputs = _outputs(in_files, units or {}, model.gyro is not None, paths)
     values = coefficients(model)
     findings = [Finding("not_stated", f"a file of {name} states no uncertainty: it is unknown", harm=())]
     if not terms.keys() & {"b_a", "db"}:
@@ -198,31 +198,31 @@ def _text(path: Path, name: str) -> str:
         raise InputError(path, f"found no text in UTF-8, expected a calibration of {name}") from error
 
 
-def _outputs(stated: Units, given: Mapping[str, str], has_gyro: bool, paths: Sequence[Path]) -> Units:
+def _outputs(units: Units, given: Mapping[str, str], has_gyro: bool, paths: Sequence[Path]) -> Units:
     """Units of the outputs, from the file or else as given."""
-    found: Units = {}
+    outputs: Units = {}
     for sensor in ("acc", "gyro") if has_gyro else ("acc",):
         option = f"--{sensor}-unit"
-        unit = stated.get(sensor) or given.get(sensor)
+        unit = units.get(sensor) or given.get(sensor)
         if unit is None:
             raise InputError(
                 paths[0], f"states no unit of the {sensor} outputs, expected {option}, such as count"
             )
-        found[sensor] = output_unit(sensor, unit, paths[0] if sensor in stated else option)
-        if sensor in given and found[sensor] != output_unit(sensor, given[sensor], option):
+        outputs[sensor] = output_unit(sensor, unit, paths[0] if sensor in units else option)
+        if sensor in given and outputs[sensor] != output_unit(sensor, given[sensor], option):
             raise InputError(option, f"found {given[sensor]}, but the file states {unit}, expected the same")
-    return found
+    return outputs
 
 
 def coefficients(model: ImuModel) -> dict[str, float]:
     """The model's coefficients by symbol; M below the diagonal and G only where they are not zero."""
     below = bool(np.abs(np.tril(model.accelerometer.misalignment, -1)).max() > _ROUNDING)
-    found = _of_triad(model.accelerometer, "K0", "K1", "M", full=below)
+    values = _of_triad(model.accelerometer, "K0", "K1", "M", full=below)
     if model.gyro is not None:
-        found |= _of_triad(model.gyro, "D_F", "S", "T", full=True)
+        values |= _of_triad(model.gyro, "D_F", "S", "T", full=True)
         if model.g_sensitivity.any():
-            found |= dict(zip(GYRO_G_SENSITIVITY, model.g_sensitivity.ravel().tolist(), strict=True))
-    return found
+            values |= dict(zip(GYRO_G_SENSITIVITY, model.g_sensitivity.ravel().tolist(), strict=True))
+    return values
 
 
 def _of_triad(triad: TriadModel, bias: str, scale: str, misalignment: str, full: bool) -> dict[str, float]:

@@ -58,8 +58,8 @@ class PlatformModel:
         triads = [record.triad(sensor) for sensor in _SENSORS if f"{sensor}_x" in record]
         if not triads:
             where = ", ".join(source.path for source in record.sources) or "record"
-            found = ", ".join(record.columns) or "no column"
-            raise InputError(where, f"found {found}, expected wc_x to z, gyro_x to z or acc_x to z")
+            names = ", ".join(record.columns) or "no column"
+            raise InputError(where, f"found {names}, expected wc_x to z, gyro_x to z or acc_x to z")
         for triad in triads:
             dimension = _SENSORS[triad.sensor]
             if triad.unit.dimension != dimension:
@@ -94,8 +94,8 @@ def platform_model(estimate: Estimate, where: object = "calibration") -> Platfor
     """
     values = {name: p.value for name, p in estimate.parameters.items()}
     if not values.keys() >= set(NAMES) or not np.all(np.isfinite(estimate.values)):
-        found = ", ".join(estimate.names) or "no coefficients"
-        raise InputError(where, f"found {found}, expected the coefficients of a platform")
+        names = ", ".join(estimate.names) or "no coefficients"
+        raise InputError(where, f"found {names}, expected the coefficients of a platform")
 
     def triple(group: str) -> tuple[float, float, float]:
         x, y, z = (values.get(f"{group}_{axis}", 0.0) for axis in "xyz")
@@ -124,5 +124,5 @@ def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Find
     """``not_held``: the coefficients that `platform_model` leaves out."""
     if "beta_x" not in estimate.names:
         return ()
-    said = "the zero of the encoders beta is not applied: gimbal angles stay as they are"
-    return (Finding("not_held", said, str(where)),)
+    text = "the zero of the encoders beta is not applied: gimbal angles stay as they are"
+    return (Finding("not_held", text, str(where)),)

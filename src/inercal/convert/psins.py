@@ -116,7 +116,7 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     if more:
         raise InputError("psins", f"found {len(texts)} files, expected one")
     bare = re.sub(r"%.*|\.\.\.", "", text)
-    found: dict[str, Array] = {}
+    matrices: dict[str, Array] = {}
     for struct, name, body in re.findall(r"(clbt\.)?\b(\w+)\s*=\s*(\[[^\]]*\]|[^;\n]*)", bare):
         try:
             numbers = np.array(
@@ -124,38 +124,39 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
             )
         except ValueError as error:
             raise InputError(where, f"{name}: {error}, expected numbers in brackets") from error
-        found[name] = numbers if struct else numbers * _IN_CLBTFILE.get(name, 1.0)
-    stated = all(re.search(rf"%\s*{unit}\s*$", text, re.MULTILINE) for unit in ("deg/h", "ug"))
-    if "eb" in found and "clbt.eb" not in bare and not stated:
+        matrices[name] = numbers if struct else numbers * _IN_CLBTFILE.get(name, 1.0)
+    has_units = all(re.search(rf"%\s*{unit}\s*$", text, re.MULTILINE) for unit in ("deg/h", "ug"))
+    if "eb" in matrices and "clbt.eb" not in bare and not has_units:
         raise InputError(
             where,
             "states no unit of eb and db, expected % deg/h and % ug beside them, or clbt.eb and clbt.db in SI",
         )
-    if not found.keys() >= {"Kg", "eb", "Ka", "db"}:
+    if not matrices.keys() >= {"Kg", "eb", "Ka", "db"}:
         raise InputError(
-            where, f"found {', '.join(found) or 'no variables'}, expected Kg, eb, Ka, db of a clbt of PSINS"
+            where,
+            f"found {', '.join(matrices) or 'no variables'}, expected Kg, eb, Ka, db of a clbt of PSINS",
         )
     for name, size in _SIZES.items():
-        if name in found and found[name].size != size:
-            raise InputError(where, f"{name} has {found[name].size} numbers, expected {size}")
-    strange = [name for name in _OTHERS if name in found and found[name].any()]
+        if name in matrices and matrices[name].size != size:
+            raise InputError(where, f"{name} has {matrices[name].size} numbers, expected {size}")
+    strange = [name for name in _OTHERS if name in matrices and matrices[name].any()]
     if strange:
         raise InputError(
             where,
             f"found {', '.join(strange)}, for which inercal's triads have no place, expected zeros there",
         )
     units = units_in(text)
-    if "sf" not in found:
+    if "sf" not in matrices:
         units = {"acc": FORCE, "gyro": RATE} | units
-    sf = found.get("sf", np.ones(6))
-    square = {name: found[name].reshape(3, 3) for name in ("Kg", "Ka")}
-    gSens = found.get("gSens", np.zeros(9)).reshape(3, 3)
+    sf = matrices.get("sf", np.ones(6))
+    square = {name: matrices[name].reshape(3, 3) for name in ("Kg", "Ka")}
+    gSens = matrices.get("gSens", np.zeros(9)).reshape(3, 3)
     return {
         **square,
         "sf_g": sf[:3],
         "sf_a": sf[3:],
-        "eb": found["eb"],
-        "db": found["db"],
+        "eb": matrices["eb"],
+        "db": matrices["db"],
         "gSens": gSens,
     }, units
 

@@ -53,7 +53,7 @@ def _block(lines: list[Line], where: object, depth: int) -> tuple[Any, list[Line
 
 
 def _item(line: Line) -> Line | None:
-    """What follows the dash of a list's item, indented as deep as it stands; None for anything else."""
+    """The text after the dash of an item of a list, indented as deep as it stands; None for anything else."""
     number, indent, content = line
     if content != "-" and not content.startswith("- "):
         return None
@@ -63,18 +63,18 @@ def _item(line: Line) -> Line | None:
 
 def _list(lines: list[Line], where: object, depth: int) -> tuple[list[Any], list[Line]]:
     """A list of items that stand below each other."""
-    indent, found = lines[0][1], []
+    indent, items = lines[0][1], []
     while lines and lines[0][1] == indent and (item := _item(lines[0])) is not None:
         if not item[2]:
             raise _bad(lines[0], where)
         value, lines = _block([item, *lines[1:]], where, depth + 1)
-        found.append(value)
-    return found, lines
+        items.append(value)
+    return items, lines
 
 
 def _dict(lines: list[Line], where: object, depth: int) -> tuple[dict[str, Any], list[Line]]:
     """Keys that stand below each other, each with a value beside or below it."""
-    indent, found = lines[0][1], {}
+    indent, entries = lines[0][1], {}
     while lines and lines[0][1] == indent and (match := _KEY.match(lines[0][2])):
         (number, _, content), lines = lines[0], lines[1:]
         rest = content[match.end() :]
@@ -85,8 +85,8 @@ def _dict(lines: list[Line], where: object, depth: int) -> tuple[dict[str, Any],
             value, lines = _block(lines, where, depth + 1)
         else:
             value = None
-        found[match["quoted"] or match["plain"]] = value
-    return found, lines
+        entries[match["quoted"] or match["plain"]] = value
+    return entries, lines
 
 
 def _scalar(line: Line, where: object) -> Any:
@@ -107,14 +107,14 @@ def _scalar(line: Line, where: object) -> Any:
 
 def _flow(line: Line, text: str, where: object, depth: int) -> tuple[list[Any], str]:
     """A list in brackets at the start of ``text``, and what follows it."""
-    found: list[Any] = []
+    items: list[Any] = []
     text = text[1:].lstrip()
     while not text.startswith("]"):
         if text.startswith("[") and depth < _DEEPEST:
             value, text = _flow(line, text, where, depth + 1)
-            found.append(value)
+            items.append(value)
         elif match := re.match(r"[^\[\],]+", text):
-            found.append(_scalar((line[0], line[1], match[0].strip() or "{"), where))
+            items.append(_scalar((line[0], line[1], match[0].strip() or "{"), where))
             text = text[match.end() :]
         else:
             raise _bad(line, where)
@@ -123,4 +123,4 @@ def _flow(line: Line, text: str, where: object, depth: int) -> tuple[list[Any], 
             text = text[1:].lstrip()
         elif not text.startswith("]"):
             raise _bad(line, where)
-    return found, text[1:]
+    return items, text[1:]

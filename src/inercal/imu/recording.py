@@ -21,7 +21,7 @@ from inercal.records.record import Record
 
 @dataclass(frozen=True)
 class Recording:
-    """The triads of a record, and what its initial static period says about their noise.
+    """The triads of a record, and their noise in its initial static period.
 
     ``restlessness`` holds, for each triad, the windowed variance over that of the initial static period, on
     the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it,
@@ -83,11 +83,11 @@ def _plausible(triad: Triad) -> None:
             f"found {len(triad.t)} samples of {triad.sensor} without increasing time stamps, expected a recording",
         )
     for axis, values in zip("xyz", triad.values.T, strict=True):
-        known = values[np.isfinite(values)]
-        if known.size and np.ptp(known) == 0.0:
+        finite = values[np.isfinite(values)]
+        if finite.size and np.ptp(finite) == 0.0:
             raise RecordError(
                 triad.source.path,
-                f"{triad.sensor}_{axis} never changes ({known[0]:g}), expected a live sensor",
+                f"{triad.sensor}_{axis} never changes ({finite[0]:g}), expected a live sensor",
             )
     size = float(np.max(np.abs(triad.values), initial=0.0, where=np.isfinite(triad.values)))
     if size > 0.0 and not 1e-100 < size < 1e100:
@@ -113,7 +113,7 @@ def _complete(triad: Triad) -> NDArray[np.bool_]:
 
 
 def _kept(triad: Triad, rows: NDArray[np.bool_]) -> Triad:
-    """Those rows of a triad; the triad itself if these are all."""
+    """A triad with these rows alone; the triad itself if these are all."""
     return triad if rows.all() else replace(triad, t=triad.t[rows], values=triad.values[rows])
 
 
@@ -159,15 +159,15 @@ def _initial(
     where: str,
 ) -> Dwell:
     """The initial static period: as stated and then checked, or up to the first movement."""
-    known = np.isfinite(variance)
-    if np.count_nonzero(known) < 2 * window:
+    finite = np.isfinite(variance)
+    if np.count_nonzero(finite) < 2 * window:
         raise RecordError(
             where,
             f"found {len(t)} samples, expected a recording that starts with at least {LIMITS.initial_rest:g} s at rest",
         )
-    first = int(np.argmax(known))
+    first = int(np.argmax(finite))
     # the calmest twentieth of the record tells what rest looks like before anything else is known
-    calm = float(np.quantile(variance[known], 0.05))
+    calm = float(np.quantile(variance[finite], 0.05))
     restless = np.flatnonzero(variance[first:] > LIMITS.moving_variance * max(calm, 1e-300)) + first
     moves = int(restless[0] - window // 2) if len(restless) else len(t)
     broken = int(next(iter(cuts[cuts > first]), len(t)))
@@ -192,17 +192,17 @@ def _initial(
             f"found {static_start:g} s, expected {LIMITS.initial_rest:g} s to the length of the record, "
             f"{t[-1] - t[0]:.1f} s",
         )
-    stated = int(np.argmax(t > t[0] + static_start)) or len(t)
-    inside = variance[: max(stated - window // 2, 0)]
+    end = int(np.argmax(t > t[0] + static_start)) or len(t)
+    inside = variance[: max(end - window // 2, 0)]
     inside = inside[np.isfinite(inside)]
-    if stop < stated - window and (
+    if stop < end - window and (
         not len(inside) or np.max(inside) > LIMITS.moving_variance * np.median(inside)
     ):
         raise StudyError(
             "imu.static_start",
             f"found {static_start:g} s, expected a still period: {event} after {still:.1f} s",
         )
-    return Dwell(0, stated)
+    return Dwell(0, end)
 
 
 def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
@@ -214,7 +214,7 @@ def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
 
 
 def unit_words(triad: Triad, model: TriadModel) -> str:
-    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
+    """A wrong unit of physical outputs, in words, by scale factors far from nominal; empty if they are near."""
     if triad.unit.dimension in ("count", "voltage"):
         return ""
     nominal = 1.0 / triad.unit.factor

@@ -40,16 +40,20 @@ class ImuTruth:
     def values(self) -> dict[str, float]:
         """True coefficients by term symbol."""
         triads = ((self.accelerometer, ACCELEROMETER_TRIAD), (self.gyro, GYRO_TRIAD))
-        found: dict[str, float] = {}
+        coefficients: dict[str, float] = {}
         for model, symbols in triads:
             numbers = {"bias": iter(model.bias), "scale": iter(model.scale)}
             for symbol in symbols:
                 head, _, axes = symbol.rpartition("_")
                 if len(axes) == 2:
-                    found[symbol] = float(model.misalignment["xyz".index(axes[0]), "xyz".index(axes[1])])
+                    coefficients[symbol] = float(
+                        model.misalignment["xyz".index(axes[0]), "xyz".index(axes[1])]
+                    )
                 else:
-                    found[symbol] = float(next(numbers["bias" if head in ("K0", "D_F") else "scale"]))
-        return found | dict(zip(GYRO_G_SENSITIVITY, map(float, self.g_sensitivity.ravel()), strict=True))
+                    coefficients[symbol] = float(next(numbers["bias" if head in ("K0", "D_F") else "scale"]))
+        return coefficients | dict(
+            zip(GYRO_G_SENSITIVITY, map(float, self.g_sensitivity.ravel()), strict=True)
+        )
 
 
 def draw_truth(rng: np.random.Generator, g_sensitivity: float = 0.0) -> ImuTruth:

@@ -45,8 +45,8 @@ def calibrate(
     InputError
         The record does not hold what the method needs.
     """
-    found = _by_method(record, settings, progress)
-    return found if settings.site.inputs else _with_exact_gravity(found, settings.site.gravity)
+    calibration = _by_method(record, settings, progress)
+    return calibration if settings.site.inputs else _with_exact_gravity(calibration, settings.site.gravity)
 
 
 def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], None]) -> Calibrated:
@@ -66,11 +66,11 @@ def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], 
             return calibrate_multiposition(record, settings, progress)
 
 
-def _with_exact_gravity(found: Calibrated, gravity: float) -> Calibrated:
+def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
     """The calibration, saying that gravity without an uncertainty was taken as it stands."""
     text = (
         f"gravity is taken as exactly {gravity:.6g} m/s^2, and the scale factors are too sure by what it is not: state "
         'it with its uncertainty, such as gravity = "9.81(1) m/s^2", or the latitude and height in its place'
     )
-    findings = (*found.estimate.findings, Finding("stated_exact", text))
-    return replace(found, estimate=replace(found.estimate, findings=findings))
+    findings = (*calibration.estimate.findings, Finding("stated_exact", text))
+    return replace(calibration, estimate=replace(calibration.estimate, findings=findings))

@@ -1,7 +1,7 @@
 """Turns between poses: the direction of gravity carried through the gyro's output, with its derivatives.
 
 Over one sample interval the rotation vector is ``phi = gain^-1 (Y - b dt - D X)``, with Y and X the
-trapezoidal integrals of the gyro output and of what its bias goes with (the drivers: specific force, time). The
+trapezoidal integrals of the gyro output and of the drivers of its bias (specific force, time). The
 attitude is the exact product of exp(phi); a vertical n, known in the first pose, appears in the last as ``R^T n``
 with ``R = exp(phi_1) exp(phi_2) ...``.
 NumPy over all turns at once is fast enough here; compiling would cost more than it saves.
@@ -64,7 +64,7 @@ def cut_turns(t: Array, gyro: Array, drivers: Array, spans: Sequence[tuple[int, 
     gyro : (n, 3)
         Gyro output.
     drivers : (n, q)
-        What the bias depends on, at the gyro's samples: specific force [m/s^2] for g-sensitivity, time [s] for
+        Drivers of the bias, at the gyro's samples: specific force [m/s^2] for g-sensitivity, time [s] for
         drift; q is 0 where neither is asked for.
     spans : sequence of (pose, start, stop)
         Turn from ``pose`` to the next, between the samples ``start`` and ``stop`` (both included).

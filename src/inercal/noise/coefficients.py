@@ -180,7 +180,7 @@ def _tried(whole: Curve, columns: list[int], cut: bool) -> list[tuple[Curve, Arr
 
 
 def _improbable(chi2: float, dof: int) -> bool:
-    """Whether the residuals are larger than chance lets them be."""
+    """True if the residuals are larger than chance lets them be."""
     from scipy.special import chdtrc
 
     return dof > 0 and bool(chdtrc(dof, chi2) < MISFIT)
@@ -196,7 +196,7 @@ def _nothing(deviation: AllanDeviation, terms: tuple[str, ...], why: Finding) ->
 
 
 def _in_seconds(interval: float) -> Array:
-    """What N, B, K, R and Q per sample are in seconds."""
+    """N, B, K, R and Q in seconds, from those per sample."""
     return np.array([np.sqrt(interval), 1.0, 1.0 / np.sqrt(interval), 1.0 / interval, interval])
 
 
@@ -220,10 +220,10 @@ def _uncertain(
 
 
 def _findings(span: tuple[float, float], cut: bool, inflation: float) -> list[Finding]:
-    """What is to be said of a fit."""
-    found = []
+    """Findings about a fit."""
+    findings = []
     if cut:
-        found.append(
+        findings.append(
             Finding(
                 "noise_misfit",
                 f"means shorter than {span[0]:.3g} s were left out of the fit: their noise is not N, B, K, R, Q "
@@ -231,11 +231,11 @@ def _findings(span: tuple[float, float], cut: bool, inflation: float) -> list[Fi
             )
         )
     if inflation > 1.0:
-        found.append(
+        findings.append(
             Finding(
                 "noise_misfit",
                 "the Allan deviation is not that of N, B, K, R, Q: its residuals are "
                 f"{np.sqrt(inflation):.2g} times what chance explains, and the uncertainties are enlarged by that",
             )
         )
-    return found
+    return findings

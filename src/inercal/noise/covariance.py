@@ -46,11 +46,11 @@ class Sums:
     singles: Array
 
     def without_first(self) -> Sums:
-        """Those without the shortest averaging time."""
+        """The sums without the shortest averaging time."""
         return Sums(self.lengths[1:], self.products[1:, 1:], self.singles[1:, 1:])
 
     def with_gaps(self, n: int, white: Array, steps: Array) -> Sums:
-        """Those of ``n`` samples whose gaps enlarge the variance of N by ``white`` (k,), of Q by ``steps`` (k,).
+        """The sums of ``n`` samples whose gaps enlarge the variance of N by ``white`` (k,), of Q by ``steps`` (k,).
 
         What gaps add to Q has, on average over where they are, the covariance of white noise. But it comes in shots,
         one of variance 2 Q^2 a gap, so that C varies with them: for gaps that are independent of each other, r a
@@ -137,8 +137,8 @@ def pair_sums(n: int, m: int, other: int) -> tuple[Array, Array]:
 @lru_cache(maxsize=16)
 def _offsets(last: int) -> Integers:
     """Distances 0, 1, 2, ... from a kink, further apart the further away, up to ``last``."""
-    found, d = [], 0
+    offsets, d = [], 0
     while d <= last:
-        found.append(d)
+        offsets.append(d)
         d += max(1, int(_SPACING * d))
-    return np.array(found)
+    return np.array(offsets)

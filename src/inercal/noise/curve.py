@@ -52,8 +52,8 @@ class Curve:
     def covariance(self, squares: Array) -> Array:
         """Covariance (k, k) of the variances under noise of these squared coefficients."""
         kinds = np.delete(squares, RAMP)  # N, B, K, Q
-        found = self.sums.covariance(kinds, float(squares[RAMP]))
-        return found / np.sqrt(np.outer(self.share, self.share))
+        covariance = self.sums.covariance(kinds, float(squares[RAMP]))
+        return covariance / np.sqrt(np.outer(self.share, self.share))
 
     def whitened(self, squares: Array) -> tuple[Array, Array, Array]:
         """Terms (k, 5) and variances (k,) where that covariance is the identity, and its lower factor."""
@@ -71,13 +71,13 @@ class Curve:
         squares = np.zeros(len(SYMBOLS))
         for count in range(_ROUNDS):
             size = np.linalg.norm(A[:, columns], axis=0)
-            found = np.zeros(len(SYMBOLS))
-            found[columns] = nnls(A[:, columns] / size, y)[0] / size
-            new = found if count < 5 else 0.5 * (squares + found)  # lest it go to and fro
+            fitted = np.zeros(len(SYMBOLS))
+            fitted[columns] = nnls(A[:, columns] / size, y)[0] / size
+            new = fitted if count < 5 else 0.5 * (squares + fitted)  # lest it go to and fro
             if not np.any(np.delete(new, RAMP)):
                 return None
             moved = np.max(np.abs(self.terms @ (new - squares)) / (self.terms @ new))
-            squares = np.where(found > 0.0, new, 0.0)
+            squares = np.where(fitted > 0.0, new, 0.0)
             if moved < _CLOSE:
                 break
             A, y, _ = self.whitened(squares)
@@ -100,13 +100,13 @@ class Curve:
         while True:
             seen = np.flatnonzero(squares).tolist()
             without = [self.squares([j for j in seen if j != i]) if len(seen) > 1 else None for i in seen]
-            found = [
+            remaining = [
                 np.inf if rest is None else self.asked_for(i, rest)
                 for i, rest in zip(seen, without, strict=True)
             ]
-            least = int(np.argmin(found))
+            least = int(np.argmin(remaining))
             rest = without[least]
-            if rest is None or found[least] >= significant:
+            if rest is None or remaining[least] >= significant:
                 return squares
             squares = rest
 
@@ -173,12 +173,12 @@ class Curve:
             under[i] = square
             apart, y, _ = self._apart(i, fit.squares, under)
             u = 1.0 / float(np.linalg.norm(apart))
-            found = max(float(apart @ y) * u**2, 0.0)
+            chi2 = max(float(apart @ y) * u**2, 0.0)
             own = 0.0 if i == RAMP else max(u**2 - u0**2, 0.0)
             # that of chi-square with 2 square^2 / own degrees of freedom, diluted by the rest of the scatter
             skewness = 2.0 * own**2 / (square * u**3)
             nu = 8.0 / max(skewness, 1e-3) ** 2
-            return bool(square - (1.0 - chdtri(nu, 0.95) / nu) * np.sqrt(nu / 2.0) * u >= found)
+            return bool(square - (1.0 - chdtri(nu, 0.95) / nu) * np.sqrt(nu / 2.0) * u >= chi2)
 
         low, high = u0, _WIDEST * u0
         while high > 1.01 * low:

@@ -269,10 +269,10 @@ def _exponent(sums: Array, present: Integers | None, m: int, last: int) -> int:
     at = np.arange(0, n - 3 * m + 1, max(1, m // 4, n // _MOST))
     first, second, third = (_means(sums, present, m, at + k * m) for k in range(3))
     before, after = second - first, third - second
-    known = np.isfinite(before) & np.isfinite(after)
-    if np.count_nonzero(known) < FEWEST:
+    finite = np.isfinite(before) & np.isfinite(after)
+    if np.count_nonzero(finite) < FEWEST:
         return last
-    before, after = (steps[known] - steps[known].mean() for steps in (before, after))  # without a ramp
+    before, after = (steps[finite] - steps[finite].mean() for steps in (before, after))  # without a ramp
     power = float(np.sum(before**2) + np.sum(after**2))
     if power == 0.0:
         return last

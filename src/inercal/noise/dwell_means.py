@@ -113,9 +113,9 @@ def fit_pooled(stretches: Sequence[Array], interval: float) -> AllanFit:
             size = values
             for _ in range(5):
                 weight = np.sqrt(dof / 2.0) / size
-                found, _ = nnls(A / scale * weight[:, None], values * weight)
-                size = A / scale @ found
-            coefficients[:, channel] = found / scale
+                solution, _ = nnls(A / scale * weight[:, None], values * weight)
+                size = A / scale @ solution
+            coefficients[:, channel] = solution / scale
     return AllanFit(coefficients, sum(map(len, stretches)), interval)
 
 

@@ -55,7 +55,7 @@ def mean_square_with_gaps(
     the number of runs begun; both means need ``least`` samples. All 0 where there is none.
     """
     total = white = steps = 0.0
-    found = 0
+    pairs = 0
     for i in range(len(sums) - 2 * m):
         k = i + m
         before = present[k] - present[i]
@@ -63,7 +63,7 @@ def mean_square_with_gaps(
         if before >= least and after >= least:
             d = m * ((sums[k + m] - sums[k]) / after - (sums[k] - sums[i]) / before)
             total += d * d
-            found += 1
+            pairs += 1
             a = m / before
             b = m / after
             white += m * (a + b)
@@ -72,9 +72,9 @@ def mean_square_with_gaps(
             there = runs[k + m] - runs[k + 1] + present[k + 1] - present[k]
             goes_on = (present[k] - present[k - 1]) * (present[k + 1] - present[k])
             steps += 2.0 * (a * a * here + b * b * there + a * b * goes_on)
-    if found == 0:
+    if pairs == 0:
         return 0.0, 0, 0.0, 0.0
-    return total / found, found, white / found, steps / found
+    return total / pairs, pairs, white / pairs, steps / pairs
 
 
 @kernel

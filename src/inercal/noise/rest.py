@@ -29,7 +29,7 @@ _MEDIAN_OF_A_SQUARE = 0.455  # of a standard normal variable
 
 @dataclass(frozen=True)
 class Unrest:
-    """What disturbs a channel.
+    """Disturbances of a channel.
 
     ``pieces`` of ``of`` pieces, each ``tau`` [s] long, are restless, the ``first`` and the last one from and to these
     times [s] from the start; ``factor`` is the deviation of adjacent means over ``tau`` with them, over that without.
@@ -80,14 +80,14 @@ def unrest(x: Array, interval: float) -> Unrest | None:
     pieces = x[: count * window].reshape(count, window)
     mean = pieces.mean(axis=1)
     variance = np.mean((pieces - mean[:, None]) ** 2, axis=1)
-    known = np.isfinite(variance)  # a piece that lacks a sample says nothing
-    if not known.any():
+    finite = np.isfinite(variance)  # a piece that lacks a sample says nothing
+    if not finite.any():
         return None
     moves = np.abs(np.diff(x))
     step = float(np.min(moves, initial=np.inf, where=moves > 0))
-    calm = max(float(np.quantile(variance[known], CALM)), step**2 / 12.0)
-    restless = known & (variance > RESTLESS * calm)
-    d, both = np.diff(mean) ** 2, known[1:] & known[:-1]
+    calm = max(float(np.quantile(variance[finite], CALM)), step**2 / 12.0)
+    restless = finite & (variance > RESTLESS * calm)
+    d, both = np.diff(mean) ** 2, finite[1:] & finite[:-1]
     usual = max(float(np.median(d[both])) / _MEDIAN_OF_A_SQUARE, calm / window) if both.any() else np.inf
     jump = both & (d > JUMP**2 * usual)
     restless[1:] |= jump
@@ -98,5 +98,5 @@ def unrest(x: Array, interval: float) -> Unrest | None:
     factor = float(np.sqrt(d[both].mean() / d[quiet].mean())) if d[quiet].any() else np.inf
     first, last = np.flatnonzero(restless)[[0, -1]] * window * interval
     return Unrest(
-        int(restless.sum()), int(known.sum()), window * interval, first, last + window * interval, factor
+        int(restless.sum()), int(finite.sum()), window * interval, first, last + window * interval, factor
     )

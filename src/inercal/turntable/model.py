@@ -1,4 +1,4 @@
-"""What the instrument on the table should indicate, and how the table's errors change that."""
+"""Model of an instrument on a table: its outputs, and their change by the errors of the table."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ class TableModel:
     channels : tuple of ChannelModel
         Their terms are those to be estimated.
     stated : tuple of Stated
-        Of each channel what is known and not estimated; empty where there is nothing.
+        Terms of each channel that are stated and not estimated.
     references : tuple of Reference
-        What a and w are uncertain by.
+        Uncertain inputs of a and w.
     """
 
     chain: Chain
@@ -88,7 +88,7 @@ class TableModel:
 
     @property
     def blocks(self) -> tuple[slice, ...]:
-        """Where the terms of each channel stand among `symbols`."""
+        """Places of the terms of each channel among `symbols`."""
         ends = np.cumsum([len(channel.symbols) for channel in self.channels]).tolist()
         return tuple(slice(a, b) for a, b in zip([0, *ends], ends, strict=False))
 
@@ -106,14 +106,14 @@ class TableModel:
         return made
 
     def outputs(self, angles: Array, c: Array, errors: Array | None = None) -> Array:
-        """Outputs (*batch, channels) for linear coefficients ``c`` (p,), what is stated included."""
+        """Outputs (*batch, channels) for linear coefficients ``c`` (p,), stated terms included."""
         a, w = self.inputs(angles, errors)
         made = [
             channel.regressors(a, w) @ c[block]
             for channel, block in zip(self.channels, self.blocks, strict=True)
         ]
-        for k, known in enumerate(self.stated):
-            made[k] = made[k] + known.channel.regressors(a, w) @ known.values
+        for k, fixed in enumerate(self.stated):
+            made[k] = made[k] + fixed.channel.regressors(a, w) @ fixed.values
         return np.stack(made, axis=-1)
 
     def by_inputs(self, angles: Array, c: Array) -> Array:
@@ -123,8 +123,8 @@ class TableModel:
             np.einsum("npi,p->ni", channel.slopes(a, w), c[block])
             for channel, block in zip(self.channels, self.blocks, strict=True)
         ]
-        for k, known in enumerate(self.stated):
-            made[k] = made[k] + np.einsum("npi,p->ni", known.channel.slopes(a, w), known.values)
+        for k, fixed in enumerate(self.stated):
+            made[k] = made[k] + np.einsum("npi,p->ni", fixed.channel.slopes(a, w), fixed.values)
         return np.stack(made, axis=1)
 
     def by_errors(self, angles: Array, c: Array) -> Array:
@@ -144,23 +144,23 @@ class TableModel:
 
         Each has one value throughout a test.
         """
-        found, columns = [], []
+        inputs, columns = [], []
         for reference in self.references:
             change = self.by_references(angles, c, reference.a_n, reference.w_n)
             if np.any(change):
-                found.append(Beside(reference.source, reference.u, reference.unit))
+                inputs.append(Beside(reference.source, reference.u, reference.unit))
                 columns.append(change)
         a, w = self.inputs(angles)
-        for k, known in enumerate(self.stated):
-            regressors = known.channel.regressors(a, w)
-            for j in np.flatnonzero(known.u):
+        for k, fixed in enumerate(self.stated):
+            regressors = fixed.channel.regressors(a, w)
+            for j in np.flatnonzero(fixed.u):
                 column = np.zeros((len(angles), len(self.channels)))
                 column[:, k] = regressors[:, j]
-                symbol = known.channel.symbols[j]
-                found.append(Beside(f"stated {symbol}", float(known.u[j]), "", symbol))
+                symbol = fixed.channel.symbols[j]
+                inputs.append(Beside(f"stated {symbol}", float(fixed.u[j]), "", symbol))
                 columns.append(column)
         empty = np.zeros((len(angles), len(self.channels), 0))
-        return tuple(found), np.stack(columns, axis=-1) if columns else empty
+        return tuple(inputs), np.stack(columns, axis=-1) if columns else empty
 
 
 def table_model(
@@ -180,7 +180,7 @@ def table_model(
         raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
     models = [channel_model(instrument.kind, channel) for channel in channels]
     wanted = instrument.terms
-    chosen, stated = [], []
+    chosen, fixed = [], []
     for model in models:
         unwanted = set(EXTRA) if wanted is None else set(model.symbols) - set(wanted)
         kept = model.without(unwanted | set(left_out))
@@ -193,14 +193,14 @@ def table_model(
                 "instrument.terms", f"{kept.leading} is missing, to which others of {model.channel} relate"
             )
         chosen.append(kept)
-        stated.append(_stated(settings, model, model.without(kept.symbols)))
+        fixed.append(_stated(settings, model, model.without(kept.symbols)))
     a_n = gravity_reference() if instrument.kind == "gyrowheel" else -gravity_reference(site.gravity)
     w_n = rate_reference(site.latitude)
-    return TableModel(settings.chain, a_n, w_n, tuple(chosen), tuple(stated), _references(settings))
+    return TableModel(settings.chain, a_n, w_n, tuple(chosen), tuple(fixed), _references(settings))
 
 
 def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel) -> Stated:
-    """What the study states of the terms in ``rest``, of a channel whose whole ``model`` it is a part of."""
+    """Stated values of the terms in ``rest``, a part of the whole ``model`` of a channel."""
     values = stated_values(settings, model)
     linear, typed = model.linear(values), settings.instrument.coefficients_u
     # a relative term enters times the stated scale factor: what is fitted of that changes it to second order
@@ -217,12 +217,12 @@ def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel
 
 
 def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
-    """What gravity and earth rate are uncertain by."""
+    """Uncertain inputs of gravity and earth rate."""
     site, still = settings.site, np.zeros(3)
     assert site.latitude is not None
     # in units of the site's gravity, gravity is one whatever its value
     up = still if settings.instrument.kind == "gyrowheel" else np.array([0.0, 0.0, 1.0])
-    found = {
+    references = {
         (each.source, each.u, each.unit): Reference(
             each.source, each.u, each.unit, up * each.sensitivity, still
         )
@@ -231,8 +231,8 @@ def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
     if site.latitude_u > 0.0:
         key = ("latitude", site.latitude_u, "rad")
         w_n = EARTH_RATE * np.array([-np.sin(site.latitude), 0.0, np.cos(site.latitude)])
-        found[key] = Reference(*key, found[key].a_n if key in found else still, w_n)
-    return tuple(found.values())
+        references[key] = Reference(*key, references[key].a_n if key in references else still, w_n)
+    return tuple(references.values())
 
 
 def orthonormal(model: TableModel, angles: Array) -> Array:
@@ -247,11 +247,11 @@ def orthonormal(model: TableModel, angles: Array) -> Array:
 
 def channels_of(settings: TurntableSettings) -> tuple[str, ...]:
     """Channels of which the study states a coefficient; all of the kind where it states none."""
-    kind, stated = settings.instrument.kind, settings.instrument.coefficients
+    kind, coefficients = settings.instrument.kind, settings.instrument.coefficients
     named = [
         channel
         for channel in CHANNELS[kind]
-        if any(symbol in stated for symbol in channel_model(kind, channel).symbols)
+        if any(symbol in coefficients for symbol in channel_model(kind, channel).symbols)
     ]
     return tuple(named) or CHANNELS[kind]
 
@@ -261,9 +261,11 @@ def stated_values(settings: TurntableSettings, channel: ChannelModel) -> Array:
 
     Of those it does not state, the gain is 1 where the output is in the unit of its input; all others are 0.
     """
-    stated, dimension = settings.instrument.coefficients, settings.instrument.unit.dimension
+    coefficients, dimension = settings.instrument.coefficients, settings.instrument.unit.dimension
     gain = 1.0 if dimension in ("rate", "acceleration") else 0.0
-    return np.array([stated.get(symbol, gain if symbol in UNIT_GAINS else 0.0) for symbol in channel.symbols])
+    return np.array(
+        [coefficients.get(symbol, gain if symbol in UNIT_GAINS else 0.0) for symbol in channel.symbols]
+    )
 
 
 UNIT_GAINS = ("k_x", "kY_y", *(f"{k}_{i}" for k in ("S", "K1") for i in "xyz"))

@@ -37,7 +37,7 @@ class Scatter:
 
 @dataclass(frozen=True, eq=False)
 class _Likelihood:
-    """Of the variances of the noise: ``value`` its logarithm, ``slope`` (c,) and ``information`` (c, c)."""
+    """Likelihood of the variances of the noise: ``value`` its logarithm, ``slope`` (c,) and ``information`` (c, c)."""
 
     value: float
     slope: Array
@@ -54,12 +54,12 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
     table : Weights without noise
     noise : (c,) standard deviations that are stated, None where they are not
     floor : (c,)
-        Least standard deviation that is told from none; a stated one below it counts as that.
+        Least standard deviation; a smaller one, stated or estimated, counts as this.
     """
     free = np.array([each is None for each in noise])
     low = 2.0 * np.log(floor)
-    stated = np.array([1.0 if each is None else each for each in noise])
-    start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), stated), floor))
+    std = np.array([1.0 if each is None else each for each in noise])
+    start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), std), floor))
     dof = np.full(len(free), np.inf)
     if not free.any():
         return Scatter(np.exp(0.5 * start), dof)

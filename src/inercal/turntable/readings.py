@@ -31,7 +31,7 @@ class Readings:
     samples : (n,) rows behind each reading
     u_mean : (c,) standard deviation of a reading that the scatter within the dwells explains if it is white,
         in the unit of y; NaN where a reading is a single row
-    findings : what is to be said of the record
+    findings : about the record
     """
 
     angles: Array
@@ -90,34 +90,34 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     groups, short = (_by_number(record, angles, where), []) if "position" in record else _by_angle(angles)
     if not groups:
         raise RecordError(where, "found no rows with angles, expected one or more for each position")
-    found = _averaged(angles, values, groups, channels, columns[0].unit, where)
+    means = _averaged(angles, values, groups, channels, columns[0].unit, where)
     if short:
-        said = (
+        text = (
             f"{counted(len(short), 'stay')} of less than half the usual length: the readings there are left out; a "
             "column position that numbers the stays keeps them"
         )
         starts = [int(rows[0]) + 1 for rows in short]
-        found = replace(
-            found, findings=(*found.findings, Finding("poor_section", said, places("row", starts), harm=()))
+        means = replace(
+            means, findings=(*means.findings, Finding("poor_section", text, places("row", starts), ()))
         )
     nowhere = np.flatnonzero(~np.isfinite(_places(record, angles)) & np.isfinite(values).any(axis=1)) + 1
     if not len(nowhere):
-        return found
-    said = f"{counted(len(nowhere), 'row')} without an angle or a position number: the readings there are left out"
-    return replace(found, findings=(*found.findings, Finding("nan", said, places("row", nowhere))))
+        return means
+    text = f"{counted(len(nowhere), 'row')} without an angle or a position number: the readings there are left out"
+    return replace(means, findings=(*means.findings, Finding("nan", text, places("row", nowhere))))
 
 
 def _places(record: Record, angles: Array) -> Array:
     """A number (n,) for each row that says where it is; NaN where it does not."""
-    known = angles.sum(axis=1)
-    return np.asarray(known + record["position"].values if "position" in record else known)
+    place = angles.sum(axis=1)
+    return np.asarray(place + record["position"].values if "position" in record else place)
 
 
 def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int64]]:
     """Rows of each stretch of one position number."""
     number = record["position"].values
-    known = np.flatnonzero(np.isfinite(number) & np.isfinite(angles).all(axis=1))
-    parts = _stretches(known, np.diff(number[known]) != 0.0)
+    numbered = np.flatnonzero(np.isfinite(number) & np.isfinite(angles).all(axis=1))
+    parts = _stretches(numbered, np.diff(number[numbered]) != 0.0)
     for part in parts:
         if np.abs(_apart(angles[part], angles[part[0]])).max() > LIMITS.position_angle:
             raise RecordError(
@@ -133,24 +133,26 @@ def _by_angle(angles: Array) -> tuple[list[NDArray[np.int64]], list[NDArray[np.i
     Those among the short ones that do not move come second. The usual length is that of the stretch in which the middle
     row stands when stretches are sorted by length: a slow turn makes many short ones, but of few rows.
     """
-    known = np.flatnonzero(np.isfinite(angles).all(axis=1))
-    still = angles[known]
+    finite = np.flatnonzero(np.isfinite(angles).all(axis=1))
+    still = angles[finite]
     parts, start = [], 0
-    while start < len(known):
+    while start < len(finite):
         stop = _departure(still, start)
-        parts.append(known[start:stop])
+        parts.append(finite[start:stop])
         start = stop
     if not parts:
         return [], []
     lengths = np.sort([len(part) for part in parts])
-    usual = lengths[np.searchsorted(np.cumsum(lengths), 0.5 * len(known))]
+    usual = lengths[np.searchsorted(np.cumsum(lengths), 0.5 * len(finite))]
     long = [part for part in parts if len(part) >= LIMITS.stay_length * usual]
     return long, [part for part in parts if len(part) < LIMITS.stay_length * usual and _at_rest(angles[part])]
 
 
 def _at_rest(angles: Array) -> bool:
-    """Whether most of three rows or more stand still: those of a turn take all the room that a position has, which puts
-    their median a quarter of it from the middle one."""
+    """True if most of three rows or more stand still.
+
+    Rows of a turn fill the whole angle of a position, so that their median lies a quarter of it from the middle one.
+    """
     away = np.abs(_apart(angles, angles[len(angles) // 2]))
     return len(angles) > 2 and bool(np.median(away, axis=0).max() < 0.15 * LIMITS.position_angle)
 
@@ -189,23 +191,23 @@ def _averaged(
     scatter, freedom = np.zeros(values.shape[1]), np.zeros(values.shape[1])
     missing = 0
     for k, rows in enumerate(groups):
-        known = np.isfinite(values[rows])
-        count = known.sum(axis=0)
+        finite = np.isfinite(values[rows])
+        count = finite.sum(axis=0)
         if not count.all():
             channel = channels[int(np.argmin(count))]
             raise RecordError(
                 where, f"{channel} has no number at position {k + 1} of {len(groups)}, expected one for each"
             )
-        missing += int((~known).sum())
-        y[k] = np.where(known, values[rows], 0.0).sum(axis=0) / count
-        scatter += np.square(np.where(known, values[rows] - y[k], 0.0)).sum(axis=0)
+        missing += int((~finite).sum())
+        y[k] = np.where(finite, values[rows], 0.0).sum(axis=0) / count
+        scatter += np.square(np.where(finite, values[rows] - y[k], 0.0)).sum(axis=0)
         freedom += count - 1
     samples = np.array([len(rows) for rows in groups])
     with np.errstate(divide="ignore", invalid="ignore"):
         u_mean = np.sqrt(scatter / freedom / np.mean(samples))
     findings = []
     if missing:
-        said = f"{counted(missing, 'value')} within the dwells are no numbers: the means are over the others"
-        findings.append(Finding("nan", said))
+        text = f"{counted(missing, 'value')} within the dwells are no numbers: the means are over the others"
+        findings.append(Finding("nan", text))
     still = [angles[rows[0]] + _apart(angles[rows], angles[rows[0]]).mean(axis=0) for rows in groups]
     return Readings(np.array(still), channels, unit, y, samples, u_mean, tuple(findings))

@@ -46,10 +46,10 @@ class Regression:
     angles : (n, joints) rad
     c : (p,) linear coefficients [output per monomial]
     covariance : (p, p) of them
-    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less what is stated
+    gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less the stated terms
     residuals : (n, c) readings minus model at the nominal attitudes
     chi2, dof : weighted sum of squares, prior of the constant errors included, and its degrees of freedom
-    noise : (c,) standard deviation of a reading that is not the table's doing
+    noise : (c,) standard deviation of a reading beside the table's part
     noise_dof : (c,) its degrees of freedom; inf where it was stated
     slopes : (n, c, k) derivatives of the readings with respect to all errors of the table
     beside : (n, c, b) change of the readings by one standard uncertainty of each input beside the table
@@ -94,24 +94,24 @@ class Solution:
 
 
 @dataclass(frozen=True)
-class Known:
-    """What the plan lets a channel say: rank and null vectors of its terms, ``words`` for each null vector."""
+class Identified:
+    """Identifiability of the terms of a channel: rank and null vectors, ``words`` for each null vector."""
 
     identifiability: Identifiability
     words: tuple[str, ...]
 
 
-def known(model: TableModel, angles: Array) -> tuple[Known, ...]:
+def identify_channels(model: TableModel, angles: Array) -> tuple[Identified, ...]:
     """Rank and null vectors of each channel at these positions."""
     rows = model.rows(angles)
-    found = []
+    channels = []
     for k, (channel, block) in enumerate(zip(model.channels, model.blocks, strict=True)):
         own = identify(rows[:, k, block], channel.symbols)
-        found.append(Known(own, _null_words(own, full_inputs(model, channel))))
-    return tuple(found)
+        channels.append(Identified(own, _null_words(own, full_inputs(model, channel))))
+    return tuple(channels)
 
 
-def worst_rank(seen: Sequence[Known]) -> tuple[int, int]:
+def worst_rank(seen: Sequence[Identified]) -> tuple[int, int]:
     """Rank and number of terms of the channel that lacks most; of the largest one where none lacks any."""
     pairs = [(each.identifiability.rank, len(each.identifiability.names)) for each in seen]
     return max(pairs, key=lambda pair: (pair[1] - pair[0], pair[1]))
@@ -168,7 +168,7 @@ def fit(
     Parameters
     ----------
     model : TableModel
-        Whose terms the positions identify (see `known`).
+        Whose terms the positions identify (see `identify_channels`).
     angles : (n, joints) rad
     y : (n, c) readings
     noise : (c,) standard deviation of a reading; None where it is to be estimated from the scatter
@@ -193,8 +193,8 @@ def fit(
         if not np.isfinite(c).all():
             break
         table = weights(model, angles, c, np.zeros(channels), samples=samples)
-        found = scatter(rows, y, table, noise, np.maximum(least, least_noise(table.within)))
-        sigma = found.std
+        noise_fit = scatter(rows, y, table, noise, np.maximum(least, least_noise(table.within)))
+        sigma = noise_fit.std
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
         change, c = np.abs(solution.c - c), solution.c
         before, u = u, np.sqrt(np.diag(solution.joint)[:p])
@@ -203,7 +203,7 @@ def fit(
     else:
         settled = bool((u <= RUNAWAY * before).all())
     if not (
-        settled and np.isfinite(c).all() and np.isfinite(solution.joint).all() and (found.dof > 0.0).all()
+        settled and np.isfinite(c).all() and np.isfinite(solution.joint).all() and (noise_fit.dof > 0.0).all()
     ):
         raise np.linalg.LinAlgError("the weights of the readings do not settle")
     constant = np.flatnonzero([error.scope.constant for error in model.chain.errors])
@@ -218,7 +218,7 @@ def fit(
         solution.chi2,
         n * channels - p,
         sigma,
-        found.dof,
+        noise_fit.dof,
         model.by_errors(angles, c),
         beside_inputs(model, angles, c),
         samples,

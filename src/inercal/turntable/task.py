@@ -1,4 +1,4 @@
-"""What the commands run on a turntable study: a calibration of a record, a simulated record, a design."""
+"""The tasks of a turntable study: a calibration of a record, a simulated record, a design."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ def calibrate(
         timing = {"solve": time.perf_counter() - clock}
         return replace(tested, estimate=replace(tested.estimate, timing=timing))
     progress("averaging over the positions")
-    found = readings(record, settings.chain.joints, settings.instrument.kind)
-    settings = _with_unit(settings, found)
+    means = readings(record, settings.chain.joints, settings.instrument.kind)
+    settings = _with_unit(settings, means)
     progress("fitting")
-    fitting = fit_readings(found, settings)
-    estimate = assemble(record, found, fitting, settings)
+    fitting = fit_readings(means, settings)
+    estimate = assemble(record, means, fitting, settings)
     timed = replace(estimate, timing={"solve": time.perf_counter() - clock})
-    return Calibration(timed, found, fitting)
+    return Calibration(timed, means, fitting)
 
 
 def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
@@ -84,13 +84,15 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
     return made(settings, rng)
 
 
-def _with_unit(settings: TurntableSettings, found: Readings) -> TurntableSettings:
+def _with_unit(settings: TurntableSettings, means: Readings) -> TurntableSettings:
     """The settings with the record's unit; refused where values were stated for another."""
-    stated = settings.instrument
-    if stated.unit.dimension != found.unit.dimension and (stated.noise is not None or stated.coefficients):
+    instrument = settings.instrument
+    if instrument.unit.dimension != means.unit.dimension and (
+        instrument.noise is not None or instrument.coefficients
+    ):
         raise StudyError(
             "instrument.unit",
-            f"noise or coefficients are stated for outputs in {stated.unit.symbol}, and the record's are in "
-            f"{found.unit.symbol}, expected the same kind of unit",
+            f"noise or coefficients are stated for outputs in {instrument.unit.symbol}, and the record's are in "
+            f"{means.unit.symbol}, expected the same kind of unit",
         )
-    return replace(settings, instrument=replace(stated, unit=found.unit))
+    return replace(settings, instrument=replace(instrument, unit=means.unit))

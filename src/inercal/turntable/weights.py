@@ -1,4 +1,4 @@
-"""What the readings of a test are uncertain by: covariance redrawn at each position, and what is constant."""
+"""Covariance of the readings of a test: the part redrawn at each position, and the part constant over the test."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Samples: TypeAlias = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """What the readings are uncertain by.
+    """Covariance of the readings.
 
     ``within`` (n, c, c) covariance redrawn at each position, noise and table; ``common`` (n, c, q) derivatives
     with respect to what is constant, in its standard deviations: errors of the table, then inputs beside it.
@@ -86,8 +86,8 @@ def least_noise(within: Array) -> Array:
 
 def beside_inputs(model: TableModel, angles: Array, c: Array) -> Array:
     """Change (n, c, b) of the readings by one standard uncertainty of each input beside the table."""
-    found, columns = model.beside(angles, c)
-    return np.asarray(columns * np.array([each.u for each in found]))
+    inputs, columns = model.beside(angles, c)
+    return np.asarray(columns * np.array([each.u for each in inputs]))
 
 
 def weights_of(

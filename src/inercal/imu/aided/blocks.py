@@ -1,4 +1,4 @@
-"""Means of a triad over short blocks of time, and what the table says it should have measured in them."""
+"""Means of a triad over short blocks of time, and the motion of the table in the same blocks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Blocks:
         return np.asarray(self.nodes[:, -1] - self.nodes[:, 0])
 
     def only(self, kept: NDArray[np.bool_]) -> Blocks:
-        """Those of a mask (n,)."""
+        """The blocks of a mask (n,)."""
         return replace(
             self,
             y=self.y[kept],
@@ -106,7 +106,7 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
 
 
 def _within(nodes: Array, rests: Array) -> NDArray[np.bool_]:
-    """Whether blocks lie within a rest."""
+    """True (n,) for blocks within a rest of the table."""
     if not len(rests):
         return np.zeros(len(nodes), dtype=bool)
     k = np.clip(np.searchsorted(rests[:, 0], nodes[:, 0], side="right") - 1, 0, None)
@@ -115,7 +115,7 @@ def _within(nodes: Array, rests: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the table says of blocks, for angles that come ``shift`` [s] late.
+    """Mean motion of the table in each block, for angles that come ``shift`` [s] late.
 
     ``rate`` (n, 3) [rad/s] mean rate of the table on the instrument's axes, without earth rate; ``C_bn`` (n, 3, 3)
     mean of the attitude, which takes gravity and earth rate to these axes; ``rate_slope`` and ``C_slope`` their
@@ -131,7 +131,10 @@ class Reference:
 
 
 def reference(blocks: Blocks, motion: Motion, shift: float) -> Reference:
-    """Angles, not rates, are integrated: noise of the encoders stays at the ends of a turn."""
+    """The motion of the table in blocks.
+
+    Angles, not rates, are integrated: noise of the encoders stays at the ends of a turn.
+    """
     C_nodes = motion.attitude(blocks.nodes + shift)
     turn = small_turn(np.swapaxes(C_nodes[:, :-1], -1, -2) @ C_nodes[:, 1:])
     C_bn = np.swapaxes(motion.attitude(blocks.samples + shift).mean(axis=1), -1, -2)

@@ -74,11 +74,13 @@ def calibrate_aided(
     motion = motion_of(record, options.chain)
     rests = motion.rests()
     triads = [record.triad("acc")]
-    said = []
+    findings = []
     if any(f"gyro_{axis}" in record for axis in "xyz"):
         triads.append(record.triad("gyro"))
     else:
-        said.append(Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated"))
+        findings.append(
+            Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated")
+        )
     blocks = [cut(triad, motion, rests) for triad in triads]
     late = lag(blocks[1], motion) if len(blocks) > 1 else 0.0
     if late != 0.0:
@@ -90,10 +92,10 @@ def calibrate_aided(
         sensor, x = each.triad.sensor, expected(each, motion)
         scales[sensor] = 1.0 / each.triad.unit.factor
         if tells(sensor, x):
-            found = agreement(each.y, x)
-            if found.miss > MISFIT:
-                wrong.append(f"{sensor} leaves {100.0 * found.miss:.0f} %")
-            scales[sensor] = found.scale / (settings.site.gravity if sensor == "acc" else 1.0)
+            match = agreement(each.y, x)
+            if match.miss > MISFIT:
+                wrong.append(f"{sensor} leaves {100.0 * match.miss:.0f} %")
+            scales[sensor] = match.scale / (settings.site.gravity if sensor == "acc" else 1.0)
     bad = None
     if travel(motion) < LIMITS.table_travel:
         said_of_it = (
@@ -104,34 +106,34 @@ def calibrate_aided(
     elif wrong:
         bad = Status.INCONSISTENT, _contradiction(wrong, blocks, motion)
     if bad is not None:
-        estimate = without_fit(record, settings, *bad, said=(*said, *motion.findings))
+        estimate = without_fit(record, settings, *bad, said=(*findings, *motion.findings))
         return AidedCalibration(timed(estimate, clock), motion, rests)
     progress("fitting all sensors")
-    known = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
+    layout = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
     names = {each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity) for each in blocks}
 
     def fitted() -> Fit:
-        sides = [side_of(each, motion, rests, known) for each in blocks]
-        return fit(sides, motion, known, settings.site.gravity, names)
+        sides = [side_of(each, motion, rests, layout) for each in blocks]
+        return fit(sides, motion, layout, settings.site.gravity, names)
 
     done = fitted()
     knocked = knocks(done)
     if any(wrong.any() for wrong in knocked.values()):
-        said += [
+        findings += [
             _knocked(each, knocked[each.triad.sensor]) for each in blocks if knocked[each.triad.sensor].any()
         ]
         blocks = [each.only(~knocked[each.triad.sensor]) for each in blocks]
         done = fitted()
-    estimate = assemble(record, motion, rests, done, late, settings, said)
+    estimate = assemble(record, motion, rests, done, late, settings, findings)
     return AidedCalibration(timed(estimate, clock), motion, rests, done)
 
 
 def _contradiction(wrong: list[str], blocks: list[Blocks], motion: Motion) -> str:
     """Outputs that do not follow the table, and what would make sense of them."""
-    found = list(cures(blocks, motion))
+    remedies = list(cures(blocks, motion))
     what = "check the order, signs and units of the angles and of the sensors' axes, and the mounting"
-    if found:
-        what = "all would fit if " + ", or if ".join(found)
+    if remedies:
+        what = "all would fit if " + ", or if ".join(remedies)
     unexplained = f"{' and '.join(wrong)} of its variation unexplained"
     return f"the outputs do not follow the table's angles ({unexplained}): {what}"
 

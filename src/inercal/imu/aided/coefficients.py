@@ -1,4 +1,4 @@
-"""From the unknowns of the fit to the coefficients of the instrument, with everything that makes them uncertain."""
+"""The coefficients of the instrument from the unknowns of the fit, with their sources of uncertainty."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def names_of(triads: tuple[str, ...], g_sensitivity: bool) -> tuple[str, ...]:
 def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]:
     """Values (p,), their derivatives (p, P) by the unknowns, and variances (p,) of their own."""
     P = len(fit.x)
-    found: dict[str, tuple[float, Array, float]] = {}
+    by_name: dict[str, tuple[float, Array, float]] = {}
     for k, sensor in enumerate(fit.sensors):
         triad, i = sensor.side.sensor, "xyz"[k % 3]
         bias, scale, cross = _LETTERS[triad]
         row = np.zeros(P)
         row[sensor.equation.index] = -sensor.whitened.mean[:-1]
-        found[f"{bias}_{i}"] = (sensor.bias, row, sensor.whitened.mean_variance)
+        by_name[f"{bias}_{i}"] = (sensor.bias, row, sensor.whitened.mean_variance)
         places = fit.unknowns.places[f"gain {triad}"][3 * (k % 3) : 3 * (k % 3) + 3]
         own = places[k % 3]
         S = fit.x[own]
@@ -47,10 +47,10 @@ def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]
             if place != own:
                 row[own] = -value / S**2
                 value = value / S
-            found[f"{scale}_{i}" if place == own else f"{cross}_{i}{j}"] = (float(value), row, 0.0)
+            by_name[f"{scale}_{i}" if place == own else f"{cross}_{i}{j}"] = (float(value), row, 0.0)
     for name, place in zip(GYRO_G_SENSITIVITY, fit.unknowns.places.get("gain G", ()), strict=False):
-        found[name] = (float(fit.x[place]), np.eye(P)[place], 0.0)
-    chosen = [found[name] for name in names]
+        by_name[name] = (float(fit.x[place]), np.eye(P)[place], 0.0)
+    chosen = [by_name[name] for name in names]
     return (
         np.array([value for value, _, _ in chosen]),
         np.array([row for _, row, _ in chosen]),
@@ -59,7 +59,7 @@ def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]
 
 
 def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[TypeA]:
-    """What the noise in the data does to the coefficients: white noise and the wander of the biases, by triad.
+    """Uncertainties of the coefficients by noise in the data: white noise and wander of the biases, by triad.
 
     ``rows`` (p, n) derivatives of the coefficients ``names`` (p,) by the unknowns of the fit; ``own`` (p,) variance
     that a coefficient has beside them.
@@ -100,11 +100,12 @@ def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[Ty
 def type_b(
     fit: Fit, rows: Array, names: tuple[str, ...], values: Array, site: Site, clock_u: float
 ) -> list[TypeB]:
-    """What is known from elsewhere: gravity and the clock, earth rate, the errors of the table.
+    """Uncertainties of the coefficients by inputs: gravity, the clock, earth rate, the errors of the table.
 
-    Gravity sets the scale of specific force, the clock, known to the part ``clock_u``, that of rate. Earth rate and the
-    errors of the table are unknowns of the fit with a prior; what the data do not tell of them is left here. ``rows``
-    and ``names`` as in `type_a`, ``values`` (p,) of the coefficients in SI.
+    Gravity sets the scale of specific force, the clock, with the relative standard uncertainty ``clock_u``, that of
+    rate. Earth rate and the errors of the table are unknowns of the fit with a prior; the part of their uncertainty
+    that the data leave is listed here. ``rows`` and ``names`` as in `type_a`, ``values`` (p,) of the coefficients in
+    SI.
     """
 
     def scaled(factor: float, *prefixes: str) -> Array:
@@ -115,16 +116,16 @@ def type_b(
     sources = [TypeB(each.source, each.u, each.unit, by_gravity * each.sensitivity) for each in site.inputs]
     if clock_u > 0.0 and "S_x" in names:
         sources.append(TypeB("time base", clock_u, "1", scaled(1.0, "S_")))
-    known = fit.unknowns
+    layout = fit.unknowns
     gain = rows @ fit.covariance
     variance = np.einsum("pi,ij,pj->p", rows, fit.covariance, rows)
-    for name, places in known.places.items():
-        u = float(np.max(known.sd[places]))
+    for name, places in layout.places.items():
+        u = float(np.max(layout.sd[places]))
         # an error with a value in each position has others in the next test
-        redrawn = name not in known.stated or (len(places) > 1 and name != "earth rate")
-        source = TypeB(name, u, known.units[name], gain[:, places] / known.sd[places] / u, redrawn)
+        redrawn = name not in layout.stated or (len(places) > 1 and name != "earth rate")
+        source = TypeB(name, u, layout.units[name], gain[:, places] / layout.sd[places] / u, redrawn)
         # priors of gains, arms and shifts are only there for order, unless the test says nothing of these
-        if name in known.stated or np.any(np.diag(source.covariance) > LIMITS.prior_share * variance):
+        if name in layout.stated or np.any(np.diag(source.covariance) > LIMITS.prior_share * variance):
             sources.append(source)
     return sources
 

@@ -50,12 +50,12 @@ class Fault:
 
 def faults(fit: Fit, motion: Motion, gravity: float) -> Iterator[Fault]:
     """All that is looked for."""
-    told = {triad: _at_fit(fit, motion, triad) for triad in fit.known}
+    told = {triad: _at_fit(fit, motion, triad) for triad in fit.identified}
     yield from _of_angles(fit, motion, gravity, told)
     yield _of_clock(fit, motion, gravity, told)
-    if "gyro" in fit.known:
+    if "gyro" in fit.identified:
         yield from _of_gyro(fit, gravity)
-    for triad in fit.known:
+    for triad in fit.identified:
         yield _memory(fit, motion, gravity, triad)
         yield from _nonlinear(fit, gravity, triad)
 

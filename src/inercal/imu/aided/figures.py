@@ -26,7 +26,7 @@ def pictures(calibration: AidedCalibration) -> list[Picture]:
     """Draw what there is to see of a calibration, of any status; without a fit there is only the table."""
     drawn = [_test(calibration)]
     if calibration.fit is not None:
-        drawn += [_biases(calibration.fit, calibration.rests, triad) for triad in calibration.fit.known]
+        drawn += [_biases(calibration.fit, calibration.rests, triad) for triad in calibration.fit.identified]
     if calibration.estimate.names:
         drawn += [correlation(calibration.estimate), budget(calibration.estimate)]
     return drawn

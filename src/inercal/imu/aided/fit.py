@@ -58,7 +58,7 @@ class Sensor:
 class Fit:
     """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, three of each triad.
 
-    ``references`` by triad; ``known`` by triad what the test, on a perfect table, tells of its gains.
+    ``references`` by triad; ``identified`` by triad the identifiability of its gains on a perfect table.
     """
 
     unknowns: Unknowns
@@ -66,14 +66,14 @@ class Fit:
     covariance: Array
     sensors: Sequence[Sensor]
     references: Mapping[str, Reference]
-    known: Mapping[str, Identifiability]
+    identified: Mapping[str, Identifiability]
     converged: bool
 
 
 def fit(
     sides: Sequence[Side],
     motion: Motion,
-    known: Unknowns,
+    layout: Unknowns,
     gravity: float,
     names: Mapping[str, tuple[str, ...]],
 ) -> Fit:
@@ -84,40 +84,40 @@ def fit(
     sides : sequence of Side
         The triads.
     motion : Motion
-    known : Unknowns
+    layout : Unknowns
     gravity : float
         Of the site [m/s^2].
     names : mapping
         By triad, of its gains (9,) row by row, and of the g-sensitivities where they are estimated.
     """
-    x = known.mean.copy()
-    late = {side.sensor: known.places[f"time shift of {side.sensor}"][0] for side in sides}
+    x = layout.mean.copy()
+    late = {side.sensor: layout.places[f"time shift of {side.sensor}"][0] for side in sides}
     references = {side.sensor: reference(side.blocks, motion, 0.0) for side in sides}
     converged = False
     for rough in (True, False):
         noise: list[Levels] = []
         for _ in range(STEPS):
-            found = [
+            pairs = [
                 (side, each)
                 for side in sides
-                for each in equations(side, references[side.sensor], known, x, gravity)
+                for each in equations(side, references[side.sensor], layout, x, gravity)
             ]
             noise = noise or [
                 level
-                for first in range(0, len(found), 3)
+                for first in range(0, len(pairs), 3)
                 for level in chosen(
-                    [noise_of(side, each, known, x, rough) for side, each in found[first : first + 3]]
+                    [noise_of(side, each, layout, x, rough) for side, each in pairs[first : first + 3]]
                 )
             ]
             sensors = [
                 Sensor(side, each, level, _whiten(side, each, level))
-                for (side, each), level in zip(found, noise, strict=True)
+                for (side, each), level in zip(pairs, noise, strict=True)
             ]
-            R, right = _stacked(sensors, known, known.mean - x)
+            R, right = _stacked(sensors, layout, layout.mean - x)
             inverse = np.linalg.inv(R)
-            dx = known.sd * (inverse @ right)
+            dx = layout.sd * (inverse @ right)
             done = DONE * np.linalg.norm(inverse, axis=1) + LEAST
-            converged = bool(np.all(np.abs(dx) <= known.sd * done))
+            converged = bool(np.all(np.abs(dx) <= layout.sd * done))
             if converged:
                 break
             x = x + dx
@@ -125,17 +125,17 @@ def fit(
                 shift = float(x[late[side.sensor]])
                 if abs(shift - references[side.sensor].shift) > SAME:
                     references[side.sensor] = reference(side.blocks, motion, shift)
-    root = known.sd[:, None] * inverse
-    told = {side.sensor: _known(sensors, known, side.sensor, names) for side in sides}
-    return Fit(known, x, root @ root.T, sensors, references, told, converged)
+    root = layout.sd[:, None] * inverse
+    identified = {side.sensor: _identified(sensors, layout, side.sensor, names) for side in sides}
+    return Fit(layout, x, root @ root.T, sensors, references, identified, converged)
 
 
 def noise_of(
-    side: Side, equation: Equation, known: Unknowns, x: Array, rough: bool = False
+    side: Side, equation: Equation, layout: Unknowns, x: Array, rough: bool = False
 ) -> tuple[Levels, Levels]:
     """Noise of a sensor; ``rough`` from its steps at rest alone, while the fit is far off."""
     blocks = side.blocks
-    sd = known.sd[equation.index]
+    sd = layout.sd[equation.index]
     y = equation.residual
     floor = 1e-12 * max(float(np.max(np.abs(blocks.y))), 1e-290)
     if rough:
@@ -146,7 +146,7 @@ def noise_of(
         return level, level
     U, s, Vt = np.linalg.svd(equation.columns * sd, full_matrices=False)
     some = s > SMALL * np.std(np.diff(y))
-    prior = Vt[some] @ ((known.mean - x)[equation.index] / sd)
+    prior = Vt[some] @ ((layout.mean - x)[equation.index] / sd)
     return levels(y, U[:, some] * s[some], prior, blocks.middle, blocks.length, blocks.resting, floor)
 
 
@@ -158,49 +158,49 @@ def _whiten(side: Side, equation: Equation, level: Levels) -> Whitened:
     return whiten(columns, t, level.white(length, resting), level.wander(t, length, resting))
 
 
-def _stacked(sensors: Sequence[Sensor], known: Unknowns, from_mean: Array) -> tuple[Array, Array]:
+def _stacked(sensors: Sequence[Sensor], layout: Unknowns, from_mean: Array) -> tuple[Array, Array]:
     """Triangular factor (P, P) of all equations and priors, in units of the prior's sd, and its right-hand side."""
-    P = len(known.sd)
-    rows = [np.column_stack([np.eye(P), from_mean / known.sd])]
+    P = len(layout.sd)
+    rows = [np.column_stack([np.eye(P), from_mean / layout.sd])]
     for sensor in sensors:
         small = _triangle(sensor.whitened.rows[1:])
         wide = np.zeros((len(small), P + 1))
         index = sensor.equation.index
-        wide[:, index] = small[:, :-1] * known.sd[index]
+        wide[:, index] = small[:, :-1] * layout.sd[index]
         wide[:, -1] = small[:, -1]
         rows.append(wide)
     R = _triangle(np.vstack(rows))
     return R[:P, :P], R[:P, -1]
 
 
-def _known(
-    sensors: Sequence[Sensor], known: Unknowns, triad: str, names: Mapping[str, tuple[str, ...]]
+def _identified(
+    sensors: Sequence[Sensor], layout: Unknowns, triad: str, names: Mapping[str, tuple[str, ...]]
 ) -> Identifiability:
-    """What the test tells of the gains of a triad, whatever the other unknowns are within their priors.
+    """Identifiability of the gains of a triad, the other unknowns free within their priors.
 
     Errors of the table do not count: a large one, such as that of the mounting, which turns the frame of all sensors,
     makes the uncertainties large, but no motion would help.
     """
-    main = np.concatenate([known.places[f"gain {each}"] for each in _gains(triad, known)])
-    of_table = [known.places[name] for name in known.stated if name != "earth rate"]
-    others = np.setdiff1d(np.arange(len(known.sd)), np.concatenate([main, *of_table]))
-    rows = [np.zeros((len(others), len(known.sd)))]
+    main = np.concatenate([layout.places[f"gain {each}"] for each in _gains(triad, layout)])
+    of_table = [layout.places[name] for name in layout.stated if name != "earth rate"]
+    others = np.setdiff1d(np.arange(len(layout.sd)), np.concatenate([main, *of_table]))
+    rows = [np.zeros((len(others), len(layout.sd)))]
     rows[0][range(len(others)), others] = 1.0
     for sensor in sensors:
         if sensor.side.sensor != triad:
             continue
         index = sensor.equation.index
-        wide = np.zeros((len(sensor.whitened.rows) - 1, len(known.sd)))
-        wide[:, index] = sensor.whitened.rows[1:, :-1] * known.sd[index]
+        wide = np.zeros((len(sensor.whitened.rows) - 1, len(layout.sd)))
+        wide[:, index] = sensor.whitened.rows[1:, :-1] * layout.sd[index]
         rows.append(_triangle(wide))
     R = _triangle(np.vstack(rows)[:, np.r_[others, main]])
     own = R[len(others) :, len(others) :]
     return identify(own, names[triad], np.ones(len(main)))
 
 
-def _gains(triad: str, known: Unknowns) -> tuple[str, ...]:
+def _gains(triad: str, layout: Unknowns) -> tuple[str, ...]:
     """Groups of gains of a triad."""
-    return (triad, "G") if triad == "gyro" and "gain G" in known.places else (triad,)
+    return (triad, "G") if triad == "gyro" and "gain G" in layout.places else (triad,)
 
 
 def _triangle(rows: Array) -> Array:

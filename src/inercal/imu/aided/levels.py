@@ -45,7 +45,7 @@ class Levels:
 
 
 def turning(t: Array, length: Array, resting: Flags) -> Flags:
-    """Whether the table turns between the middles of each block and the one before (n,), the first aside."""
+    """True (n,) where the table turns between the middles of a block and the one before; False for the first."""
     still = resting[1:] & resting[:-1] & (np.diff(t) < 1.5 * length[1:])
     return np.append(False, ~still)
 
@@ -79,7 +79,7 @@ def levels(
         Middles and lengths of the blocks.
     resting : (n,)
     floor : float
-        Least standard deviation of a block that is told from none [output].
+        Least standard deviation of a block [output]; smaller ones count as this.
     """
     near = np.diff(t) < 1.5 * length[1:]
     each = np.square(np.diff(residual)) / (1.0 / length[1:] + 1.0 / length[:-1])
@@ -148,6 +148,8 @@ def _restricted(columns: Array, prior: Array, t: Array, white: Array, walk: Arra
     own = gram[:-1, :-1] + np.eye(len(prior))
     length = np.sqrt(np.diag(own))
     factor = np.linalg.cholesky(own / np.outer(length, length) + 1e-12 * np.eye(len(prior)))
-    told = np.linalg.solve(factor, right / length)
+    projected = np.linalg.solve(factor, right / length)
     volume = 2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(length).sum()
-    return -0.5 * float(np.log(done.size[1:]).sum() + volume + gram[-1, -1] + prior @ prior - told @ told)
+    return -0.5 * float(
+        np.log(done.size[1:]).sum() + volume + gram[-1, -1] + prior @ prior - projected @ projected
+    )

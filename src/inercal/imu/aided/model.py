@@ -1,4 +1,4 @@
-"""Everything that is not known of an IMU on a table, and the linear equations of each sensor in it.
+"""The unknowns of an IMU on a table, and the linear equations of each sensor in them.
 
     accelerometer i :  y = B_i (f + A r_i) + bias ,    gyro i :  y = B_i (omega + C h) + G_i f + bias
 
@@ -26,7 +26,7 @@ from inercal.imu.aided_settings import AidedSettings
 Indices = NDArray[np.int64]
 
 SHIFT_U = 1.0
-"""Prior standard deviation [s] of what the angles come late by, after a search in whole blocks."""
+"""Prior standard deviation [s] of the delay of the angles, after a search in whole blocks."""
 
 ARM_U = 0.5
 """Prior standard deviation [m] of the place of a sensor beside the crossing of the axes, along each axis."""
@@ -118,22 +118,22 @@ class Side:
         return self.rate_errors + np.cross(rate[:, :, None], self.errors, axis=1)
 
 
-def side_of(blocks: Blocks, motion: Motion, rests: Array, known: Unknowns) -> Side:
+def side_of(blocks: Blocks, motion: Motion, rests: Array, layout: Unknowns) -> Side:
     """Prepare a triad."""
     at = {
         k: _turns(motion, t, rests)
         for k, t in enumerate((blocks.nodes[:, 0], blocks.middle, blocks.nodes[:, -1]))
     }
-    names = [error.name for error in motion.chain.errors if error.name in known.places]
-    places = np.concatenate([known.places[name] for name in names]) if names else np.zeros(0, dtype=np.int64)
+    names = [error.name for error in motion.chain.errors if error.name in layout.places]
+    places = np.concatenate([layout.places[name] for name in names]) if names else np.zeros(0, dtype=np.int64)
     change = (at[2] - at[0]) / blocks.length[:, None, None]
     return Side(blocks.triad.sensor, blocks, at[1], change, places)
 
 
 def _turns(motion: Motion, t: Array, rests: Array) -> Array:
     """(n, 3, Q): turn of the instrument by unit errors at times t."""
-    found = [nodes.slopes[:, :, None] * nodes.hats[:, None, :] for nodes in error_nodes(motion, t, rests)]
-    return np.concatenate(found, axis=-1) if found else np.zeros((len(t), 3, 0))
+    parts = [nodes.slopes[:, :, None] * nodes.hats[:, None, :] for nodes in error_nodes(motion, t, rests)]
+    return np.concatenate(parts, axis=-1) if parts else np.zeros((len(t), 3, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +145,9 @@ class Equation:
     residual: Array
 
 
-def equations(side: Side, ref: Reference, known: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
+def equations(side: Side, ref: Reference, layout: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
     """The three sensors of a triad at unknowns ``x`` (P,)."""
-    places = known.places
+    places = layout.places
     B = x[places[f"gain {side.sensor}"]].reshape(3, 3)
     force = gravity * ref.C_bn[:, :, 2]
     if side.sensor == "acc":

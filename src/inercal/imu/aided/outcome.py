@@ -59,7 +59,7 @@ def assemble(
     said: list[Finding],
 ) -> Estimate:
     """Put the estimate together."""
-    triads = tuple(fit.known)
+    triads = tuple(fit.identified)
     names = names_of(triads, settings.g_sensitivity)
     values, rows, own = coefficients(fit, names)
     sources_a = type_a(fit, rows, own, names)
@@ -121,12 +121,12 @@ def _statistics(fit: Fit, rests: Array) -> dict[str, float]:
     """Numbers about the fit."""
     found: dict[str, float] = {"rests": float(len(rests))}
     for triad, prefix in (("acc", ""), ("gyro", "gyro_")):
-        if triad in fit.known:
+        if triad in fit.identified:
             sensors = of_triad(fit, triad)
             squares = [np.mean(sensor.residual**2) for sensor in sensors]
             found |= {
-                f"{prefix}dof": float(3 * (len(sensors[0].residual) - 1) - len(fit.known[triad].names)),
-                f"{prefix}condition": fit.known[triad].condition,
+                f"{prefix}dof": float(3 * (len(sensors[0].residual) - 1) - len(fit.identified[triad].names)),
+                f"{prefix}condition": fit.identified[triad].condition,
                 f"{prefix}residual_rms": float(np.sqrt(np.mean(squares))),
             }
     return found
@@ -155,7 +155,7 @@ def rest_table(fit: Fit, motion: Motion, rests: Array) -> list[Mapping[str, Any]
     for start, end in rests:
         row: dict[str, Any] = {"start_s": float(start), "end_s": float(end)}
         row["angles_rad"] = motion.at(np.array(0.5 * (start + end))).tolist()
-        for triad in fit.known:
+        for triad in fit.identified:
             sensors = of_triad(fit, triad)
             blocks = sensors[0].side.blocks
             inside = (blocks.middle >= start) & (blocks.middle <= end)
@@ -174,7 +174,7 @@ def _conditions(record: Record, fit: Fit, settings: ImuSettings) -> dict[str, An
         "duration_s": float(blocks.nodes[-1, -1] - blocks.nodes[0, 0]),
         "rate_hz": blocks.triad.rate,
     }
-    if "gyro" in fit.known:
+    if "gyro" in fit.identified:
         rate = fit.references["gyro"].rate
         ranges["rate_about_an_axis_rad_s"] = [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()]
     return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)

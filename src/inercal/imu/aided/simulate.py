@@ -88,12 +88,12 @@ def simulate(
     dt = 1.0 / rate
     t = np.arange(0.0, sum(duration for *_, duration in program), dt)
     rests = rests_of(program)
-    drawn = chain.draw(rng, len(rests))
+    table_errors = chain.draw(rng, len(rests))
 
     def attitude(at: Array) -> Array:
         errors = np.stack(
-            [np.interp(at, rests.ravel(), np.repeat(column, 2)) for column in drawn.T], axis=-1
-        ) if drawn.shape[1] else np.zeros((len(at), 0))  # fmt: skip
+            [np.interp(at, rests.ravel(), np.repeat(column, 2)) for column in table_errors.T], axis=-1
+        ) if table_errors.shape[1] else np.zeros((len(at), 0))  # fmt: skip
         return chain.attitude(angles_at(program, chain.joints, at), errors)
 
     edges = attitude(np.append(t - 0.5 * dt, t[-1] + 0.5 * dt))
@@ -127,20 +127,20 @@ def simulate(
 
 def _values(truth: Truth, biases: Mapping[str, Array]) -> dict[str, float]:
     """True coefficients by symbol."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for sensor, model, (bias, scale, cross) in (
         ("acc", truth.acc, ("K0", "K1", "M")),
         ("gyro", truth.gyro, ("D_F", "S", "T")),
     ):
         for i, axis in enumerate("xyz"):
-            found[f"{bias}_{axis}"] = float(biases[sensor][i])
-            found[f"{scale}_{axis}"] = float(model.scale[i])
+            values[f"{bias}_{axis}"] = float(biases[sensor][i])
+            values[f"{scale}_{axis}"] = float(model.scale[i])
             for j, other in enumerate("xyz"):
                 if i != j:
-                    found[f"{cross}_{axis}{other}"] = float(model.misalignment[i, j])
-    found |= {
+                    values[f"{cross}_{axis}{other}"] = float(model.misalignment[i, j])
+    values |= {
         f"G_{i}{j}": float(truth.g_sensitivity[a, b])
         for a, i in enumerate("xyz")
         for b, j in enumerate("xyz")
     }
-    return found
+    return values

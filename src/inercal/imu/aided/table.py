@@ -100,7 +100,7 @@ def motion_of(record: Record, chain: Chain) -> Motion:
         raise RecordError(path, f"found {len(t)} rows with angles, expected the table's angles over the test")
     angles = np.unwrap(values, axis=0)
     wrong = [_glitches(column) for column in angles.T]
-    said = tuple(
+    findings = tuple(
         Finding(
             "outlier",
             f"{counted(len(rows), 'reading')} of {joint} far from both neighbours, at t {times(t[rows])} s: left out",
@@ -119,7 +119,7 @@ def motion_of(record: Record, chain: Chain) -> Motion:
             f"{chain.joints[joint]} jumps by {jump:.4g} deg at t {t[row]:.2f} s, expected the angles that the table "
             "passes through, as its encoders give them",
         )
-    return Motion(chain, t, angles, path, said)
+    return Motion(chain, t, angles, path, findings)
 
 
 def forward(t: Array, name: str, path: str) -> NDArray[np.int64]:

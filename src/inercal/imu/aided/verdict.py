@@ -30,7 +30,7 @@ def verdict(
     ``values`` and standard uncertainties ``u`` of the coefficients by name, these without ``faults``, which are what
     was found in the residuals.
     """
-    triads = tuple(fit.known)
+    triads = tuple(fit.identified)
     limit = np.array(list(u.values()))
     for fault in faults:
         if fault.part > LIMITS.fault_part and np.any(np.abs(fault.shift) > LIMITS.fault_shift * limit):
@@ -54,7 +54,7 @@ def verdict(
                 "instrument that is not fixed to it, outputs that saturate or are not linear)",
             )
     for triad in triads:
-        known = fit.known[triad]
+        known = fit.identified[triad]
         weak = [name for name in known.names if _relative(name, values, u) > LIMITS.unknown_coefficient_u]
         if weak:
             return (
@@ -62,7 +62,7 @@ def verdict(
                 f"the test says next to nothing of {counted_names(weak)} ({_least(fit, triad)}): {_cure(fit, triad)}",
             )
     for triad in triads:
-        known = fit.known[triad]
+        known = fit.identified[triad]
         if known.condition > LIMITS.condition:
             term = known.leading_term()
             return (
@@ -72,7 +72,7 @@ def verdict(
             )
     if not fit.converged:
         return Status.NOT_CONVERGED, "the fit of all sensors together did not settle: look at the residuals"
-    conditions = ", ".join(f"{fit.known[triad].condition:.1f} ({_WORDS[triad]})" for triad in triads)
+    conditions = ", ".join(f"{fit.identified[triad].condition:.1f} ({_WORDS[triad]})" for triad in triads)
     return (
         Status.OK,
         f"{len(values)} coefficients from {counted(rests, 'rest')} and the turns between; condition {conditions}",
@@ -157,7 +157,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
     """Findings about clocks and biases, saturation, and faults found in the residuals."""
     for fault in faults:
         yield Finding(fault.code, f"{fault.message}; the uncertainties allow for it", harm=())
-    for triad in fit.known:
+    for triad in fit.identified:
         blocks = of_triad(fit, triad)[0].side.blocks
         if blocks.clipped:
             lost = ", ".join(f"{triad}_{axis} {count}" for axis, count in blocks.clipped.items())
@@ -179,7 +179,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
             "table that are not stated, or hysteresis; the uncertainties use it",
             harm=(),
         )
-    for triad in fit.known:
+    for triad in fit.identified:
         group = f"time shift of {triad}"
         own = float(fit.x[fit.unknowns.places[group][0]])
         shift, u = own + lag, float(standard_uncertainty(fit, group)[0])
@@ -191,7 +191,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
                 f"{_WORDS[triad]}: corrected",
                 harm=(),
             )
-    for triad in fit.known:
+    for triad in fit.identified:
         sensors = of_triad(fit, triad)
         moved = [
             f"{axis} {sensor.noise.walk * np.sqrt(np.ptp(sensor.side.blocks.middle)):.2g}"

@@ -40,7 +40,7 @@ class FerrarisCalibration:
     gyro: Triad
     sections: Sections
     readings: Readings | None = None
-    found: Matrices | None = None
+    solution: Matrices | None = None
     scatter: Scatter | None = None
 
 
@@ -97,35 +97,35 @@ def calibrate_ferraris(
     if wrong:
         estimate = without_sections(record, acc, sections, settings, wrong)
         return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections)
-    found = matrices(readings.inputs, readings.weights)
-    carried = misses(acc, gyro, sections, found)
+    solution = matrices(readings.inputs, readings.weights)
+    carried = misses(acc, gyro, sections, solution)
     turns = sections.turns
-    against = list(contradictions((acc, gyro), found, carried, options))
+    against = list(contradictions((acc, gyro), solution, carried, options))
     if turns is not None:
         against += turns.against
     progress("carrying the uncertainties")
-    scatter = judge(readings, found, settings.site, options)
+    scatter = judge(readings, solution, settings.site, options)
     findings = [
         *against,
         *(() if turns is None else turns.findings),
         *readings.findings,
         *unused_labels(sections),
-        *([] if against else sense_finding(found, carried, options)),
+        *([] if against else sense_finding(solution, carried, options)),
         *scatter_findings(scatter, options),
     ]
-    errors = propagation(readings, found, scatter)
+    errors = propagation(readings, solution, scatter)
     estimate = assemble(record, (acc, gyro), sections, errors, settings, options, against, findings)
-    return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections, readings, found, scatter)
+    return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections, readings, solution, scatter)
 
 
 def _stamped(triad: Triad) -> Triad:
     """The triad with no values in rows without a time stamp, which get one between their neighbours."""
-    known = np.isfinite(triad.t)
-    if known.all() or not known.any():
+    stamped = np.isfinite(triad.t)
+    if stamped.all() or not stamped.any():
         return triad
-    rows = np.arange(len(known))
-    t = np.interp(rows, rows[known], triad.t[known])
-    return replace(triad, t=t, values=np.where(known[:, None], triad.values, np.nan))
+    rows = np.arange(len(stamped))
+    t = np.interp(rows, rows[stamped], triad.t[stamped])
+    return replace(triad, t=t, values=np.where(stamped[:, None], triad.values, np.nan))
 
 
 def _check(triad: Triad) -> None:

@@ -39,8 +39,8 @@ def detect(acc: Triad, gyro: Triad) -> Detected:
         return Detected((), {}, ())
     level = Level.of(acc, holds)
     bias = np.mean([np.nanmean(part(gyro, acc, hold.start, hold.stop)[1], axis=0) for hold in holds], axis=0)
-    found = motions(acc, gyro, holds, level, bias, _cuts(acc))
-    return Detected(holds, _positions(acc, holds, level), tuple(found))
+    candidates = motions(acc, gyro, holds, level, bias, _cuts(acc))
+    return Detected(holds, _positions(acc, holds, level), tuple(candidates))
 
 
 def _holds(acc: Triad, gyro: Triad) -> tuple[Dwell, ...]:
@@ -56,11 +56,11 @@ def _holds(acc: Triad, gyro: Triad) -> tuple[Dwell, ...]:
 
 
 def _calm(variance: Array) -> NDArray[np.bool_]:
-    """Where the variance is near that of the calm parts."""
-    known = variance[np.isfinite(variance)]
+    """True (n,) where the variance is near that of the calm parts."""
+    finite = variance[np.isfinite(variance)]
     return (
-        variance <= LIMITS.hold_variance * float(np.quantile(known, LIMITS.calm_quantile))
-        if known.size
+        variance <= LIMITS.hold_variance * float(np.quantile(finite, LIMITS.calm_quantile))
+        if finite.size
         else np.isfinite(variance)
     )
 
@@ -71,7 +71,7 @@ def _positions(acc: Triad, holds: tuple[Dwell, ...], level: Level) -> dict[str, 
     Biases that wander then drop out of their difference.
     """
     cosines = np.array([level.up(hold.of(acc.values)) for hold in holds]) @ UP.T
-    found: dict[str, tuple[int, int]] = {}
+    positions: dict[str, tuple[int, int]] = {}
     for k in range(0, 6, 2):
         up, down = (
             _long_enough([h for h, c in zip(holds, cosines[:, n], strict=True) if c > LIMITS.upright_cosine])
@@ -81,8 +81,8 @@ def _positions(acc: Triad, holds: tuple[Dwell, ...], level: Level) -> dict[str, 
         if up and down:
             chosen = list(min(itertools.product(up, down), key=lambda pair: _apart(*pair)))
         there = [name for name, each in zip(POSITIONS[k : k + 2], (up, down), strict=True) if each]
-        found |= {name: _without_hand(acc, hold) for name, hold in zip(there, chosen, strict=True)}
-    return found
+        positions |= {name: _without_hand(acc, hold) for name, hold in zip(there, chosen, strict=True)}
+    return positions
 
 
 def _without_hand(acc: Triad, hold: Dwell) -> tuple[int, int]:
@@ -100,12 +100,12 @@ def _without_hand(acc: Triad, hold: Dwell) -> tuple[int, int]:
 
 
 def _cuts(acc: Triad) -> NDArray[np.int64]:
-    """Where the time axis breaks."""
+    """Samples at which the time axis breaks."""
     return breaks(acc.t, 0.5 * window_samples(acc.rate) / acc.rate)
 
 
 def _long_enough(holds: list[Dwell]) -> list[Dwell]:
-    """Those at least half as long as the longest."""
+    """The holds at least half as long as the longest."""
     longest = max((hold.samples for hold in holds), default=0)
     return [hold for hold in holds if 2 * hold.samples >= longest]
 

@@ -103,10 +103,10 @@ def _pieces(triad: Triad) -> Iterator[tuple[Array, Array]]:
 
 def _positions(calibration: FerrarisCalibration, scatter: Scatter) -> Picture:
     """What the two positions of each axis leave over on the other two."""
-    assert calibration.found is not None
+    assert calibration.solution is not None
     assert calibration.readings is not None
     gravity = float(calibration.readings.inputs.gravity)
-    tilts = np.degrees(scatter.left["acc"] / np.diag(calibration.found.force_gain) / gravity)
+    tilts = np.degrees(scatter.left["acc"] / np.diag(calibration.solution.force_gain) / gravity)
     pairs = [(j, i) for j in range(3) for i in range(3) if i != j]
     labels = [f"{'xyz'[j]}_p, {'xyz'[j]}_a\non {'xyz'[i]}" for j, i in pairs]
     expected = math.degrees(scatter.tilt) / math.sqrt(2.0)
@@ -134,8 +134,8 @@ def _positions(calibration: FerrarisCalibration, scatter: Scatter) -> Picture:
 
 def _turns(calibration: FerrarisCalibration) -> Picture:
     """The calibrated rate about the three axes in each turn."""
-    assert calibration.found is not None
-    gyro, found, rows = calibration.gyro, calibration.found, calibration.sections.gyro
+    assert calibration.solution is not None
+    gyro, found, rows = calibration.gyro, calibration.solution, calibration.sections.gyro
     with figure(WIDTH, 2.2) as page:
         panels = page.subplots(1, 3, sharey=True)
         for axes, name in zip(panels, TURNS, strict=True):

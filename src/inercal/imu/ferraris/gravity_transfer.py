@@ -1,7 +1,8 @@
 """Scale factors of the gyro without the turns: by gravity, carried from rest to rest through all motion between.
 
-Where several motions may have been the turn, that says which. The verticals are those of the accelerometers, whose
-misalignments are known as well as the positions were upright: both triads' misalignments are unknowns with a prior.
+Where several motions may have been the turn, the transfer of gravity tells which. The verticals are those of the
+accelerometers, whose misalignments are as uncertain as the positions: the misalignments of both triads are unknowns
+with a prior.
 """
 
 from __future__ import annotations
@@ -45,15 +46,15 @@ class Carried:
     at_rest: Matrices
 
 
-def carry(acc: Triad, gyro: Triad, found: Detected) -> Carried:
+def carry(acc: Triad, gyro: Triad, detected: Detected) -> Carried:
     """Fit scale factors and misalignments to the verticals in all holds; the six positions must be among them."""
-    at_rest = _at_rest(acc, gyro, found)
+    at_rest = _at_rest(acc, gyro, detected)
     nothing = Carried(np.ones(3), np.full(3, np.inf), at_rest)
     model = at_rest.accelerometer
-    f = np.array([model.correct(hold.of(acc.values).mean(axis=0)) for hold in found.holds])
+    f = np.array([model.correct(hold.of(acc.values).mean(axis=0)) for hold in detected.holds])
     f /= np.linalg.norm(f, axis=1, keepdims=True)
     spans, clipped = [], clipped_rows(gyro)
-    for k, (here, there) in enumerate(itertools.pairwise(found.holds)):
+    for k, (here, there) in enumerate(itertools.pairwise(detected.holds)):
         start, stop = (int(np.searchsorted(gyro.t, acc.t[row])) for row in (here.stop - 1, there.start))
         if is_recorded(gyro, clipped, start, stop):
             spans.append((k, start, stop))
@@ -70,7 +71,7 @@ def carry(acc: Triad, gyro: Triad, found: Detected) -> Carried:
     ways = cut_turns(gyro.t, gyro.values, force, spans)
     guesses = [(*first_guess(ways, f, at_rest.rate_bias, sign * np.eye(3)), sign) for sign in (1.0, -1.0)]
     scale, _, sign = min(guesses, key=lambda guess: guess[1])
-    problem = _Problem(ways, f, at_rest, _directions(found), sign)
+    problem = _Problem(ways, f, at_rest, _directions(detected), sign)
     x, miss = np.concatenate([np.full(3, scale), np.zeros(12)]), 0.05
     for _ in range(4):
         fit = problem.solved(x, miss)
@@ -80,9 +81,9 @@ def carry(acc: Triad, gyro: Triad, found: Detected) -> Carried:
     return Carried(x[:3], np.sqrt(np.diag(fit.unit_covariance)[:3]) / x[:3], at_rest)
 
 
-def _at_rest(acc: Triad, gyro: Triad, found: Detected) -> Matrices:
-    """What the positions say, in units of g."""
-    spans = [found.positions[name] for name in POSITIONS]
+def _at_rest(acc: Triad, gyro: Triad, detected: Detected) -> Matrices:
+    """Biases and g-sensitivity by the positions, in units of g."""
+    spans = [detected.positions[name] for name in POSITIONS]
     force = np.array([np.nanmean(acc.values[start:stop], axis=0) for start, stop in spans])
     rate = np.array([np.nanmean(part(gyro, acc, *span)[1], axis=0) for span in spans])
     one = np.ones(3)
@@ -90,11 +91,11 @@ def _at_rest(acc: Triad, gyro: Triad, found: Detected) -> Matrices:
     return matrices(x, np.full(6, 1.0 / 6.0))
 
 
-def _directions(found: Detected) -> Array:
+def _directions(detected: Detected) -> Array:
     """(3, 3): responses of the outputs to a turn about each axis (column), over that of its own, by the motions."""
     T = np.eye(3)
     for axis in range(3):
-        own = [motion for motion in found.motions if motion.axis == axis]
+        own = [motion for motion in detected.motions if motion.axis == axis]
         if own:
             largest = max(own, key=lambda motion: abs(motion.rotation[axis])).rotation
             T[:, axis] = largest / largest[axis]

@@ -52,12 +52,12 @@ class Motion:
 
     @property
     def single(self) -> bool:
-        """Whether it is the whole of one stretch between holds."""
+        """True if the motion is the whole of one stretch between holds."""
         return self.begins and self.ends and self.stretches == 1
 
     @property
     def axis(self) -> int | None:
-        """The axis that it is about, if any."""
+        """The axis of the motion, if it is about one."""
         axis = int(np.argmax(np.abs(self.rotation)))
         size = float(np.linalg.norm(self.rotation))
         return axis if abs(self.rotation[axis]) > LIMITS.axis_share * size > 0.0 else None
@@ -65,7 +65,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """What accelerometers at ``middle`` (3,) and of this ``size`` [output] show of the vertical, uncalibrated."""
+    """Level of uncalibrated accelerometers: output ``middle`` (3,) at no force, and ``size`` of gravity [output]."""
 
     middle: Array
     size: float
@@ -158,7 +158,7 @@ def _motion(
 def _edges(
     acc: Triad, gyro: Triad, stretch: Dwell, bias: Array, noise: float, smooth: int
 ) -> tuple[list[int], list[tuple[int, int]]]:
-    """Where a stretch is taken apart: its ends and the middles of its pauses, and the pauses.
+    """The samples at which a stretch is taken apart, its ends and the middles of its pauses; and the pauses.
 
     A pause may hold a small motion between two rests, or a hand that is never quite at rest.
     """
@@ -175,8 +175,8 @@ def _edges(
         inner = [rest for rest in rests if pause.start <= rest.start and rest.stop <= pause.stop]
         pauses += [each for each in inner or [pause] if each.start > 0 and each.stop < len(t)]
     rows = np.array([(t[pause.start], t[pause.stop - 1]) for pause in pauses]).reshape(-1, 2)
-    found = stretch.start + np.searchsorted(acc.t[stretch.start : stretch.stop], rows)
-    spans = [(int(a), int(b) + 1) for a, b in found]
+    ends = stretch.start + np.searchsorted(acc.t[stretch.start : stretch.stop], rows)
+    spans = [(int(a), int(b) + 1) for a, b in ends]
     return [stretch.start, *((a + b) // 2 for a, b in spans), stretch.stop], spans
 
 

@@ -20,7 +20,7 @@ UP: NDArray[Any] = np.array([sign * row for row in np.eye(3) for sign in (1.0, -
 
 
 def in_words(name: str) -> str:
-    """What is to be done for a section."""
+    """The action that records a section, in words."""
     axis = name[0]
     if name in TURNS:
         return f"the turn about {axis}"

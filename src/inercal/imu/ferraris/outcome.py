@@ -63,7 +63,7 @@ def assemble(
         from_outside += doubtful_turns(errors, sections.turns.doubt)
     known = combine(NAMES, [*from_data, *from_outside])
     residual = np.sum([source.covariance for source in from_data], axis=0)
-    gain = np.abs(np.diag(errors.found.force_gain))
+    gain = np.abs(np.diag(errors.solution.force_gain))
     left = scatter.left["acc"] / gain
     return Estimate.of(
         _basis(record, settings, _conditions(record, triads, errors, settings, options)),

@@ -1,4 +1,4 @@
-"""What the sections say: mean outputs, integrals of the turns, the noise at rest, and what is wrong with them."""
+"""Readings of the sections: mean outputs, integrals of the turns, noise at rest, and findings about the sections."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _noise(triad: Triad, parts: list[Array]) -> AllanFit:
 
 
 def _cells(t: Array) -> Array:
-    """What each sample stands for [s]: half the way to its neighbours, at the ends a whole interval as inside.
+    """Length of time of each sample [s]: half the way to its neighbours, at the ends a whole interval as inside.
 
     With even stamps all are equal, and the integral is the sum over the rate, as Ferraris and imucal take it.
     """
@@ -127,7 +127,7 @@ def _moving(at_rest: dict[str, list[Array]]) -> Iterator[Finding]:
 def _of_turn(
     name: str, t: Array, rate: Array, clipped: bool, longest: float, options: FerrarisSettings
 ) -> Iterator[Finding]:
-    """What is wrong with a turn: ``rate`` (n, 3) its output less the bias, ``longest`` step of time [s] allowed."""
+    """Findings about a turn: ``rate`` (n, 3) its output less the bias, ``longest`` step of time [s] allowed."""
     where, axis = f"t {t[0]:.2f} to {t[-1]:.2f} s", name[0]
     gains = (f"S_{axis}", *(f"T_{i}{axis}" for i in "xyz" if i != axis))
     steps = np.diff(t)
@@ -143,7 +143,7 @@ def _of_turn(
         end = "beginning" if edges[0] == max(edges) else "end"
         code = "poor_section" if max(edges) > LIMITS.lost_rate * largest else "turn_cut"
         part = f"{100 * max(edges) / largest:.0f} % of its largest rate"
-        said = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
+        text = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
         # at a steady deceleration this part of the angle is left
         small = max(edges) ** 2 / largest**2 * abs(options.turn) < options.turn_u
-        yield Finding(code, said, where, () if code == "turn_cut" and small else gains)
+        yield Finding(code, text, where, () if code == "turn_cut" and small else gains)

@@ -1,4 +1,4 @@
-"""Eighteen equations for twelve unknowns in the positions of each sensor: what the six that are left over say.
+"""Scatter of the positions by the six equations that are left over of eighteen, for twelve unknowns of each sensor.
 
 The two positions of an axis have one mean, the bias, also in the outputs of the other axes. There the accelerometers
 show how far the positions were from upright: their scatter is the alignment. The gyro's show whether its bias stayed.
@@ -28,7 +28,7 @@ _ACROSS = ~np.eye(3, dtype=bool)
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """What the positions scatter by.
+    """Scatter of the positions.
 
     ``tilt`` [rad] the standard uncertainty of the direction of a position and ``tilt_dof`` its degrees of freedom, inf
     where it is stated; ``means`` the variances (6, 3) [output squared] of the mean outputs by sensor and ``dof`` theirs
@@ -48,7 +48,7 @@ class Scatter:
     fits: dict[str, LinearFit]
 
 
-def judge(readings: Readings, found: Matrices, site: Site, options: FerrarisSettings) -> Scatter:
+def judge(readings: Readings, solution: Matrices, site: Site, options: FerrarisSettings) -> Scatter:
     """Compare the scatter of the positions with the noise at rest, the stated alignment and earth rate."""
     x = readings.inputs
     outputs = {"acc": x.force, "gyro": x.rate}
@@ -56,22 +56,22 @@ def judge(readings: Readings, found: Matrices, site: Site, options: FerrarisSett
         s: np.maximum(readings.noise[s].variance(readings.lengths), _floor(y)) for s, y in outputs.items()
     }
     dof = {s: 3.0 * readings.noise[s].dof(float(np.median(readings.lengths))) for s in outputs}
-    tilted = _by_direction(found.force_gain * site.gravity)
-    earth = site.horizontal_rate_u**2 * _by_direction(found.rate_gain)
-    left = {"acc": _left_over(x.force, found.force_bias), "gyro": _left_over(x.rate, x.rate.mean(axis=0))}
+    tilted = _by_direction(solution.force_gain * site.gravity)
+    earth = site.horizontal_rate_u**2 * _by_direction(solution.rate_gain)
+    left = {"acc": _left_over(x.force, solution.force_bias), "gyro": _left_over(x.rate, x.rate.mean(axis=0))}
 
     # what the noise does to the means of the pairs, and to the bias taken off them
     of_pairs, of_bias = _pairs(noise["acc"]), np.diag(_pairs(noise["acc"]))
     by_tilt, squares = _pairs(tilted)[_ACROSS], left["acc"][_ACROSS] ** 2
     by_noise = (of_pairs + of_bias)[_ACROSS]
-    stated = options.alignment or 0.0
-    ratio = float(np.mean(squares / (by_noise + stated**2 * by_tilt)))
+    alignment = options.alignment or 0.0
+    ratio = float(np.mean(squares / (by_noise + alignment**2 * by_tilt)))
     rest = _all_equations(x.rate, site.gravity, noise["gyro"] + earth, "D_F", "G")
     excess = {
-        "acc": _beyond_chance(ratio, np.inf if stated else dof["acc"]),
+        "acc": _beyond_chance(ratio, np.inf if alignment else dof["acc"]),
         "gyro": _beyond_chance(rest.s2, dof["gyro"]),
     }
-    means, tilt, tilt_dof = dict(noise), stated, np.inf
+    means, tilt, tilt_dof = dict(noise), alignment, np.inf
     if options.alignment is None or excess["acc"]:
         seen = np.mean((squares - np.broadcast_to(of_bias, (3, 3))[_ACROSS]) / by_tilt)
         tilt, tilt_dof = float(np.sqrt(max(seen, np.mean(of_pairs[_ACROSS] / by_tilt)))), float(DOF)
@@ -122,7 +122,7 @@ def _left_over(outputs: Array, bias: Array) -> Array:
 
 
 def _beyond_chance(ratio: float, dof: float) -> bool:
-    """Whether a ratio of variances of `DOF` and so many degrees of freedom is too large for chance (F test)."""
+    """True if a ratio of variances of `DOF` and ``dof`` degrees of freedom is too large for chance (F test)."""
     from scipy.special import chdtrc, fdtrc
 
     p = chdtrc(DOF, DOF * ratio) if np.isinf(dof) else fdtrc(DOF, dof, ratio)

@@ -108,15 +108,15 @@ def _labelled(labels: Sequence[str], acc: Triad) -> dict[str, Integers]:
         )
     canonical = {label: _canonical(label) for label in set(labels)}
     names = np.array([canonical[label] for label in labels])
-    found = {}
+    rows_by_name = {}
     for name in NAMES:
         rows = np.flatnonzero(names == name)
         starts = rows[np.flatnonzero(np.diff(rows, prepend=-2) > 1)]
         if name.endswith("_rot") and len(starts) > 1:
             raise RecordError(path, f"found {name} in several {places('row', starts + 1)}, expected one turn")
         if len(rows):
-            found[name] = rows
-    return found
+            rows_by_name[name] = rows
+    return rows_by_name
 
 
 def _rows(name: str, ends: tuple[float, float], acc: Triad) -> Integers:
@@ -137,13 +137,13 @@ def _rows(name: str, ends: tuple[float, float], acc: Triad) -> Integers:
 
 def _recorded(name: str, rows: Integers, triad: Triad) -> Integers:
     """Rows of a section that hold numbers; raises `RecordError` where there are hardly any."""
-    found = rows[np.isfinite(triad.values[rows]).all(axis=1) & np.isfinite(triad.t[rows])]
-    if len(found) < 2:
+    recorded = rows[np.isfinite(triad.values[rows]).all(axis=1) & np.isfinite(triad.t[rows])]
+    if len(recorded) < 2:
         raise RecordError(
             triad.source.path,
-            f"section {name} has {counted(len(found), 'row')} of {triad.sensor} with numbers, expected a recording",
+            f"section {name} has {counted(len(recorded), 'row')} of {triad.sensor} with numbers, expected a recording",
         )
-    return found
+    return recorded
 
 
 def _on(gyro: Triad, acc: Triad, rows: Integers) -> Integers:

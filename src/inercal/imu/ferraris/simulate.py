@@ -19,7 +19,7 @@ from inercal.records.record import Record
 
 @dataclass(frozen=True)
 class Session:
-    """How a session goes.
+    """The course of a session.
 
     ``holds`` lengths of the six positions, ``turning`` that of a turn, ``rest`` of the pauses before and after it and
     ``way`` of the motion between sections [s]; ``rate`` of samples [Hz]; ``turn`` the stated angle [rad], ``turn_u``
@@ -117,7 +117,7 @@ def simulate_session(truth: ImuTruth, session: Session, rng: np.random.Generator
 def _outputs(
     truth: ImuTruth, session: Session, q_nb: Array, omega: Array, labels: list[str], rng: np.random.Generator
 ) -> tuple[Record, ImuTruth]:
-    """What the instrument indicates."""
+    """The record that the instrument gives, and the truth with the biases of this record."""
     to_body, n, rate = conjugate(q_nb), len(q_nb), session.rate
     if session.latitude is not None:
         north, up = earth_rate(session.latitude)

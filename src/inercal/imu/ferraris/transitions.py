@@ -1,6 +1,6 @@
-"""Between the positions the instrument was turned over: whether its gyro then moved the vertical as it should.
+"""Gravity carried from position to position through the gyro: a check of the sense of the turns.
 
-That tells in which sense the turns were made, which they cannot tell themselves.
+The turns themselves cannot tell in which sense they were made.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from inercal.imu.turns import carried, cut_turns
 from inercal.records.column import Triad
 
 
-def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tuple[float, float] | None:
+def misses(acc: Triad, gyro: Triad, sections: Sections, solution: Matrices) -> tuple[float, float] | None:
     """Root-mean-square angle [rad] between carried and measured verticals after the ways between the positions.
 
     Returns
@@ -30,7 +30,9 @@ def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tupl
     (as stated, with all turns in the other sense), or None where the ways were not recorded.
     """
     order = sorted(POSITIONS, key=lambda name: int(sections.acc[name][0]))
-    f = np.array([found.accelerometer.correct(acc.values[sections.acc[name]].mean(axis=0)) for name in order])
+    f = np.array(
+        [solution.accelerometer.correct(acc.values[sections.acc[name]].mean(axis=0)) for name in order]
+    )
     verticals = f / np.linalg.norm(f, axis=1, keepdims=True)
     spans, clipped = [], clipped_rows(gyro)
     for k, (here, there) in enumerate(itertools.pairwise(order)):
@@ -40,7 +42,7 @@ def misses(acc: Triad, gyro: Triad, sections: Sections, found: Matrices) -> tupl
     if len(spans) < LIMITS.fewest_transitions:
         return None
     turns = cut_turns(gyro.t, gyro.values, np.zeros_like(gyro.values), spans)
-    model, none = found.gyro, np.zeros((3, 3))
+    model, none = solution.gyro, np.zeros((3, 3))
     as_stated, reversed_ = (
         carried(turns, verticals, each, none) for each in (model, replace(model, scale=-model.scale))
     )

@@ -1,4 +1,4 @@
-"""One covariance for all coefficients: every error of the readings and of what is known, carried through the method.
+"""One covariance for all coefficients: every error of the readings and inputs, carried through the method.
 
 The derivatives of the closed form take each error to the coefficients. Alignment also acts in second order: a position
 tilted by d shows g cos d along its own axis, a turn about a tilted axis its angle times cos d. The method does not
@@ -29,18 +29,18 @@ class Propagation:
     """Readings and matrices with the derivatives ``by`` (33, *shape) of the coefficients, by input."""
 
     readings: Readings
-    found: Matrices
+    solution: Matrices
     scatter: Scatter
     by: dict[str, Array]
 
 
-def propagation(readings: Readings, found: Matrices, scatter: Scatter) -> Propagation:
+def propagation(readings: Readings, solution: Matrices, scatter: Scatter) -> Propagation:
     """Take the derivatives."""
-    return Propagation(readings, found, scatter, derivatives(readings.inputs, readings.weights))
+    return Propagation(readings, solution, scatter, derivatives(readings.inputs, readings.weights))
 
 
 def type_a(p: Propagation, acc_unit: str, gyro_unit: str) -> list[TypeA]:
-    """What the noise of the sensors and, where no alignment is stated, the scatter of the positions do."""
+    """Uncertainties by noise of the sensors and, where no alignment is stated, by scatter of the positions."""
     readings, scatter = p.readings, p.scatter
     rest = scatter.means["gyro"]
     noise = readings.noise["gyro"]
@@ -66,7 +66,7 @@ def _noise(source: str, by: Array, variance: Array, dof: float, unit: str) -> Ty
 
 
 def noise_covariance(p: Propagation) -> Array:
-    """(33, 33): what the noise of the sensors by its Allan fit alone would do."""
+    """(33, 33): covariance by the noise of the sensors alone, as their Allan fits have it."""
     readings, x = p.readings, p.readings.inputs
     rows = (
         ("force", "acc", readings.lengths),
@@ -86,15 +86,18 @@ def alignment(p: Propagation, tilt: float) -> Array:
     The last ten columns are of second order, and so hold a factor ``tilt``: the mean of (d1^2 + d2^2)/2 over all, which
     is tilt^2, and its standard deviation of each, which is the same.
     """
-    x, found = p.readings.inputs, p.found
+    x, solution = p.readings.inputs, p.solution
     first, second = [], []
     for k, j in enumerate(_AXIS):
-        to_force, to_rate = p.by["force"][:, k] @ found.force_gain, p.by["rate"][:, k] @ found.apparent_g
+        to_force, to_rate = (
+            p.by["force"][:, k] @ solution.force_gain,
+            p.by["rate"][:, k] @ solution.apparent_g,
+        )
         both = float(x.gravity) * (to_force + to_rate)
         first += [both[:, d] for d in range(3) if d != j]
         second.append(-both @ UP[k])
     for k in range(3):
-        turned = p.by["turned_rate"][:, k] @ found.rate_gain * float(x.angles[k] / x.durations[k])
+        turned = p.by["turned_rate"][:, k] @ solution.rate_gain * float(x.angles[k] / x.durations[k])
         first += [turned[:, d] for d in range(3) if d != k]
         second.append(-turned[:, k])
     return np.column_stack([*first, tilt * np.sum(second, axis=0), *(tilt * each for each in second)])
@@ -103,7 +106,7 @@ def alignment(p: Propagation, tilt: float) -> Array:
 def type_b(
     p: Propagation, site: Site, time_base_u: float, options: FerrarisSettings, acc_unit: str, gyro_unit: str
 ) -> list[TypeB]:
-    """What gravity, the angle of the turns, alignment, the clock, earth rate and coarse outputs do."""
+    """Uncertainties by gravity, the angle of the turns, alignment, the clock, earth rate and coarse outputs."""
     by, scatter = p.by, p.scatter
     sources = [TypeB(i.source, i.u, i.unit, by["gravity"] * i.sensitivity) for i in site.inputs]
     if options.turn_u > 0.0:
@@ -129,7 +132,7 @@ def type_b(
 
 
 def doubtful_turns(p: Propagation, doubt: Array) -> list[TypeB]:
-    """What it does that a turn may have been by up to ``doubt`` (3,) [rad] more or less (GUM F.2.3.3)."""
+    """Uncertainty by turns that may have been up to ``doubt`` (3,) [rad] larger or smaller (GUM F.2.3.3)."""
     u = doubt / math.sqrt(3.0)
     size = float(np.max(u))
     return (
@@ -141,10 +144,10 @@ def _horizontal_earth_rate(p: Propagation) -> Array:
     """(33, 18): by either horizontal component in each position and turn, the heading of each unknown."""
     columns = []
     for k, j in enumerate(_AXIS):
-        at_rest = p.by["rate"][:, k] @ p.found.rate_gain
+        at_rest = p.by["rate"][:, k] @ p.solution.rate_gain
         columns += [at_rest[:, d] for d in range(3) if d != j]
     for k, (cosine, sine) in enumerate(p.readings.swing):
-        turned = p.by["turned_rate"][:, k] @ p.found.rate_gain
+        turned = p.by["turned_rate"][:, k] @ p.solution.rate_gain
         a, b = turned[:, (k + 1) % 3], turned[:, (k + 2) % 3]
         columns += [cosine * a - sine * b, sine * a + cosine * b]
     return np.column_stack(columns)
@@ -165,7 +168,7 @@ def _coarse(p: Propagation, acc_unit: str, gyro_unit: str) -> list[TypeB]:
 
 
 def _unequal_holds(p: Propagation) -> list[TypeB]:
-    """What is left of the g-sensitivity in the gyro's bias where the positions are not equally long.
+    """Uncertainty by the g-sensitivity that stays in the gyro's bias where the positions are not equally long.
 
     The bias is the mean of all samples, as in the method; the mean specific force over them is known, but nothing is
     taken off for it.
@@ -174,5 +177,5 @@ def _unequal_holds(p: Propagation) -> list[TypeB]:
     size = float(np.linalg.norm(mean))
     if size == 0.0:
         return []
-    shift = p.by["rate"].sum(axis=1) @ p.found.apparent_g @ mean / size
+    shift = p.by["rate"].sum(axis=1) @ p.solution.apparent_g @ mean / size
     return [TypeB("unequal holds", size, "m/s^2", shift, redrawn=True)]

@@ -1,4 +1,4 @@
-"""Which of the motions about an axis was the turn, and what speaks against each of them."""
+"""Choice of the turn among the motions about each axis, with findings that speak against it."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ class Choice:
     findings: tuple[Finding, ...]
 
 
-def choose(acc: Triad, gyro: Triad, found: Detected, options: FerrarisSettings) -> Choice:
+def choose(acc: Triad, gyro: Triad, detected: Detected, options: FerrarisSettings) -> Choice:
     """The turn about each axis, as far as there is a motion that can be it.
 
     It gives the scale factor by which gravity is carried from rest to rest, where that is known; else one near the
     nominal, or of counts one like those of the other axes. Of motions that cannot be told apart one in the stated
     sense is taken, of a single stretch between holds, and the likeliest; the others make the doubt about its angle.
     """
-    known = carry(acc, gyro, found) if all(name in found.positions for name in POSITIONS) else None
-    about = {axis: [m for m in found.motions if m.axis == axis] for axis in range(3)}
+    carried = carry(acc, gyro, detected) if all(name in detected.positions for name in POSITIONS) else None
+    about = {axis: [m for m in detected.motions if m.axis == axis] for axis in range(3)}
     turns: dict[int, Motion] = {}
-    doubt, said, untold = np.zeros(3), list[tuple[bool, Finding]](), []
+    doubt, graded, untold = np.zeros(3), list[tuple[bool, Finding]](), []
     for axis, motions in about.items():
-        gains = np.array([_gain(m, axis, known, options.turn) for m in motions])
+        gains = np.array([_gain(m, axis, carried, options.turn) for m in motions])
         off, u = np.abs(gains), math.inf
-        if known is not None and known.u[axis] < LIMITS.transfer_scale_u:
-            off = off / known.scale[axis] - 1.0
-            u = math.hypot(options.turn_u / options.turn, LIMITS.turn_scale_u, float(known.u[axis]))
+        if carried is not None and carried.u[axis] < LIMITS.transfer_scale_u:
+            off = off / carried.scale[axis] - 1.0
+            u = math.hypot(options.turn_u / options.turn, LIMITS.turn_scale_u, float(carried.u[axis]))
         elif gyro.unit.dimension == "rate":
             off = off * gyro.unit.factor - 1.0
         else:
@@ -75,13 +75,13 @@ def choose(acc: Triad, gyro: Triad, found: Detected, options: FerrarisSettings) 
                 f"gravity, carried through the motion between the rests, says that the turn {TURNS[axis]} found was "
                 f"by {by:.1f} deg, not by {math.degrees(abs(options.turn)):g} deg: {ASK}, and check imu.ferraris.turn"
             )
-            said.append((True, Finding("contradiction", message, where, EVERYTHING)))
+            graded.append((True, Finding("contradiction", message, where, EVERYTHING)))
         if apart > max(LIMITS.slight_turn_difference, abs(options.turn_u / options.turn)):
             message = (
                 f"which motion is the turn {TURNS[axis]} is not certain: the one taken and the one from "
                 f"{_where(acc, motions[other])} differ by {100 * apart:.2g} %: {ASK}"
             )
-            said.append((apart > LIMITS.grave_turn_difference, Finding("turn_doubtful", message, where)))
+            graded.append((apart > LIMITS.grave_turn_difference, Finding("turn_doubtful", message, where)))
         if math.isinf(u):
             untold.append(TURNS[axis])
     if untold:
@@ -89,16 +89,16 @@ def choose(acc: Triad, gyro: Triad, found: Detected, options: FerrarisSettings) 
             "the motion between the rests does not tell by what angle the instrument was turned: that the motions "
             f"found are the whole of {', '.join(untold)} is taken for granted"
         )
-        said.append((False, Finding("turn_doubtful", message)))
-    against, findings = (tuple(f for grave, f in said if grave is each) for each in (True, False))
+        graded.append((False, Finding("turn_doubtful", message)))
+    against, findings = (tuple(f for grave, f in graded if grave is each) for each in (True, False))
     return Choice(turns, doubt, against, findings)
 
 
-def _gain(motion: Motion, axis: int, known: Carried | None, turn: float) -> float:
+def _gain(motion: Motion, axis: int, carried: Carried | None, turn: float) -> float:
     """The scale factor [output per rad/s] if this was the turn; bias and g-sensitivity are those in the positions."""
-    if known is None:
+    if carried is None:
         return float(motion.rotation[axis] / turn)
-    bias = known.at_rest.rate_bias + known.at_rest.apparent_g @ motion.up
+    bias = carried.at_rest.rate_bias + carried.at_rest.apparent_g @ motion.up
     return float((motion.integral - motion.duration * bias)[axis] / turn)
 
 

@@ -113,7 +113,7 @@ def _gyro_means(recording: Recording, poses: Poses) -> Array:
 
 
 def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | None, list[Finding]]:
-    """The turns between neighbouring poses that can be integrated, and what is said of the others."""
+    """The turns between neighbouring poses that can be integrated, and findings about the others."""
     gyro = recording.gyro
     assert gyro is not None
     longest = LIMITS.motion_gap / gyro.rate
@@ -149,14 +149,14 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
 def _calibrate_gyro(
     recording: Recording, poses: Poses, scatter: Scatter, settings: ImuSettings
 ) -> tuple[GyroFit | None, list[Finding]]:
-    """The gyro's fit, if it can be made, and what is to be said of it."""
+    """The gyro's fit, if it can be made, and findings about it."""
     if recording.gyro is None:
-        said = "the record has no gyro: only the accelerometers are calibrated"
-        return None, [Finding("gyro_missing", said)]
+        text = "the record has no gyro: only the accelerometers are calibrated"
+        return None, [Finding("gyro_missing", text)]
     findings = []
     if not poses.with_gyro:
-        said = "the gyro is so restless in most holds that the poses were found by the accelerometers alone"
-        findings.append(Finding("gyro_restless", said))
+        text = "the gyro is so restless in most holds that the poses were found by the accelerometers alone"
+        findings.append(Finding("gyro_restless", text))
     drivers = drivers_of(recording, poses, settings)
     turns, skipped = _turns(recording, poses, drivers.at_samples)
     findings += skipped
@@ -164,8 +164,8 @@ def _calibrate_gyro(
         return None, findings
     acc, means = poses.accelerometer, _gyro_means(recording, poses)
     if not np.isfinite(means).all():
-        said = "the gyro has no numbers in some poses: it is not calibrated"
-        return None, [*findings, Finding("gyro_missing", said)]
+        text = "the gyro has no numbers in some poses: it is not calibrated"
+        return None, [*findings, Finding("gyro_missing", text)]
     scale, miss = first_guess(turns, acc.directions, means[0])
     start = TriadModel(np.full(3, scale), np.eye(3), means[0])
     error, earth = force_error(acc), earth_rate_at(settings.site)
@@ -174,11 +174,11 @@ def _calibrate_gyro(
         gyro = fit_gyro(turns, means, acc.f, error, scatter.s, start, drivers, earth)
         miss = rms_miss(gyro)
     if gyro is None or not gyro.converged or miss > LIMITS.vertical_miss:
-        said = (
+        text = (
             f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
             "carried through the turns): check the gyro's signs and order of axes; it is not calibrated"
         )
         axes = axis_findings(turns, acc.directions, means[0])
-        return None, [*findings, Finding("contradiction", said, harm=EVERYTHING), *axes]
+        return None, [*findings, Finding("contradiction", text, harm=EVERYTHING), *axes]
     findings += gyro_findings(poses, drivers, means - gyro.by_earth, recording)
     return gyro, findings

@@ -1,4 +1,4 @@
-"""What the bias of the gyro may depend on, beside a constant: the specific force, and the time.
+"""Drivers of the bias of the gyro: the specific force, and the time.
 
 Bias = D_F + G f + D_R (t - t0), G and D_R where they are asked for. t0 is the mean of the times of the poses, so
 that D_F is the bias in the middle of the recording and hardly depends on whether its drift is fitted.
@@ -31,7 +31,7 @@ class Drivers:
 
 
 def drivers_of(recording: Recording, poses: Poses, settings: ImuSettings) -> Drivers:
-    """Those that the settings ask for; the recording must have a gyro."""
+    """The drivers that the settings ask for; the recording must have a gyro."""
     gyro, acc = recording.gyro, recording.accelerometer
     assert gyro is not None
     t0 = float(poses.times.mean())

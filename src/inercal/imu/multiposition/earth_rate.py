@@ -1,8 +1,8 @@
 """Earth rate in a hand-held calibration: its vertical part is known with the latitude, the rest is not.
 
 The instrument's heading is unknown, so the horizontal part is a vector of known size and unknown direction,
-fixed to the Earth. The turns tell how it lies in every pose relative to the first. Its two components (and what
-is not known of the vertical one) are unknowns of the fit with a prior: a gyro too coarse to see them keeps the
+fixed to the Earth. The turns tell how it lies in every pose relative to the first. Its two components (and the
+error of the vertical one) are unknowns of the fit with a prior: a gyro too coarse to see them keeps the
 prior, and its uncertainty; a fine one measures them.
 """
 
@@ -21,7 +21,7 @@ from inercal.instruments.triad import TriadModel
 
 @dataclass(frozen=True)
 class EarthRate:
-    """What is known of earth rate.
+    """Earth rate at a site, with its uncertainty.
 
     The ``vertical`` part [rad/s] with its standard uncertainty ``vertical_u``, and the standard deviation
     ``horizontal_u`` of each horizontal component.
@@ -33,7 +33,7 @@ class EarthRate:
 
 
 def earth_rate_at(site: Site) -> EarthRate:
-    """What a site says of earth rate."""
+    """Earth rate at a site, with its uncertainty."""
     return EarthRate(site.vertical_rate, site.vertical_rate_u, site.horizontal_rate_u)
 
 

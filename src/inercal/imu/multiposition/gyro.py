@@ -66,7 +66,7 @@ def regress_static(means: Array, regressors: Array) -> StaticRegression:
 class GyroFit:
     """The triad ``model``, ``drift`` (3, q) [output/driver], and how they came about.
 
-    ``x`` (p,) are the parameters ``names``; ``geometry`` tells what turns and poses can tell of them, whatever
+    ``x`` (p,) are the parameters ``names``; ``geometry`` is their identifiability by turns and poses, whatever
     the noise. ``walk`` is the angle random walk [rad/sqrt(s)] that explains the scatter of the turns. ``gain``
     (p, 3 m + 3 n) takes errors of the carried verticals (turn by turn, [rad]) and of the pose means (pose by
     pose, [output]) to errors of the parameters, ``rate_gain`` (p, q) the unknown parts of earth rate, each in
@@ -122,9 +122,9 @@ def fit_gyro(
     start : TriadModel
         First guess (see `first_guess`).
     drivers : Drivers
-        What the bias may depend on, in the poses; the same as in ``turns``.
+        Drivers of the bias, in the poses; the same as in ``turns``.
     earth : EarthRate
-        What is known of earth rate at the site.
+        Earth rate at the site.
     """
     names = GYRO_TRIAD + drivers.names
     p = len(names)
@@ -153,8 +153,8 @@ def fit_gyro(
         theta = x[:p]
         spread = np.tile(np.maximum(static.scatter, finest), len(f))
         vertical_error = _vertical_errors(part, verticals, size, theta) @ force_error
-        known = scatter**2 * vertical_error @ vertical_error.T
-        weigh = np.linalg.inv(np.linalg.cholesky(known + walk2 * np.diag(durations)))
+        by_verticals = scatter**2 * vertical_error @ vertical_error.T
+        weigh = np.linalg.inv(np.linalg.cholesky(by_verticals + walk2 * np.diag(durations)))
         unknown = unknown_rates(part, verticals, *unpack(theta), earth)
         x = np.concatenate([theta, np.zeros(len(unknown.sizes))])
 
@@ -167,7 +167,7 @@ def fit_gyro(
         by_earth = unknown.output(model, x[p:])
         static = regress_static(means - by_earth, drivers.at_rest)
         dof = max(1.0, 2.0 * len(turns) - _absorbed(fit, len(weigh)))
-        walk2 = _excess(left, known, durations, dof)
+        walk2 = _excess(left, by_verticals, durations, dof)
 
     gain = fit.gain()[:p]
     m, n = len(weigh), len(spread)
@@ -249,7 +249,7 @@ def _geometry(
     typical: Array,
     names: tuple[str, ...],
 ) -> Identifiability:
-    """What the turns and poses can tell whatever the noise: misses in radians, rates at rest in radians a turn."""
+    """Identifiability by turns and poses, whatever the noise: misses in radians, rates at rest in radians a turn."""
     by_parameter = carried_with_derivatives(turns, verticals, model, drift)[1]
     per_turn = float(np.median(turns.durations)) / np.tile(model.scale, len(verticals))
     J = np.concatenate([by_parameter.reshape(-1, len(names)), design * per_turn[:, None]])
@@ -291,7 +291,7 @@ def _absorbed(fit: NonlinearFit, rows: int) -> float:
     return float(np.sum((J @ fit.unit_covariance) * J))
 
 
-def _excess(miss: Array, known: Array, durations: Array, dof: float) -> float:
+def _excess(miss: Array, by_verticals: Array, durations: Array, dof: float) -> float:
     """Variance per second that brings the weighted sum of squares of ``miss`` down to ``dof``.
 
     Mandel and Paule's rule (Anal. Chem. 42 (1970) 1194) with a variance proportional to the duration; not
@@ -300,7 +300,7 @@ def _excess(miss: Array, known: Array, durations: Array, dof: float) -> float:
     root = np.sqrt(durations)
     floor = 1e-6 * float(miss @ miss) / float(np.sum(durations)) + 1e-24
     # in the eigenvectors of the known part, per second, the covariance is diagonal for every variance
-    values, vectors = np.linalg.eigh(known / np.outer(root, root))
+    values, vectors = np.linalg.eigh(by_verticals / np.outer(root, root))
     parts = (vectors.T @ (miss / root)) ** 2
 
     def surplus(variance: float) -> float:

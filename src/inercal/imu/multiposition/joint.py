@@ -85,7 +85,7 @@ def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> Joint:
 
 
 def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
-    """What the scatter in the data does to the parameters; ``gyro_unit`` is that of the gyro's output."""
+    """Uncertainties of the parameters by scatter in the data; ``gyro_unit`` is that of the gyro's output."""
     sources = [
         TypeA(
             "pose scatter", scatter.s, "m/s^2", scatter.s**2 * joint.by_force @ joint.by_force.T, scatter.dof
@@ -106,7 +106,7 @@ def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
 
 
 def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro_unit: str) -> list[TypeB]:
-    """What gravity, the record's clock, earth rate and the gyro's resolution do to the parameters.
+    """Uncertainties of the parameters by gravity, the record's clock, earth rate and the gyro's resolution.
 
     ``resolution`` (3,) [``gyro_unit``] is the step of gyro outputs too coarse for their noise, else 0: then every
     pose has the same rounding error, u = step/sqrt(12) (GUM F.2.2.1), where scatter shows nothing.
@@ -140,7 +140,7 @@ def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro
 
 
 def noise_covariance(joint: Joint, pose: Array, walk: Array, output: Array) -> Array:
-    """(p, p): what the sensors' noise alone would cause.
+    """(p, p): covariance by the sensors' noise alone.
 
     Parameters
     ----------

@@ -91,17 +91,17 @@ def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
                 continue
             seen.add(dwells)
             means = np.array([dwell.of(y).mean(axis=0) for dwell in dwells])
-            found = fit_accelerometer(means, gravity, start)
-            full_rank = found.fit.identifiability.rank == PARAMETERS
-            if not found.fit.converged or not full_rank or np.any(found.model.scale <= 0):
+            accelerometer = fit_accelerometer(means, gravity, start)
+            full_rank = accelerometer.fit.identifiability.rank == PARAMETERS
+            if not accelerometer.fit.converged or not full_rank or np.any(accelerometer.model.scale <= 0):
                 continue
-            start = found.fit.x
+            start = accelerometer.fit.x
             lengths = np.array([dwell.samples for dwell in dwells]) / rate
             noise = recording.noise["acc"]
-            variance = np.sum(found.output_gradient() ** 2 * noise.variance(lengths), axis=1)
+            variance = np.sum(accelerometer.output_gradient() ** 2 * noise.variance(lengths), axis=1)
             dof = 3.0 * noise.dof(float(np.median(lengths)))
             times = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in dwells])
-            yield Poses(dwells, multiple, with_gyro, times, means, found, variance, dof)
+            yield Poses(dwells, multiple, with_gyro, times, means, accelerometer, variance, dof)
 
 
 def choose(candidates: list[Poses]) -> Poses:

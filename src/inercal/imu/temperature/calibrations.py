@@ -77,15 +77,15 @@ def fit_calibrations(
     for k, name in enumerate(first.names):
         y = np.array([estimate.values[k] for estimate in estimates])
         # what comes from elsewhere moves all alike: it belongs to the values, not to their change
-        known = np.array([0.0 if e.common is None else e.common[k, k] for e in estimates])
+        common = np.array([0.0 if e.common is None else e.common[k, k] for e in estimates])
         variances = np.array([e.covariance[k, k] for e in estimates])
-        own = np.maximum(variances - known, 1e-12 * variances)
+        own = np.maximum(variances - common, 1e-12 * variances)
         fits = [
-            fit_points(T, y, own, float(np.mean(known)), reference, more, terms)
+            fit_points(T, y, own, float(np.mean(common)), reference, more, terms)
             for more in ((nothing, rising[:, None]) if both else (nothing,))
         ]
         if terms < 4:
-            fits[0] = _with_neglected(fits[0], T, y, own, float(np.mean(known)))
+            fits[0] = _with_neglected(fits[0], T, y, own, float(np.mean(common)))
         curves.append(
             Curve(
                 name,

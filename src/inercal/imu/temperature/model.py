@@ -1,4 +1,4 @@
-"""What bias and scale factor do with temperature, put together: the estimate of any of the ways to find out.
+"""Coefficients over temperature: the estimate of a sweep, or of calibrations at several temperatures.
 
 ``y = c + T1 d + T2 d^2 + T3 d^3``, d = T - T0, for each quantity; its value at T0 keeps its name, the others end in
 ``_T1``, ``_T2``, ``_T3``. ``_hyst`` is the mean difference between rising and falling temperature.
@@ -152,7 +152,7 @@ def assemble(
 
 
 def no_span(low: float, high: float, inputs: Sequence[Source], findings: Sequence[Finding]) -> Estimate:
-    """The estimate of what was recorded at hardly more than one temperature."""
+    """The estimate without parameters of data at hardly more than one temperature."""
     text = (
         f"the temperature goes from {low:.1f} to {high:.1f} degC, expected a range of at least "
         f"{LIMITS.temperature_span:g} K"
@@ -170,12 +170,12 @@ def _range(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def _shows_hysteresis(curve: Curve) -> bool:
-    """Whether passes at one temperature differ by more than chance, and than a tenth of the change with temperature."""
+    """True if passes at one temperature differ by more than chance, and than a tenth of the change with temperature."""
     return curve.beyond_chance and curve.apart > 0.1 * curve.change
 
 
 def _hysteresis(curve: Curve) -> Finding:
-    """What to say of it."""
+    """The finding of hysteresis."""
     text = (
         f"{curve.name} differs by up to {curve.apart:.3g} {curve.unit} between passes at the same temperature, "
         f"{curve.apart / curve.change:.0%} of its change over the range: no polynomial in temperature takes that away "

@@ -49,11 +49,13 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
     where = temperature.source.path
     if not channels:
         raise RecordError(where, f"found {', '.join(record.columns)}, expected acc_x.., gyro_x.. to fit")
-    known = temperature.si()
-    known = known[np.isfinite(known)]
-    if len(known) < 2 * PARTS:
-        raise RecordError(where, f"found {counted(len(known), 'temperature')}, expected at least {2 * PARTS}")
-    low, high = float(known.min()), float(known.max())
+    finite = temperature.si()
+    finite = finite[np.isfinite(finite)]
+    if len(finite) < 2 * PARTS:
+        raise RecordError(
+            where, f"found {counted(len(finite), 'temperature')}, expected at least {2 * PARTS}"
+        )
+    low, high = float(finite.min()), float(finite.max())
     if high - low < LIMITS.temperature_span:
         return TemperatureModel(no_span(low, high, record.sources, record.findings))
     live = [channel for channel in channels if not is_dead(channel.values)]
@@ -116,8 +118,8 @@ def _apart(T: Array, y: Array, risk: float) -> tuple[float, bool]:
     times: list[Array] = []
     for part in passes:
         order = part[np.argsort(at[part])]
-        for drawn, of in ((values, means), (times, np.arange(float(PARTS)))):
-            drawn.append(np.interp(grid, at[order], of[order], left=np.nan, right=np.nan))
+        for curves, of in ((values, means), (times, np.arange(float(PARTS)))):
+            curves.append(np.interp(grid, at[order], of[order], left=np.nan, right=np.nan))
     bends = [np.diff(means[part], 2) ** 2 for part in passes]
     # of a step: by the median, for the ends of the passes are no noise
     step = np.sqrt(np.median(np.concatenate(bends)) / _MEDIAN_OF_A_SQUARE / 2.0) if passes else 0.0
@@ -139,7 +141,7 @@ def _part_means(values: Array) -> Array:
 
 
 def branches(temperature: Array) -> Array:
-    """+1/2 where it gets warmer, -1/2 where it gets colder, 0 where it does hardly either (n,)."""
+    """+1/2 (n,) on rising temperature, -1/2 on falling, 0 where it hardly changes."""
     slope = np.gradient(_part_means(temperature))
     sign = np.where(np.abs(slope) > LIMITS.flat_temperature * np.max(np.abs(slope)), np.sign(slope), 0.0)
     return np.repeat(0.5 * sign, [len(part) for part in np.array_split(temperature, PARTS)])

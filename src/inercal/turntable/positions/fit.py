@@ -1,4 +1,4 @@
-"""From readings to a fit: which terms the positions allow, and what is stated of the rest."""
+"""From readings to a fit: the terms that the positions identify, with stated values of the others."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from inercal.errors import StudyError
 from inercal.findings import Finding
 from inercal.turntable.model import TableModel, table_model
 from inercal.turntable.readings import Readings
-from inercal.turntable.regression import Known, Regression, fit, known
+from inercal.turntable.regression import Identified, Regression, fit, identify_channels
 from inercal.turntable.settings import TurntableSettings
 
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
-    """What a plan allows, and the fit if it allows one.
+    """The terms that a plan identifies, and the fit if it identifies all.
 
-    ``known`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
+    ``identified`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
     identified, and where the weights of the readings do not settle.
     """
 
     model: TableModel
-    known: tuple[Known, ...]
+    identified: tuple[Identified, ...]
     fit: Regression | None
     findings: tuple[Finding, ...] = ()
 
 
-def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
+def fit_readings(means: Readings, settings: TurntableSettings) -> Fitting:
     """Fit the terms that the study asks for, those of the earth rate only where the positions allow it.
 
     Raises
@@ -38,22 +38,22 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
     StudyError
         No value stated for terms of the earth rate that cannot be fitted.
     """
-    model, what, free = choose_terms(settings, found.channels, found.angles)
-    stated, findings = _stated_rates(model, settings), list(found.findings)
+    model, what, free = choose_terms(settings, means.channels, means.angles)
+    fixed_rates, findings = _stated_rates(model, settings), list(means.findings)
     if free:
-        said = (
+        text = (
             f"the positions do not identify the terms of the earth rate ({free} is free): earth rate is subtracted "
-            f"with {', '.join(stated)}"
+            f"with {', '.join(fixed_rates)}"
         )
-        findings.append(Finding("stated_earth_rate", said))
-    if any(each.words for each in what) or len(found.y) < fewest_positions(model, settings):
+        findings.append(Finding("stated_earth_rate", text))
+    if any(each.words for each in what) or len(means.y) < fewest_positions(model, settings):
         return Fitting(model, what, None, tuple(findings))
-    noise = [settings.instrument.noise] * len(found.channels)
+    noise = [settings.instrument.noise] * len(means.channels)
     try:
         with np.errstate(
             over="ignore", divide="ignore", invalid="ignore"
         ):  # what is lost is not finite, and no fit
-            done = fit(model, found.angles, found.y, noise, samples=found.samples)
+            done = fit(model, means.angles, means.y, noise, samples=means.samples)
     except np.linalg.LinAlgError:
         return Fitting(model, what, None, tuple(findings))
     return Fitting(model, what, done, tuple(findings))
@@ -61,18 +61,18 @@ def fit_readings(found: Readings, settings: TurntableSettings) -> Fitting:
 
 def choose_terms(
     settings: TurntableSettings, channels: Sequence[str], angles: Array
-) -> tuple[TableModel, tuple[Known, ...], str]:
-    """The terms to be fitted at these positions, and what these tell of them.
+) -> tuple[TableModel, tuple[Identified, ...], str]:
+    """The terms to be fitted at these positions, and their identifiability.
 
     The terms of the earth rate are among them as the study says; where it says nothing, if the positions identify
     them. Where they do not, the third is the combination that would be free, in words.
     """
     whole = table_model(settings, channels)
-    what, rates, choice = known(whole, angles), rate_terms(whole), settings.instrument.earth_rate
+    what, rates, choice = identify_channels(whole, angles), rate_terms(whole), settings.instrument.earth_rate
     if not rates or choice == "fitted" or (choice is None and not any(each.words for each in what)):
         return whole, what, ""
     rest = table_model(settings, channels, rates)
-    without = known(rest, angles)
+    without = identify_channels(rest, angles)
     if choice == "stated":
         return rest, without, ""
     if not leaves_rates_unknown(what, without):
@@ -86,11 +86,11 @@ def choose_terms(
 
 def earth_rate_of(model: TableModel) -> str:
     """``stated`` if terms of the earth rate are taken as known, else ``fitted``."""
-    stated = any(each.of_rate for part in model.stated for each in part.channel.monomials)
-    return "stated" if stated else "fitted"
+    fixed = any(each.of_rate for part in model.stated for each in part.channel.monomials)
+    return "stated" if fixed else "fitted"
 
 
-def leaves_rates_unknown(whole: tuple[Known, ...], without: tuple[Known, ...]) -> bool:
+def leaves_rates_unknown(whole: tuple[Identified, ...], without: tuple[Identified, ...]) -> bool:
     """True if fewer combinations are unknown once the earth rate is: ``whole`` with its terms, ``without`` them."""
     return any(len(a.words) > len(b.words) for a, b in zip(whole, without, strict=True))
 
@@ -118,19 +118,19 @@ def _stated_rates(model: TableModel, settings: TurntableSettings) -> tuple[str, 
     StudyError
         None of them is stated, and the output is in no unit of rate.
     """
-    found, said = [], False
+    rates, has_value = [], False
     for part in model.stated:
         for symbol, each, value in zip(
             part.channel.symbols, part.channel.monomials, part.values, strict=True
         ):
             if each.of_rate:
-                found.append(f"{symbol} = {value:.6g}")
-                said = said or symbol in settings.instrument.coefficients or bool(value)
-    if found and not said:
-        names = ", ".join(text.partition(" ")[0] for text in found)
+                rates.append(f"{symbol} = {value:.6g}")
+                has_value = has_value or symbol in settings.instrument.coefficients or bool(value)
+    if rates and not has_value:
+        names = ", ".join(text.partition(" ")[0] for text in rates)
         raise StudyError(
             "instrument.coefficients",
             f"none of {names} is stated, expected one or more: they are not fitted, and the output is in no unit of "
             "rate",
         )
-    return tuple(found)
+    return tuple(rates)

@@ -99,11 +99,11 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     model, conditions = MODELS[settings.instrument.kind], _conditions(record, found, settings)
     basis = studied(COMMAND, settings, record.sources, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
-    rank, terms_asked = worst_rank(fitting.known)
+    rank, terms_asked = worst_rank(fitting.identified)
     result: dict[str, Any] = {
         "rank": rank,
         "terms": terms_asked,
-        "null_vectors": list(dict.fromkeys(words for each in fitting.known for words in each.words)),
+        "null_vectors": list(dict.fromkeys(words for each in fitting.identified for words in each.words)),
         "plan": _plan(found, fitting, settings),
         "instrument": settings.instrument.kind,
         "earth_rate": earth_rate_of(fitting.model),
@@ -152,7 +152,7 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
 
     fit = fitting.fit
     assert fit is not None
-    worst = max(fitting.known, key=lambda each: each.identifiability.condition).identifiability
+    worst = max(fitting.identified, key=lambda each: each.identifiability.condition).identifiability
     if worst.condition > LIMITS.condition:
         return Status.ILL_CONDITIONED, (
             f"the {len(found.y)} positions fix {worst.weakest()} only weakly (condition number "
@@ -224,7 +224,7 @@ def _dead(fit: Regression, known: NDArray[np.bool_]) -> str:
 def _without_fit(found: Readings, fitting: Fitting, settings: TurntableSettings) -> tuple[Status, str]:
     """Status and sentence where nothing was fitted."""
     enough = len(found.y) >= fewest_positions(fitting.model, settings)
-    if enough and not any(each.words for each in fitting.known):
+    if enough and not any(each.words for each in fitting.identified):
         return Status.NOT_CONVERGED, (
             "the weights of the readings do not settle: the terms come out so large that errors of the table, which "
             "they multiply, drown the readings; fit fewer terms, or check units and noise"
@@ -234,7 +234,7 @@ def _without_fit(found: Readings, fitting: Fitting, settings: TurntableSettings)
 
 def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings) -> str:
     """Why nothing was fitted, and what would help."""
-    words = [text for each in fitting.known for text in each.words]
+    words = [text for each in fitting.identified for text in each.words]
     fewest = fewest_positions(fitting.model, settings)
     if len(found.y) < fewest:
         why = (
@@ -242,7 +242,7 @@ def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings
         )
         terms = max(len(channel.symbols) for channel in fitting.model.channels)
         return f"found {counted(len(found.y), 'position')} for {terms} terms, expected at least {fewest}{why}"
-    first = next(each for each in fitting.known if each.words)
+    first = next(each for each in fitting.identified if each.words)
     rank, terms = first.identifiability.rank, len(first.identifiability.names)
     return (
         f"the {len(found.y)} positions identify {rank} of {terms} terms: the readings do not change along "
@@ -258,7 +258,7 @@ def _statistics(found: Readings, fitting: Fitting, condition: float) -> Mapping[
     return {
         "dof": float(fit.dof),
         "condition": condition,
-        "column_condition": max(each.identifiability.condition for each in fitting.known),
+        "column_condition": max(each.identifiability.condition for each in fitting.identified),
         "residual_rms": float(np.sqrt(np.mean(np.square(fit.residuals)))),
         "chi2": fit.chi2,
         "positions": float(len(found.y)),

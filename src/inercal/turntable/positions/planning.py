@@ -25,7 +25,7 @@ from inercal.turntable.model import TableModel, channels_of, orthonormal, stated
 from inercal.turntable.positions.fit import choose_terms, earth_rate_of, rate_terms
 from inercal.turntable.positions.outcome import unit_of_term
 from inercal.turntable.positions.tolerance import drift_shares, sphere_rows
-from inercal.turntable.regression import fit, full_inputs, known, worst_rank
+from inercal.turntable.regression import fit, full_inputs, identify_channels, worst_rank
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.weights import least_noise, weights
 from inercal.units import Unit
@@ -39,7 +39,7 @@ REFERENCES = (
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A plan and what it is worth.
+    """A plan and its figures of merit.
 
     ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``model`` with the terms that ``figures.u``
     is of; ``drift_shares`` of the table's errors, as in `inercal.turntable.positions.tolerance.drift_shares`.
@@ -58,7 +58,7 @@ class Judged:
 
     @property
     def earth_rate(self) -> str:
-        """Whether the terms of the earth rate are fitted, or stated because the plan does not identify them."""
+        """``fitted``, or ``stated`` where the plan does not identify the terms of the earth rate."""
         return earth_rate_of(self.model)
 
 
@@ -79,7 +79,7 @@ class Designed:
     message : str
         What was searched, in words.
     findings : tuple of Finding
-        What is to be known about it.
+        Findings about the plan.
     result : mapping
         The command's part of the JSON result.
     """
@@ -109,7 +109,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     Parameters
     ----------
     settings : TurntableSettings
-        The instrument with its expected coefficients and noise; what the table's errors do depends on them.
+        The instrument with its expected coefficients and noise; the effect of the table's errors depends on them.
     progress : callable
         Told, in words, what is being done.
 
@@ -135,8 +135,8 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     def search(name: str, candidates: Candidates, criterion: Criterion, allowed: NDArray[np.bool_]) -> None:
         progress(f"searching {asked.positions} positions: {name}")
         rng = np.random.default_rng(asked.seed)
-        found = exchange(candidates, asked.positions, criterion, rng, allowed=allowed)
-        plans.append(Plan(name, asked.candidates.angles[found.chosen]))
+        choice = exchange(candidates, asked.positions, criterion, rng, allowed=allowed)
+        plans.append(Plan(name, asked.candidates.angles[choice.chosen]))
 
     criterion = _criterion(asked.criterion, model)
     if asked.constraint is not None:
@@ -176,9 +176,9 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
     """Figures of a plan, with table errors; the earth rate as `calibrate` would treat it there."""
     channels = channels_of(settings)
     whole = (
-        known(table_model(settings, channels), plan.angles)
+        identify_channels(table_model(settings, channels), plan.angles)
         if rate_terms(model)
-        else known(model, plan.angles)
+        else identify_channels(model, plan.angles)
     )
     used, seen, _ = choose_terms(settings, channels, plan.angles)
     c, (rank, terms) = _expected(settings, used), worst_rank(whole)
@@ -216,12 +216,12 @@ def _of_site(judged: Judged, settings: TurntableSettings) -> list[Finding]:
     if not LIMITS.site_ratio * best < rms < math.inf:
         return []
     unit = settings.instrument.unit
-    said = (
+    text = (
         f"what [site] states is so uncertain ({', '.join(each.source for each in acting if not each.term)}) that the "
         f"rms u of the output is {rms / unit.factor:.3g} {unit.symbol}; with an exact site it would be "
         f"{best / unit.factor:.3g} {unit.symbol}: state the site better"
     )
-    return [Finding("uncertain_site", said)]
+    return [Finding("uncertain_site", text)]
 
 
 def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:
@@ -229,8 +229,8 @@ def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding
     model, what, free = choose_terms(settings, channels_of(settings), settings.design.candidates.angles)
     findings: list[Finding] = []
     if free:
-        said = f"no choice of positions identifies the terms of the earth rate ({free} is free): they are as stated"
-        findings.append(Finding("stated_earth_rate", said))
+        text = f"no choice of positions identifies the terms of the earth rate ({free} is free): they are as stated"
+        findings.append(Finding("stated_earth_rate", text))
     lost = [words for each in what for words in each.words]
     if lost:
         raise StudyError(
@@ -239,11 +239,11 @@ def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding
             "more candidates or fewer terms",
         )
     if settings.design.table_errors and not settings.instrument.coefficients:
-        said = (
+        text = (
             "no coefficients are expected of the instrument: what the table's errors do to its readings cannot be "
             "foreseen; state them under [instrument.coefficients]"
         )
-        findings.append(Finding("no_coefficients", said))
+        findings.append(Finding("no_coefficients", text))
     return model, _expected(settings, model), findings
 
 
@@ -260,7 +260,7 @@ def _samples(settings: TurntableSettings, angles: Array) -> NDArray[np.int64]:
 def _candidates(
     model: TableModel, angles: Array, c: Array, settings: TurntableSettings, table_errors: bool
 ) -> Candidates:
-    """What each position tells, with the table's errors or without."""
+    """Candidates with their regressors and covariances, with the table's errors or without."""
     noise = np.full(len(model.channels), settings.instrument.noise)
     std = None if table_errors else np.zeros(len(model.chain.errors))
     table = weights(model, angles, c, np.zeros_like(noise), std, _samples(settings, angles))

@@ -1,4 +1,4 @@
-"""Which error of the table matters for which coefficient, and what halving it would bring.
+"""Share of each error of the table in each coefficient, and the effect of halving it.
 
 Goal-oriented shares: the part of the variance of a coefficient, or of the mean square of the predicted output
 over the sphere, that each error of the table causes. For one that stays constant it is
@@ -26,12 +26,12 @@ def shifts(fit: Regression) -> tuple[Array, ...]:
 
     q is 1 for a constant error, and the number of positions for one that is redrawn there.
     """
-    chain, found = fit.model.chain, []
+    chain, by_error = fit.model.chain, []
     slopes = averaged(chain, fit.slopes, fit.samples)
     for k, error in enumerate(chain.errors):
         each = np.einsum("pnc,nc->pn", fit.gain, slopes[..., k]) * error.distribution.std
-        found.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
-    return tuple(found)
+        by_error.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
+    return tuple(by_error)
 
 
 def coefficient_shares(fit: Regression, slope: Array) -> dict[str, dict[str, float]]:
@@ -40,8 +40,8 @@ def coefficient_shares(fit: Regression, slope: Array) -> dict[str, dict[str, flo
     ``slope`` (p, p) derivatives of the terms with respect to the linear coefficients. The shares of a term sum
     to one; a term that the table does not touch has none.
     """
-    found = [np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)]
-    parts = np.array(found).reshape(-1, len(fit.c))
+    variances = [np.square(slope @ shift).sum(axis=1) for shift in shifts(fit)]
+    parts = np.array(variances).reshape(-1, len(fit.c))
     return {symbol: _shares(fit.model.chain, parts[:, j]) for j, symbol in enumerate(fit.model.symbols)}
 
 
@@ -114,7 +114,7 @@ class Alternatives:
 
 
 def alternatives(fit: Regression, slope: Array) -> Alternatives:
-    """What halving each tolerance would bring, and what the scopes mean; the fit is weighted anew each time.
+    """Uncertainties with each tolerance halved, and with other scopes; the fit is weighted anew each time.
 
     ``slope`` (p, p) of the terms as reported by the linear coefficients; u is of those, in the unit of the fit.
     """

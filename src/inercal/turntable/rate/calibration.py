@@ -1,4 +1,4 @@
-"""Calibration of gyros by a rate test: what the record holds, what its rates can tell, and the fit."""
+"""Calibration of gyros by a rate test: readings, identifiability of the terms, and the fit."""
 
 from __future__ import annotations
 
@@ -55,62 +55,64 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
     test, chain, instrument = settings.rate_test, settings.chain, settings.instrument
     assert test is not None
     check_rate_test(settings)
-    found = rate_dwells(record, chain.joints, test.joint, instrument.dwell)
-    stated = instrument.unit
-    if instrument.noise is not None and stated.dimension != found.unit.dimension:
+    readings = rate_dwells(record, chain.joints, test.joint, instrument.dwell)
+    unit = instrument.unit
+    if instrument.noise is not None and unit.dimension != readings.unit.dimension:
         raise StudyError(
             "instrument.unit",
-            f"noise is stated for outputs in {stated.symbol}, and the record's are in {found.unit.symbol}, expected "
+            f"noise is stated for outputs in {unit.symbol}, and the record's are in {readings.unit.symbol}, expected "
             "the same kind of unit",
         )
     findings = [*record.findings]
-    along = turning_axis(chain, test.joint, found.angles)
+    along = turning_axis(chain, test.joint, readings.angles)
     taken = []
-    for channel in found.channels:
+    for channel in readings.channels:
         if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine:
             taken.append(channel)
         else:
-            said = f"{channel} lies across the turning axis {test.joint} and is left out"
-            findings.append(Finding("weak_term", said))
+            text = f"{channel} lies across the turning axis {test.joint} and is left out"
+            findings.append(Finding("weak_term", text))
 
-    def nothing(rank: int, said: str, words: Sequence[str] = ()) -> RateCalibration:
-        return RateCalibration(unobservable(record, found, settings, findings, rank, words, said), found)
+    def nothing(rank: int, text: str, words: Sequence[str] = ()) -> RateCalibration:
+        return RateCalibration(
+            unobservable(record, readings, settings, findings, rank, words, text), readings
+        )
 
     if not taken:
         return nothing(0, f"no gyro of the record lies along the turning axis {test.joint}")
     axis, asymmetry = taken[0][-1], True
-    known = separable(found.rate, axis, test.order, asymmetry)
-    if known.rank < len(known.names):
+    identified = separable(readings.rate, axis, test.order, asymmetry)
+    if identified.rank < len(identified.names):
         asymmetry = False
-        known = separable(found.rate, axis, test.order, asymmetry)
-        said = "the rates do not tell the asymmetry from the other terms: take two or more of either sign"
-        findings.append(Finding("weak_term", said))
-    stays, terms = len(found.rate), len(known.names)
-    if known.rank < terms:
-        words = [in_words(vector / known.scale, known.names) for vector in known.null_vectors]
+        identified = separable(readings.rate, axis, test.order, asymmetry)
+        text = "the rates do not tell the asymmetry from the other terms: take two or more of either sign"
+        findings.append(Finding("weak_term", text))
+    stays, terms = len(readings.rate), len(identified.names)
+    if identified.rank < terms:
+        words = [in_words(vector / identified.scale, identified.names) for vector in identified.null_vectors]
         return nothing(
-            known.rank,
-            f"the rates of {counted(stays, 'stay')} identify {known.rank} of {terms} terms: the readings do not change "
-            f"along {'; '.join(words)} (by rad/s); add rates",
+            identified.rank,
+            f"the rates of {counted(stays, 'stay')} identify {identified.rank} of {terms} terms: the readings do not "
+            f"change along {'; '.join(words)} (by rad/s); add rates",
             words,
         )
     if stays == terms and instrument.noise is None:
-        said = f"found {counted(stays, 'stay')} for {terms} terms and no stated noise, expected one stay more"
-        return nothing(known.rank, said)
+        text = f"found {counted(stays, 'stay')} for {terms} terms and no stated noise, expected one stay more"
+        return nothing(identified.rank, text)
     for channel in taken:
-        if not np.ptp(found.y[:, found.channels.index(channel)]):
+        if not np.ptp(readings.y[:, readings.channels.index(channel)]):
             return nothing(
                 0, f"{channel} reads the same at all rates, expected it to follow them: is it dead?"
             )
-    inputs = tuple(gyro_input(found, settings, "xyz".index(channel[-1])) for channel in taken)
-    if found.assumed:
-        findings += _whole_turns(found, inputs)
-    full_scale = test.full_scale or float(np.abs(found.rate).max())
+    inputs = tuple(gyro_input(readings, settings, "xyz".index(channel[-1])) for channel in taken)
+    if readings.assumed:
+        findings += _whole_turns(readings, inputs)
+    full_scale = test.full_scale or float(np.abs(readings.rate).max())
     fits = tuple(
         fit_rates(
             channel[-1],
-            found.rate,
-            found.y[:, found.channels.index(channel)],
+            readings.rate,
+            readings.y[:, readings.channels.index(channel)],
             given,
             instrument.noise,
             test.order,
@@ -120,8 +122,8 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
         for channel, given in zip(taken, inputs, strict=True)
     )
     findings += [finding for fit in fits for finding in _excess(fit)]
-    estimate = assemble(record, found, settings, findings, inputs, fits, full_scale, known)
-    return RateCalibration(estimate, found, inputs, fits)
+    estimate = assemble(record, readings, settings, findings, inputs, fits, full_scale, identified)
+    return RateCalibration(estimate, readings, inputs, fits)
 
 
 def check_rate_test(settings: TurntableSettings) -> None:
@@ -140,23 +142,23 @@ def _excess(fit: RateFit) -> list[Finding]:
 
     if fit.dof < 1 or np.isfinite(fit.noise_dof) or chdtrc(fit.dof, fit.chi2) >= LIMITS.misfit_probability:
         return []
-    said = (
+    text = (
         f"gyro_{fit.axis} misses the fit by {np.sqrt(fit.chi2 / fit.dof):.1f} times what the stated noise and the "
         "table explain: what S_nl and S_hyst say is the gyro's own, and the uncertainties are those of the terms over "
         "these rates"
     )
-    return [Finding("excess_scatter", said, harm=())]
+    return [Finding("excess_scatter", text, harm=())]
 
 
-def _whole_turns(found: RateDwells, inputs: Sequence[Input]) -> list[Finding]:
+def _whole_turns(stays: RateDwells, inputs: Sequence[Input]) -> list[Finding]:
     """A finding where a gyro is oblique, so that earth rate across the turning axis must average out."""
     oblique = max(float(np.sqrt(1.0 - np.square(given.gain).min().clip(0.0, 1.0))) for given in inputs)
     if oblique < 1e-6:
         return []
-    moving = np.abs(found.rate[np.abs(found.rate) > 0.0])
+    moving = np.abs(stays.rate[np.abs(stays.rate) > 0.0])
     worst = 1e6 * oblique * EARTH_RATE / float(moving.min()) if len(moving) else np.inf
-    said = (
+    text = (
         "the record does not hold the angle of the turning axis: the earth rate across it is taken to average out over "
         f"whole turns; were they not whole, an input could be wrong by up to {worst:.0f} ppm"
     )
-    return [Finding("whole_turns", said)]
+    return [Finding("whole_turns", text)]

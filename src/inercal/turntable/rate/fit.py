@@ -47,7 +47,7 @@ class RateFit:
     residuals : (n,) readings minus the best straight line
     remainder : (n, n) how each reading enters each residual
     noise : float
-        Standard deviation of a reading that is not the table's doing; ``noise_dof`` inf where it was stated.
+        Standard deviation of a reading beside the table's part; ``noise_dof`` inf where it was stated.
     chi2, dof : weighted sum of squares of the fit, and its degrees of freedom
     """
 
@@ -80,7 +80,7 @@ def symbols(axis: str, order: int, asymmetry: bool) -> tuple[str, ...]:
 
 
 def separable(rate: Array, axis: str, order: int, asymmetry: bool) -> Identifiability:
-    """What the rates let the terms say.
+    """Identifiability of the terms by the rates.
 
     By the rates of the table alone, rounded to what counts as one rate: earth rate and jitter would make terms
     seem known that hang on a millionth of the rate.
@@ -108,11 +108,11 @@ def approaches(rate: Array) -> NDArray[np.int64]:
         level[same] = rate[same].mean()
     smallest = LIMITS.same_rate * 1e-3 * np.abs(level).max(initial=0.0)
     steps = np.diff(level, prepend=0.0)
-    found = np.where(np.abs(steps) <= smallest, 0, np.sign(steps)).astype(np.int64)
-    for k in range(1, len(found)):
-        if found[k] == 0:
-            found[k] = found[k - 1]
-    return found
+    directions = np.where(np.abs(steps) <= smallest, 0, np.sign(steps)).astype(np.int64)
+    for k in range(1, len(directions)):
+        if directions[k] == 0:
+            directions[k] = directions[k - 1]
+    return directions
 
 
 def fit_rates(
@@ -150,8 +150,8 @@ def fit_rates(
     sigma = floor
     for _ in range(ROUNDS):
         weight = _weights(given.effects, float(c[1]), n)
-        found = scatter(rows[:, None, :], y[:, None], weight, [noise], np.array([floor]))
-        sigma = float(found.std[0])
+        noise_fit = scatter(rows[:, None, :], y[:, None], weight, [noise], np.array([floor]))
+        sigma = float(noise_fit.std[0])
         solution = _solve(rows, y, weight, sigma)
         c = solution.c
     line = _solve(terms[:, :2], y, weight, sigma)
@@ -169,7 +169,7 @@ def fit_rates(
         residuals,
         remainder,
         sigma,
-        float(found.dof[0]),
+        float(noise_fit.dof[0]),
         solution.chi2,
         n - free,
     )

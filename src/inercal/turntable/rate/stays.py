@@ -85,9 +85,9 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
         )
     unit = record[channels[0]].unit
     rate = record["rate"].si()
-    known = joint in record
+    has_angle = joint in record
     still = np.zeros(len(rate))
-    angles = [record[name].si() if known or name != joint else still for name in joints]
+    angles = [record[name].si() if has_angle or name != joint else still for name in joints]
     for name in channels:
         if record[name].unit != unit or len(record[name].values) != len(rate):
             raise RecordError(where, f"{name} has another unit or length than rate or {channels[0]}")
@@ -113,7 +113,7 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
     means = np.array([rate[rows].mean() for rows in groups])
     turn = np.zeros((len(groups), 3))
     turn[:, 0] = 1.0
-    if known:
+    if has_angle:
         for k, rows in enumerate(groups):
             phi = table[rows, joints.index(joint)]
             span = means[k] * duration
@@ -125,7 +125,7 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
         channels,
         unit,
         np.array([y[rows].mean(axis=0) for rows in groups]),
-        not known,
+        not has_angle,
     )
 
 
@@ -169,7 +169,7 @@ def over_turn(of_angles: Callable[[Array], Array], angles: Array, joint: int, tu
 
 
 def beyond(chain: Chain, joint: str) -> tuple[Chain, Array]:
-    """What the joint turns: the chain after it, and the turning axis (3,) in the frame it starts from."""
+    """The chain after a joint, and the turning axis (3,) in the frame it starts from."""
     k = next(i for i, each in enumerate(chain.elements) if isinstance(each, Joint) and each.name == joint)
     turning = chain.elements[k]
     assert isinstance(turning, Joint)
@@ -180,8 +180,8 @@ def turning_axis(chain: Chain, joint: str, angles: Array, errors: Array | None =
     """Turning axis (n, 3) on the instrument's axes at ``angles`` (n, joints), errors (n, k) if any."""
     after, e = beyond(chain, joint)
     own = angles[..., len(chain.joints) - len(after.joints) :]
-    drawn = None if errors is None else errors[..., len(chain.errors) - len(after.errors) :]
-    return np.asarray(e @ after.attitude(own, drawn))
+    own_errors = None if errors is None else errors[..., len(chain.errors) - len(after.errors) :]
+    return np.asarray(e @ after.attitude(own, own_errors))
 
 
 def sensed(
@@ -207,7 +207,7 @@ def sensed(
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Something the sensed rate is uncertain by.
+    """A source of uncertainty of the sensed rate.
 
     ``shift`` (n, q) [rad/s]: change of each reading's input for one standard deviation of q independent
     components; ``redrawn`` if these take new values at each stay. ``u`` [``unit``] of the source itself.
@@ -230,7 +230,7 @@ class Input:
     effects: tuple[Effect, ...]
 
 
-def gyro_input(found: RateDwells, settings: TurntableSettings, axis: int) -> Input:
+def gyro_input(stays: RateDwells, settings: TurntableSettings, axis: int) -> Input:
     """Rate about axis 0, 1 or 2 of the instrument in each stay, and what it is uncertain by.
 
     A gyro that is meant to lie along the turning axis loses ``1 - cos`` of any misalignment: an error of second
@@ -245,12 +245,12 @@ def gyro_input(found: RateDwells, settings: TurntableSettings, axis: int) -> Inp
     turning = chain.joints.index(test.joint)
 
     def mean(of_angles: Callable[[Array], Array]) -> Array:
-        return over_turn(of_angles, found.angles, turning, found.turn)
+        return over_turn(of_angles, stays.angles, turning, stays.turn)
 
     slopes = mean(lambda at: w_n @ chain.slopes(at) @ v)  # (n, k)
     after, e = beyond(chain, test.joint)
-    gain, first, second = _gain(after, found.angles[:, turning + 1 :], e, v)
-    slopes[:, len(chain.errors) - len(after.errors) :] += found.rate[:, None] * first
+    gain, first, second = _gain(after, stays.angles[:, turning + 1 :], e, v)
+    slopes[:, len(chain.errors) - len(after.errors) :] += stays.rate[:, None] * first
     effects = [
         Effect(
             error.name,
@@ -262,17 +262,17 @@ def gyro_input(found: RateDwells, settings: TurntableSettings, axis: int) -> Inp
         for k, error in enumerate(chain.errors)
     ]
     loss = -0.5 * np.einsum("njj,j->n", second, np.square(after.std))
-    effects += _cosines(after, second, found.rate)
+    effects += _cosines(after, second, stays.rate)
     if test.rate_u > 0.0:
         effects.append(
-            Effect("rate of the table", test.rate_u, "1", (found.rate * gain * test.rate_u)[:, None])
+            Effect("rate of the table", test.rate_u, "1", (stays.rate * gain * test.rate_u)[:, None])
         )
     if latitude_u > 0.0:
         by_latitude = EARTH_RATE * np.array([-np.sin(latitude), 0.0, np.cos(latitude)])
         moved = mean(lambda at: by_latitude @ chain.attitude(at) @ v)
         effects.append(Effect("latitude", latitude_u, "rad", (moved * latitude_u)[:, None]))
-    ideal = sensed(chain, test.joint, w_n, found.rate, found.angles, found.turn) @ v
-    return Input(ideal - found.rate * loss, gain, tuple(effects))
+    ideal = sensed(chain, test.joint, w_n, stays.rate, stays.angles, stays.turn) @ v
+    return Input(ideal - stays.rate * loss, gain, tuple(effects))
 
 
 def _gain(after: Chain, angles: Array, e: Array, v: Array) -> tuple[Array, Array, Array]:

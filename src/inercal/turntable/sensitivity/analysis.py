@@ -81,15 +81,15 @@ class Analysed:
 
     @property
     def message(self) -> str:
-        """What was found, in a sentence."""
-        found = self.indices
+        """The result in a sentence."""
+        indices = self.indices
         size = (
-            f"{counted(len(found.factors), 'error')}, {counted(len(found.outputs), 'output')}, "
-            f"{counted(len(found.angles), 'position')}"
+            f"{counted(len(indices.factors), 'error')}, {counted(len(indices.outputs), 'output')}, "
+            f"{counted(len(indices.angles), 'position')}"
         )
-        if not np.any(found.variance > 0.0):
+        if not np.any(indices.variance > 0.0):
             return f"{size}; these errors do not move these outputs there"
-        top = [found.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
+        top = [indices.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
         head = f"{size}; the largest shares are those of {', '.join(top)}"
         if not self.flagged:
             return head
@@ -157,15 +157,15 @@ def analyse(
 
 def result(analysed: Analysed) -> dict[str, Any]:
     """The command's own part of the JSON result: the contract's keys, arrays as arrays."""
-    found = analysed.indices
+    indices = analysed.indices
     part = analysed.aggregate
     return {
-        "factors": found.factors,
-        "outputs": found.outputs,
+        "factors": indices.factors,
+        "outputs": indices.outputs,
         "positions": _angles(analysed),
-        "mean": {**_plain(analysed.mean), **_shapley(found, averages.mean)},
-        "weighted": {**_plain(analysed.weighted), **_shapley(found, averages.weighted)},
-        "aggregate": {"outputs": found.outputs, "first": part.first, "total": part.total},
+        "mean": {**_plain(analysed.mean), **_shapley(indices, averages.mean)},
+        "weighted": {**_plain(analysed.weighted), **_shapley(indices, averages.weighted)},
+        "aggregate": {"outputs": indices.outputs, "first": part.first, "total": part.total},
         "flagged": [
             {
                 "output": flag.output,
@@ -174,17 +174,17 @@ def result(analysed: Analysed) -> dict[str, Any]:
             }
             for flag in analysed.flagged
         ],
-        "method": found.method,
+        "method": indices.method,
     }
 
 
 def table(analysed: Analysed) -> str:
     """The errors as aligned text, those with the largest shares first."""
-    found, share, mean = analysed.indices, analysed.aggregate, analysed.mean
-    head = ("", "S", "ST", *(f"S {output}" for output in found.outputs), "")
+    indices, share, mean = analysed.indices, analysed.aggregate, analysed.mean
+    head = ("", "S", "ST", *(f"S {output}" for output in indices.outputs), "")
     rows = [
         (
-            found.factors[k],
+            indices.factors[k],
             *(_number(x) for x in (share.first[k], share.total[k], *mean.first[:, k])),
             analysed.what[k],
         )
@@ -202,7 +202,7 @@ def table(analysed: Analysed) -> str:
         [
             *lines,
             "",
-            f"S, ST: first and total order over {', '.join(found.outputs)} and all positions, each output in "
+            f"S, ST: first and total order over {', '.join(indices.outputs)} and all positions, each output in "
             "units of its reference",
             "S of an output: mean of its first-order indices over the positions",
         ]
@@ -219,17 +219,17 @@ def _angles(analysed: Analysed) -> dict[str, Array]:
     return {joint: analysed.indices.angles[:, k] for k, joint in enumerate(analysed.joints)}
 
 
-def _plain(found: Averages) -> Mapping[str, Array]:
+def _plain(means: Averages) -> Mapping[str, Array]:
     """Averages by name."""
-    return {"first": found.first, "total": found.total, "total_minus_first": found.total_minus_first}
+    return {"first": means.first, "total": means.total, "total_minus_first": means.total_minus_first}
 
 
-def _shapley(found: Indices, average: Callable[[Indices], Averages]) -> Mapping[str, Array]:
+def _shapley(indices: Indices, average: Callable[[Indices], Averages]) -> Mapping[str, Array]:
     """Shapley effects, averaged as if they were parts of variance; none where they were not computed."""
-    if found.shapley is None:
+    if indices.shapley is None:
         return {}
-    parts = np.nan_to_num(found.shapley) * found.variance[..., None]
-    return {"shapley": average(replace(found, first_variance=parts)).first}
+    parts = np.nan_to_num(indices.shapley) * indices.variance[..., None]
+    return {"shapley": average(replace(indices, first_variance=parts)).first}
 
 
 def _number(share: float) -> str:

@@ -49,11 +49,16 @@ def _maps(analysed: Analysed) -> Iterator[tuple[str, Array]]:
 
 def _npz(analysed: Analysed) -> bytes:
     """The maps and what their axes are, as an NPZ archive."""
-    found = analysed.indices
-    texts = {"output": found.outputs, "unit": found.units, "factor": found.factors, "what": analysed.what}
+    indices = analysed.indices
+    texts = {
+        "output": indices.outputs,
+        "unit": indices.units,
+        "factor": indices.factors,
+        "what": analysed.what,
+    }
     arrays: dict[str, Any] = {name: np.array(values) for name, values in texts.items()}
-    arrays |= {"scale": found.scales, "method": np.array(json.dumps(dict(found.method)))}
-    arrays |= dict(zip(analysed.joints, found.angles.T, strict=True))
+    arrays |= {"scale": indices.scales, "method": np.array(json.dumps(dict(indices.method)))}
+    arrays |= dict(zip(analysed.joints, indices.angles.T, strict=True))
     arrays |= dict(_maps(analysed))
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
@@ -66,29 +71,29 @@ def _netcdf(analysed: Analysed) -> bytes:
 
     from inercal import __version__
 
-    found = analysed.indices
+    indices = analysed.indices
     maps = dict(_maps(analysed))
     buffer = io.BytesIO()
     file: Any = netcdf_file(buffer, "w")
     file.title = "Sensitivity of what an instrument on a turntable should read to the errors of the table"
     file.source = f"inercal {__version__}"
-    file.method = json.dumps(dict(found.method))
-    sizes = {"output": len(found.outputs), "position": len(found.angles), "factor": len(found.factors)}
+    file.method = json.dumps(dict(indices.method))
+    sizes = {"output": len(indices.outputs), "position": len(indices.angles), "factor": len(indices.factors)}
     if "second" in maps:
-        sizes["other_factor"] = len(found.factors)
-        _add_texts(file, "other_factor", "other_factor", found.factors, "the other error of a pair")
+        sizes["other_factor"] = len(indices.factors)
+        _add_texts(file, "other_factor", "other_factor", indices.factors, "the other error of a pair")
     for dimension, size in sizes.items():
         if dimension not in file.dimensions:
             file.createDimension(dimension, size)
     _add_texts(
-        file, "output", "output", found.outputs, "gravity (a) or earth rate (w) on the instrument's axes"
+        file, "output", "output", indices.outputs, "gravity (a) or earth rate (w) on the instrument's axes"
     )
-    _add_texts(file, "unit", "output", found.units, "unit of the output")
-    _add_texts(file, "factor", "factor", found.factors, "error of the table")
+    _add_texts(file, "unit", "output", indices.units, "unit of the output")
+    _add_texts(file, "factor", "factor", indices.factors, "error of the table")
     _add_texts(file, "what", "factor", analysed.what, "error of the table in words")
-    _add(file, "scale", ("output",), found.scales, "what the output is divided by, in its unit")
+    _add(file, "scale", ("output",), indices.scales, "what the output is divided by, in its unit")
     for k, joint in enumerate(analysed.joints):
-        _add(file, joint, ("position",), found.angles[:, k], f"commanded angle {joint}", units="rad")
+        _add(file, joint, ("position",), indices.angles[:, k], f"commanded angle {joint}", units="rad")
     place = " ".join(analysed.joints)
     for name, values in maps.items():
         dimensions, words = _MAPS[name]
