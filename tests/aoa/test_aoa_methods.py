@@ -13,6 +13,7 @@ from inercal.aoa.settings import Attitude, Disturbances, Methods, Prior, Timing
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import RecordError, StudyError
 from inercal.units import parse_quantity
+from rows import for_each
 
 PAPER = Methods()
 SHORT = replace(BASE, duration=12.0)
@@ -275,8 +276,8 @@ def test_rows_that_do_not_go_on_in_time_have_no_angle():
     assert np.flatnonzero(np.isnan(found.theta)).tolist() == [500, 600]
 
 
-@pytest.mark.parametrize("rows", [0, 1, 2, 30])
-@pytest.mark.parametrize("methods", MEASURED, ids=label)
+@for_each("rows", [0, 1, 2, 30])
+@for_each("methods", MEASURED)
 def test_few_rows_are_no_error(methods, rows):
     settings = study(motion=SHORT, timing=Timing(None, 1e-3))
     of = made(settings).recording

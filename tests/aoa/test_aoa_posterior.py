@@ -21,6 +21,7 @@ from inercal.estimate.files import save
 from inercal.estimate.result import without_parameters
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
+from rows import for_each
 
 SWEEP = MotionPlan("pitch-pause", first=-10.0 * DEG, last=90.0 * DEG, step=20.0 * DEG, move=1.0, pause=1.0)
 STILL = MotionPlan("static", duration=4.0, first=15.0 * DEG, last=15.0 * DEG)
@@ -202,7 +203,7 @@ def used(path, settings):
     return load(path, settings), corrected(path, settings)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("keys", "value"),
     [
         (("result", "gravity"), {}),

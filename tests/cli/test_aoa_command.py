@@ -16,6 +16,7 @@ from inercal.aoa import settings
 from inercal.cli import aoa as command
 from inercal.cli import run
 from inercal.estimate.files import load
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 AOA = ["aoa", "model.csv", "--study", "aoa.toml"]
@@ -291,7 +292,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
 # What is refused.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["aoa", "none.csv", *AOA[2:]], ["none.csv"]),

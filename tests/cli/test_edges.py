@@ -11,6 +11,7 @@ import pytest
 
 from inercal.cli import run
 from inercal.studies.template import imu_template
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="a shell and file names as on POSIX")
 CSV = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]\n"
@@ -173,7 +174,7 @@ def test_schema_goes_to_a_file_and_as_json_to_standard_output_too(folder, capsys
     assert json.loads(capsys.readouterr().out) == json.loads(Path("s.json").read_text())
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["calibrate"], ["calibrate", "expected imu"]),

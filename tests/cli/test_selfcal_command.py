@@ -21,6 +21,7 @@ from inercal.estimate.files import load
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.settings import KINDS
 from inercal.studies.load import load_selfcal_study
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")
@@ -255,7 +256,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
 # What is refused.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["selfcal", "none.csv", *SELFCAL[2:]], ["none.csv"]),

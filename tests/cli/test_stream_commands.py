@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 HEADER = (
@@ -288,7 +289,7 @@ def test_the_monitor_says_what_it_sees(folder):
 # What is refused.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["apply", "cal.json", "--stream", "--out", "x.csv"], ["--out"]),
@@ -320,7 +321,7 @@ def test_bad_usage_is_one_sentence(arguments, words, folder, here):
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("log", "words"),
     [
         ("", ["standard input", "ended without a row"]),

@@ -12,6 +12,7 @@ from inercal.records.checks.values import outliers, saturation
 from inercal.records.column import Column
 from inercal.records.places import places
 from inercal.units import parse_unit
+from rows import for_each
 
 
 def noise(count, seed=7):
@@ -150,7 +151,7 @@ class TestSaturation:
         motion = np.clip(np.round(40_000 * np.sin(self.THETA)), -32768, 32767)
         assert len(saturation(np.r_[rest, motion, rest], "gyro_x")) == 1
 
-    @pytest.mark.parametrize(
+    @for_each(
         "signal",
         [
             np.zeros(1000),
@@ -184,7 +185,7 @@ class TestOutliers:
         signal[::7] += 1
         assert said(outliers(signal, "acc_x")) == [("outlier", "row 501")]
 
-    @pytest.mark.parametrize(
+    @for_each(
         "signal",
         [
             noise(1_000_000),

@@ -15,12 +15,13 @@ from inercal.aoa.settings import Calibration
 from inercal.errors import InputError, StudyError
 from inercal.studies.schema import json_schema
 from inercal.studies.sensors import MOST
+from rows import for_each
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("sensor", "text", "scale", "per"),
     [
         ("a1", "1", 1.0, "1"),

@@ -18,6 +18,7 @@ from inercal.validate import aoa, foundation, imu, noise, selfcal, turntable
 from inercal.validate.case import Case, Found, find, judge
 from inercal.validate.run import SYSTEMS, cases_of, validate
 from inercal.validate.sources import SOURCES
+from rows import for_each
 
 CASES = [case for system in SYSTEMS for case in cases_of(system)]
 
@@ -69,7 +70,7 @@ def test_each_says_what_it_shows_and_from_where():
     assert {case.source for case in CASES} == SOURCES.keys()
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@for_each("case", CASES)
 def test_any_number_that_is_wrong_fails(whole, case):
     """Each expected number in turn is moved by more than twice its limit, up and down: none is without effect."""
     found = whole[1][case.name]
