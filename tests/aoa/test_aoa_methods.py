@@ -46,6 +46,7 @@ def made(settings, seed=1, **errors):
     return simulate(settings, np.random.default_rng(seed), errors or None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_papers_method_errs_as_the_reference_figures_say(name):
     """Mean of 3 seeds within 1.3 times; the clipped case as the paper takes it, saturated samples and all."""

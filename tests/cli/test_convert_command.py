@@ -187,6 +187,7 @@ def test_a_file_of_imu_tk_is_not_overwritten_by_its_second_name(folder, capsys):
     assert "x_acc.calib: is an input" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", CONVENTIONS)
 def test_spoiled_files_of_other_tools_end_with_a_calibration_or_one_line(folder, capsys, tool):
     run(["convert", "cal.json", "--to", tool, "--out", "theirs" + CONVENTIONS[tool].suffixes[0], "--quiet"])

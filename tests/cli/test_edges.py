@@ -226,6 +226,7 @@ def test_standard_output_may_be_closed(folder):
     assert done.stderr == "inercal: error: standard output: found it closed, expected it open\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 @pytest.mark.parametrize(
     "command",
@@ -255,6 +256,7 @@ def test_standard_error_may_be_closed(folder):
     assert shell("$INERCAL inspect no.csv 2>&-").returncode == 2
 
 
+@pytest.mark.slow
 @POSIX
 def test_no_encoding_is_too_poor(folder):
     """Also without UTF-8 whatever is said can be printed, and files are written in UTF-8."""

@@ -372,6 +372,7 @@ def test_a_rate_test_is_simulated_and_calibrated(folder, capsys):
     assert Path("r.html").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

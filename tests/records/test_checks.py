@@ -120,6 +120,7 @@ def pieces(steps):
     return st.lists(stretch, min_size=1, max_size=6).map(added)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     t=pieces([0.01, 0.02, 0.0, -0.01, 1e-9, 1e300, 1e3]),

@@ -143,6 +143,7 @@ def test_examples_in_the_schema_are_accepted():
                 assert with_sensor(name=sensor, **{key: example}), (table, key, example)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     text=st.from_regex(

@@ -48,6 +48,7 @@ def whole():
     return estimate, found, told
 
 
+@pytest.mark.slow
 def test_all_pass(whole):
     estimate, _, told = whole
     assert [row["name"] for row in estimate.result["cases"] if not row["passed"]] == []
@@ -70,6 +71,7 @@ def test_each_says_what_it_shows_and_from_where():
     assert {case.source for case in CASES} == SOURCES.keys()
 
 
+@pytest.mark.slow
 @for_each("case", CASES)
 def test_any_number_that_is_wrong_fails(whole, case):
     """Each expected number in turn is moved by more than twice its limit, up and down: none is without effect."""
