@@ -119,7 +119,7 @@ def pages(files: list[str]) -> list[str]:
     runs = [
         file
         for file in changed
-        if re.search(r"^```(python|console)$", (ROOT / file).read_text("utf-8"), re.M)
+        if file != APART and re.search(r"^```(python|console)$", (ROOT / file).read_text("utf-8"), re.M)
     ]
     return [f"{PAGES}::test_a_page_runs_and_prints_what_it_shows[{file}]" for file in runs] + (
         list(OF_PAGES) if changed else []
