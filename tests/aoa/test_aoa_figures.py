@@ -77,6 +77,7 @@ def of_the_base():
     return pictures(measurement(settings), settings)
 
 
+@pytest.mark.slow
 def test_what_is_drawn_of_a_fusion():
     drawn = of_the_base()
     assert [picture.title for picture in drawn] == [
@@ -103,6 +104,7 @@ def test_what_is_drawn_of_a_fusion():
     assert float(found[1]) == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_alpha_beta_and_roll_are_drawn_where_they_are_known():
     """A roll of 20 deg with yaw gyros: roll, alpha and beta; stated alone: alpha and beta; else theta is no alpha."""
     lies = Attitude(roll=Quantity(20.0 * DEG, 0.1 * DEG, parse_unit("rad"), ""))
@@ -133,6 +135,7 @@ def test_sensors_against_the_reference_are_drawn_as_they_are():
     texts(sting.fitted(("a1",), ("x",), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("roll", "methods"), [(0.0, None), (60.0, None), (60.0, Methods())])
 def test_lever_arms_are_what_they_are_worth(roll, methods):
     """Of theta = 30° + A sin(W t): r W^2 A^2 centrifugal and, at a roll of cosine c, c r W^2 A tangential, in mg and,
@@ -153,6 +156,7 @@ def test_lever_arms_are_what_they_are_worth(roll, methods):
         assert float(found[2]) == pytest.approx(size / G / DEG, rel=0.06)
 
 
+@pytest.mark.slow
 def test_accelerometers_alone_with_a_gap_and_a_restart():
     settings = short()
     recording = without_rows(recorded(settings), np.r_[0:500, 1300:1700])
@@ -177,6 +181,7 @@ def test_a_short_record_without_a_reference():
     assert not {"Error against the reference", "Spectra", "Close-up"} & set(drawn)
 
 
+@pytest.mark.slow
 def test_rows_that_are_not_later_are_not_drawn():
     settings = short()
     recording = recorded(settings)
@@ -188,6 +193,7 @@ def test_rows_that_are_not_later_are_not_drawn():
     assert np.isnan(found.angles.theta[700:705]).all()
 
 
+@pytest.mark.slow
 def test_saturated_samples_are_marked():
     settings = short("clipping")
     drawn = by_title(pictures(measurement(settings), settings))
@@ -199,6 +205,7 @@ def test_saturated_samples_are_marked():
     assert "a2" not in caption
 
 
+@pytest.mark.slow
 def test_points_and_their_errors():
     settings = replace(scenario("pitch-pause", sample_rate=100.0, last=10.0 * DEG))
     found = measurement(settings)
@@ -209,6 +216,7 @@ def test_points_and_their_errors():
     assert "at rest" in drawn["Error against the reference"].caption
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False], ids=["reference", "none"])
 def test_methods_side_by_side(known):
     """Errors against a reference, differences from the first without one; each method has its numbers."""

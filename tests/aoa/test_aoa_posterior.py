@@ -22,6 +22,7 @@ from inercal.estimate.files import save
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
+from rows import for_each
 
 SWEEP = MotionPlan("pitch-pause", first=-10.0 * DEG, last=90.0 * DEG, step=20.0 * DEG, move=1.0, pause=1.0)
 STILL = MotionPlan("static", duration=4.0, first=15.0 * DEG, last=15.0 * DEG)
@@ -112,6 +113,7 @@ def test_a_smaller_filter_takes_what_it_has_states_for(saved, states):
         )
 
 
+@pytest.mark.slow
 def test_a_sweep_lowers_u_of_the_next_run_which_stays_consistent():
     """A sweep shows the biases, which make most of u at one angle. Sensors drawn from the study's prior, each with a
     run of its own: the mean of error^2/u^2, all but constant over a run at rest, is 1 at most within 5 standard
@@ -206,7 +208,7 @@ def used(path, settings):
     return load(path, settings), corrected(path, settings)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("keys", "value"),
     [
         (("result", "gravity"), {}),
@@ -255,6 +257,7 @@ def rig(settings, rng):
     return replace(settings, layout=layout), 1.0 + off[0]
 
 
+@pytest.mark.slow
 def test_a_turntable_puts_scales_and_axes_right(tmp_path):
     """0.5 mrad of an axis and 0.05 % of scale are 0.03 deg each, and no fusion sees them; a turntable does.
 

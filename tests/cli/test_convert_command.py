@@ -12,6 +12,7 @@ from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.instruments.triad import TriadModel
+from rows import for_each
 
 NAMES = (
     *(f"{term}_{axis}" for term in ("K0", "K1", "D_F", "S") for axis in "xyz"),
@@ -136,7 +137,7 @@ def test_a_bad_verdict_goes_along(folder, capsys):
     assert "ill_conditioned" in captured.err
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["cal.json"], ["--to", "missing", "imu_tk, imucal, kalibr, psins"]),
@@ -186,6 +187,7 @@ def test_a_file_of_imu_tk_is_not_overwritten_by_its_second_name(folder, capsys):
     assert "x_acc.calib: is an input" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", CONVENTIONS)
 def test_spoiled_files_of_other_tools_end_with_a_calibration_or_one_line(folder, capsys, tool):
     run(["convert", "cal.json", "--to", tool, "--out", "theirs" + CONVENTIONS[tool].suffixes[0], "--quiet"])

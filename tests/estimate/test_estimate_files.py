@@ -17,6 +17,7 @@ from inercal.estimate.files import from_json, load, plain_objects, save, to_json
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, Finding, Status
 from inercal.inputs import Source
+from rows import for_each
 
 
 def example(**more):
@@ -275,8 +276,8 @@ FOREIGN = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("suffix", [".json", ".toml", ".txt", ""])
-@pytest.mark.parametrize("content", FOREIGN, ids=range(len(FOREIGN)))
+@for_each("suffix", [".json", ".toml", ".txt", ""])
+@for_each("content", FOREIGN)
 def test_foreign_files(tmp_path, content, suffix):
     path = tmp_path / f"foreign{suffix}"
     path.write_bytes(content)

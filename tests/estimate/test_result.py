@@ -12,6 +12,7 @@ from scipy import stats
 from inercal.errors import CalibrationError
 from inercal.estimate.result import Estimate, Parameter, coverage_factor, rounded
 from inercal.findings import Status
+from rows import for_each
 
 
 def estimate(values=(1.0, 2.0), covariance=((0.04, 0.01), (0.01, 0.09)), dof=(5.0, np.inf), **more):
@@ -30,7 +31,7 @@ def estimate(values=(1.0, 2.0), covariance=((0.04, 0.01), (0.01, 0.09)), dof=(5.
 # Coverage.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("dof", "k95", "k9545", "k99"),
     [
         (1, 12.71, 13.97, 63.66), (2, 4.30, 4.53, 9.92), (3, 3.18, 3.31, 5.84), (4, 2.78, 2.87, 4.60),
@@ -78,7 +79,7 @@ def test_expanded_uncertainty_and_interval_agree():
 # Rounding.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("value", "u", "texts"),
     [
         (10.05762, 0.027, ("10.058", "0.027")),  # GUM 7.2.6
@@ -170,7 +171,7 @@ def test_no_correlation_with_what_is_certain():
     np.testing.assert_array_equal(estimate(covariance=((0.0, 0.0), (0.0, 4.0))).correlation, [[0, 0], [0, 1]])
 
 
-@pytest.mark.parametrize("status", Status)
+@for_each("status", Status)
 def test_raise_for_status(status):
     result = estimate(status=status, message="poses are missing")
     if status is Status.OK:

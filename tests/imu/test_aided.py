@@ -173,13 +173,16 @@ def test_there_are_24_mountings_all_of_them_right_handed():
 # uncertainties
 
 
-@pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say():
-    sample = run(one_calibration, runs=RUNS, seed=SEED)
+@pytest.mark.parametrize("runs", [20, pytest.param(RUNS, marks=pytest.mark.campaign)])
+def test_intervals_cover_the_truth_as_often_as_they_say(runs):
+    """Of 20 runs 14 hits are the exact limit of one coefficient at a risk of 4e-5; 0.88 of all together is four and
+    a half standard deviations at a design effect of 3."""
+    sample = run(one_calibration, runs=runs, seed=SEED)
     assert np.all(sample["sound"] == 1.0)
     found = coverage(sample["error"], sample["u"], sample["dof"])
-    assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table()
-    assert 0.937 <= found.pooled <= 0.963, found.table()
+    each, least, most = ((0.892, 0.992), 0.937, 0.963) if runs == RUNS else ((0.7, 1.0), 0.88, 1.0)
+    assert np.all((found.fraction >= each[0]) & (found.fraction <= each[1])), found.table()
+    assert least <= found.pooled <= most, found.table()
 
 
 def test_errors_of_the_table_widen_the_uncertainties_and_are_in_the_budget(noisy):

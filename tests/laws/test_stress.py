@@ -1,4 +1,6 @@
-"""Laws of every run, however absurd its study and its recording: benchmarks/stress.py, 500 runs of each system.
+"""Laws of every run, however absurd its study and its recording: benchmarks/stress.py.
+
+The test run makes 125 runs of each system, `make campaign` the rest of 500.
 
 A result is finite, with a covariance that is one and a known status, or the run is refused in one sentence; nothing
 warns, and nothing takes longer than 30 s. The seed was fixed before the first run.
@@ -16,7 +18,8 @@ from inercal.findings import Status
 RUNS, PARTS = 500, 4
 
 
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.slow
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.campaign) for k in range(1, PARTS))])
 @pytest.mark.parametrize("room", stress.ROOMS)
 def test_absurd_runs_end_in_a_sound_result_or_in_words(room, part, monkeypatch):
     held, of_truth = [], laws.of_truth

@@ -87,6 +87,7 @@ def paper():
     return page_of(study(grid((8, 8))))
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_analysis(paper):
     analysed, _, found = paper
     assert found.heads[:3] == ["Findings", "Ranking", "Figures"]
@@ -109,6 +110,7 @@ def test_numbers_are_those_of_the_analysis(paper):
             assert shown[titles.index(f"{name}, {words}")] == pytest.approx(getattr(kind, key), rel=0.06)
 
 
+@pytest.mark.slow
 def test_figures_four_and_five_of_the_paper(paper):
     _, text, found = paper
     for title in ("Which errors matter", "Mean indices by output", "Maps over the positions", "Interactions"):
@@ -117,6 +119,7 @@ def test_figures_four_and_five_of_the_paper(paper):
     assert "figure 5 of Zhao" in text
 
 
+@pytest.mark.slow
 def test_factors_with_their_sizes():
     rows = page_of(
         study(grid((4, 4)), dphi_y1=normal(0.2 * ARCMIN), deps_x=uniform(90.0 * ARCMIN), d_eta=uniform(2e-5))
@@ -128,6 +131,7 @@ def test_factors_with_their_sizes():
     assert sizes["dtheta_z"] == ["uniform", "± 2 arcmin", "run"]
 
 
+@pytest.mark.slow
 def test_flagged_positions_are_counted_and_the_worst_come_first(paper):
     analysed, text, found = page_of(study(grid((8, 8), half_step=False)))
     assert len(analysed.flagged) > 12
@@ -204,6 +208,7 @@ def test_what_is_no_even_grid_is_drawn_as_points():
     assert drawn.svg.count("<image") <= 1  # the colour bar alone
 
 
+@pytest.mark.slow
 def test_same_analysis_same_bytes():
     settings = study(grid((4, 4)))
     analysed = analyse(settings)

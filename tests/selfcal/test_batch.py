@@ -266,6 +266,7 @@ def test_other_gimbals_and_base():
     assert np.all(np.abs(found.coefficients - filtered.coefficients) < 0.02 * sigmas(found))
 
 
+@pytest.mark.slow
 def test_consistent_in_sixty_runs():
     """Truth from the prior, fresh noise: NEES is chi-square of 18 a run, NIS of 6 a row (seeds set beforehand)."""
     rng = np.random.default_rng(1905)

@@ -72,6 +72,7 @@ def test_a_second_process_compiles_no_filter(compiled):
     assert again["found"] == compiled["found"]
 
 
+@pytest.mark.slow
 def test_kernels_say_the_same_as_plain_python(compiled):
     """Without compiling: apart by rounding alone, 1e-9 of the prior."""
     plain = ran(NUMBA_DISABLE_JIT="1")

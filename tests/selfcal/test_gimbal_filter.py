@@ -18,6 +18,7 @@ from inercal.selfcal.platform.kinematics import angles, parity
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.rig import Gimbals, World
 from inercal.selfcal.settings import Filter
+from rows import for_each
 
 EVERY_RIG = tuple(product(permutations("xyz"), product((1, -1), repeat=3)))
 EULER = Filter(integration="euler")
@@ -51,7 +52,7 @@ def paper():
     return settings, [simulate(prepared, np.random.default_rng(seed)) for seed in range(4)]
 
 
-@pytest.mark.parametrize("rig", EVERY_RIG)
+@for_each("rig", EVERY_RIG)
 def test_kinematics_are_those_of_the_inverted_joint_axes(rig):
     """th' = J^-1 (w - C_pb w_Ib), f = C_pb up, walk T T^T: orders and signs as of the chain of elementary turns."""
     rng = np.random.default_rng(31)

@@ -33,6 +33,7 @@ def designed():
 # the search
 
 
+@pytest.mark.slow
 def test_it_is_at_least_as_good_as_the_known_paths(designed):
     made, _ = designed
     found, *others = made.compare
@@ -118,6 +119,7 @@ def test_what_does_not_fit_is_said():
 # what is told
 
 
+@pytest.mark.slow
 def test_result_holds_what_a_study_and_a_program_need(designed):
     made, told = designed
     result = json.loads(json.dumps(made.result))

@@ -154,6 +154,7 @@ def test_a_calibration_without_a_known_truth():
     assert "truth" not in drawn[1].caption
 
 
+@pytest.mark.slow
 def test_a_simulation_is_set_against_its_truth():
     q, _ = gimbals(SHORT.angles(), study().world)
     found = evidence(compared={"gimbal-ukf": filtered("gimbal-ukf", seed=3)}, truth=TRUTH)
@@ -443,6 +444,7 @@ def test_a_design_is_set_against_its_goals():
     assert "goal" not in texts(plain)
 
 
+@pytest.mark.slow
 def test_statistics_are_in_words():
     """Nothing of a self-calibration is a residual of |f|; what a row cost is there with its share of the interval."""
     statistics = {"residual_rms": 1.001, "chi2": 16220.0, "nis_mean": 6.008, "steps": 2700.0}

@@ -318,6 +318,7 @@ def test_samples_of_one_stay_carry_their_own_angles():
 # uncertainty
 
 
+@pytest.mark.slow
 def test_intervals_cover_as_they_say():
     """150 tests with noise, table errors by scope and an uncertain table rate; noise stated or not by turns."""
     runs, level, noise = 150, 0.95, 2.0 * DEG_H
@@ -339,6 +340,7 @@ def test_intervals_cover_as_they_say():
     assert all(low <= count <= high for count in hits.values()), (hits, low, high)
 
 
+@pytest.mark.slow
 def test_a_bias_is_covered_where_the_table_scatters_more_than_the_noise():
     """Noise that is not stated hides behind table errors of 30 arcmin: its few degrees of freedom must count."""
     runs, level, bias = 150, 0.95, 5.0 * DEG_H

@@ -75,6 +75,7 @@ def check(page):
     return page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [named("24-position"), grid((6, 6))], ids=["stated", "fitted"])
 def test_a_sound_calibration(plan):
     calibration = calibrated(plan, gyrowheel())
@@ -88,6 +89,7 @@ def test_a_sound_calibration(plan):
     assert "{" not in page[page.index("<h2>How it was done</h2>") :]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "unit", "noise"),
     [("accelerometer", "mg", 1e-4), ("gyro", "deg/h", 1e-7), ("gyro", "count", 1.0)],
@@ -116,6 +118,7 @@ def test_positions_that_identify_too_little_are_shown():
     check(render(calibration.shown, [drawn], "Too few"))
 
 
+@pytest.mark.slow
 def test_many_positions_stay_small():
     drawn = pictures(calibrated(grid((36, 36)), gyrowheel()))
     assert all(len(picture.svg) < 700_000 for picture in drawn)
@@ -167,6 +170,7 @@ def test_units_of_other_things_stay():
     assert shown_unit("count", parse_unit("count")) == ("count", 1.0)
 
 
+@pytest.mark.slow
 def test_a_design_on_a_page():
     settings = study(
         grid((12, 12)), gyrowheel(), positions=24, criterion="D", compare=("24-position", "6-position")
