@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from inercal.estimate.result import without_parameters
 from inercal.findings import Status
 from inercal.geometry.site import Site
-from inercal.report.sensitivity import _even_grid, _map, interactions, maps
 from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.plans import grid, listed, named
 from inercal.rigs.tables import turntable
 from inercal.turntable.analysis import analyse
-from inercal.turntable.figures import sensitivity_page
+from inercal.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
+from inercal.turntable.figures.sensitivity import page as sensitivity_page
 from inercal.turntable.settings import Analysis, Design, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)

@@ -11,12 +11,13 @@ from inercal.estimate.result import rounded, without_parameters
 from inercal.findings import Status
 from inercal.geometry.site import Site
 from inercal.report.html import render
-from inercal.report.positions import hemispheres
+from inercal.report.sphere import hemispheres
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import turntable
 from inercal.turntable.display import displayed, shown_unit
-from inercal.turntable.figures import design_page, pictures
+from inercal.turntable.figures import pictures
+from inercal.turntable.figures.design import page as design_page
 from inercal.turntable.planning import design
 from inercal.turntable.settings import Design, Instrument, TurntableSettings
 from inercal.turntable.simulate import simulate

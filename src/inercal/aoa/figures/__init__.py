@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
+from inercal.aoa.figures import sensors
+from inercal.aoa.figures.innovations import innovations
 from inercal.aoa.flow import alpha_beta, stated
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.result.display import delays, displayed, shown_unit
@@ -18,18 +20,17 @@ from inercal.aoa.result.tables import answer, on_page
 from inercal.aoa.result.verification import REFERENCE_U
 from inercal.aoa.task import in_order
 from inercal.arrays import Array
-from inercal.report import sting
-from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches
-from inercal.report.aoa_innovations import innovations
-from inercal.report.figures import correlation
-from inercal.report.histories import Course, converging, falling
+from inercal.report.coefficients import correlation
+from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture, render
 from inercal.report.numbers import SETTLED, known, largest, middle, rms, settled, span
+from inercal.report.over_time import Flags, Marks, Panel, gaps, measured, over_time, stretches
 from inercal.report.spectra import of_angle
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from inercal.aoa.fusion.filter_result import Filtered
+    from inercal.aoa.reading.recording import Recording
     from inercal.aoa.settings import AoaSettings
     from inercal.aoa.task import Measurement
 
@@ -43,34 +44,33 @@ _NO_FORCE = 1e-3
 """Specific force [mg] that is none."""
 
 
-def angle_page(measurement: Measurement, settings: AoaSettings) -> str:
-    """The report of a measurement as one self-contained HTML page, with or without other methods and a reference."""
-    estimate = measurement.estimate
-    return render(
-        displayed(estimate),
-        pictures(measurement, settings),
-        "Angle of a wind-tunnel model",
-        on_page(estimate),
-        answer(estimate, measurement.points, settings),
-    )
-
-
-def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
-    """Draw what there is to see of a measurement of whatever method, status and length."""
-    layout, gyro = settings.layout, measurement.recording.gyro
-    map_of_sensors = sting.side_view(
-        layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any())
-    )
+def main(measurement: Measurement) -> Picture:
+    """The picture that answers the question: the angle with its band; the sensors where there is no angle."""
     seen = in_order(measurement)
+    return _angle(seen, _marks(seen)) if len(seen.recording.t) > 1 else _sensors(measurement)
+
+
+def page(measurement: Measurement) -> str:
+    """The report of a measurement as one self-contained HTML page, with or without other methods and a reference."""
+    return render(
+        displayed(measurement.estimate),
+        pictures(measurement),
+        "Angle of a wind-tunnel model",
+        on_page(measurement.estimate),
+        answer(measurement.estimate, measurement.points, measurement.settings),
+    )
+
+
+def pictures(measurement: Measurement) -> list[Picture]:
+    """All pictures of a measurement of whatever method, status and length, the main one first."""
+    settings, map_of_sensors, seen = measurement.settings, _sensors(measurement), in_order(measurement)
     recording, found = seen.recording, seen.filtered
     t = recording.t
     if len(t) < 2:
         return [map_of_sensors]
-    names = (*layout.names, "gyro")
-    missing = np.isnan(np.column_stack([recording.acc, recording.gyro]))
-    masked = recording.masked if recording.masked is not None else np.zeros(missing.shape, dtype=bool)
-    restarts = np.empty(0) if found is None else t[list(found.starts[1:])]
-    marks = Marks(stretches(t, np.asarray(masked.any(axis=1))), gaps(t), restarts=restarts)
+    names = (*settings.layout.names, "gyro")
+    missing, masked = _lost(recording)
+    marks = _marks(seen)
     drawn = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
     if missing.any() or len(marks.gaps):
         drawn.append(measured(t, names, missing, masked, marks))
@@ -88,6 +88,26 @@ def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
         {} if found is None else dict(zip(names, found.innovations.T, strict=True)),
     )
     return drawn + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
+
+
+def _sensors(measurement: Measurement) -> Picture:
+    """Where the sensors are on the model."""
+    layout, gyro = measurement.settings.layout, measurement.recording.gyro
+    return sensors.side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
+
+
+def _lost(recording: Recording) -> tuple[Flags, Flags]:
+    """Samples (n, k) that are missing, and those that are saturated."""
+    missing = np.isnan(np.column_stack([recording.acc, recording.gyro]))
+    masked = recording.masked if recording.masked is not None else np.zeros(missing.shape, dtype=bool)
+    return missing, np.asarray(masked)
+
+
+def _marks(seen: Measurement) -> Marks:
+    """Stretches that are saturated or empty, and where the filter started anew."""
+    t, (_, masked) = seen.recording.t, _lost(seen.recording)
+    restarts = np.empty(0) if seen.filtered is None else t[list(seen.filtered.starts[1:])]
+    return Marks(stretches(t, np.asarray(masked.any(axis=1))), gaps(t), restarts=restarts)
 
 
 def _angle(seen: Measurement, marks: Marks) -> Picture:
@@ -226,7 +246,7 @@ def _fitted(seen: Measurement) -> list[Picture]:
     values[0] -= 1.0
     u = np.array([[each.u for each in row] for row in rows])
     told = np.array([[each.name not in fit.unseen for each in row] for row in rows])
-    return [sting.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
+    return [sensors.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
 
 
 def _points(measurement: Measurement) -> list[Picture]:
@@ -242,7 +262,7 @@ def _points(measurement: Measurement) -> list[Picture]:
         true = [known(reference[each.start : each.stop]) for each in found]
         means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
         error = np.degrees(_apart(np.radians(theta), means))
-    return [sting.points(theta, u, left, scatter, error)]
+    return [sensors.points(theta, u, left, scatter, error)]
 
 
 def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
@@ -260,7 +280,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
     panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
     return [
-        sting.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
+        sensors.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
         over_time(
             "Methods over time",
             f"The {what}, a panel for each method, each on a scale of its own: that which it spans after the first "
@@ -364,7 +384,7 @@ def _learned(seen: Measurement, found: Filtered) -> list[Picture]:
         for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True)
     ]
     last = found.states[told[-1], places] / sizes, found.states_u[told[-1], places] / sizes
-    at_end = sting.learned(
+    at_end = sensors.learned(
         tuple(problem.nuisances), units, *last, problem.mean[places] / sizes, prior[places] / sizes
     )
     if found.smoothed:
