@@ -133,14 +133,15 @@ def titles(pictures):
 def test_a_calibration_without_a_known_truth():
     drawn = drawn_by.pictures(evidence())
     assert titles(drawn) == [
-        "The path",
+        "Uncertainties beside their bounds",
         "Convergence of the coefficients",
         "How the uncertainties fall",
+        "The path",
+        "Axes and signs of the gimbals",
         "Attitude against the encoders",
         "Change still to come of the accelerometers' coefficients, in percent",
         "Normalised innovations squared",
         "Innovations and whether they are white",
-        "Uncertainties beside their bounds",
         "Correlation of the coefficients",
         "Where the uncertainty comes from",
     ]

@@ -191,7 +191,7 @@ def values(estimate: Estimate) -> Picture:
     panels = []
     for (_, unit), group in groups.items():
         rows = np.arange(len(group))
-        across = Axis("" if unit == "1" else f"[{plain_unit(unit)}]")
+        across = Axis("" if unit == "1" else f"[{plain_unit(unit)}]", few=True)
         shown = [rounded(estimate.values[k], estimate.u[k]) for k in group]
         panels.append(
             Panel(

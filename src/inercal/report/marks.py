@@ -40,7 +40,7 @@ class Dots:
     y: ArrayLike
     label: str = ""
     colour: str = COLOURS[0]
-    shape: str = "o"
+    shape: str | tuple[int, int, float] = "o"
     size: float = 4.0
     filled: bool = True
     across: ArrayLike | None = None
@@ -157,7 +157,8 @@ class Axis:
     """An axis: its ``label``, ``scale`` and ``limits``; ``names`` of rows or columns; ``ticks`` where not as usual.
 
     With ``symlog`` the axis is linear up to ``linear``. Names are ``turned`` by degrees; ``far`` sets them at the top.
-    A logarithmic axis has at most so many ``powers`` of ten, and ``whole`` numbers count.
+    A logarithmic axis has at most so many ``powers`` of ten, ``whole`` numbers count, and
+    ``few`` ones leave room for long ones.
     """
 
     label: str = ""
@@ -171,6 +172,7 @@ class Axis:
     far: bool = False
     size: float = 7.0
     powers: int = 6
+    few: bool = False
     margin: float | None = None
 
 

@@ -106,7 +106,7 @@ def _panel(axes: Axes, panel: Panel, first: bool) -> None:
     for mark in panel.marks:
         _mark(axes, mark, panel.colours)
     if panel.title:
-        axes.set_title(panel.title)
+        axes.set_title(panel.title, pad=12.0 if panel.bare else None)
     axes.margins(x=panel.x.margin, y=panel.y.margin)
     _axis(axes.xaxis, panel.x, "x")
     _axis(axes.yaxis, panel.y, "y", named=first)
@@ -161,6 +161,9 @@ def _axis(drawn: DrawnAxis, axis: Axis, way: Literal["x", "y"], named: bool = Tr
         set_ticks(axis.ticks)
     elif axis.whole:
         drawn.set_major_locator(MaxNLocator(integer=True))
+    elif axis.few:
+        drawn.set_major_locator(MaxNLocator(4, prune="both"))
+        axes.ticklabel_format(axis=way, style="plain", useOffset=False)
     if axis.label and named:
         drawn.set_label_text(axis.label)
 
@@ -227,19 +230,21 @@ def _dots(axes: Axes, mark: Dots, colours: Colours | None) -> None:
         )  # fmt: skip
         return
     look: Any = {
+        "ls": "none",
+        "marker": mark.shape,
         "color": mark.colour,
         "mec": INK if mark.edged else mark.colour,
         "mfc": mark.colour if mark.filled else "none",
-        "mew": 0.5 if mark.edged else 1.0 if mark.filled and mark.shape not in "|_+x" else 1.2,
+        "mew": 0.5 if mark.edged else 1.0 if mark.filled and mark.shape not in ("|", "_", "+", "x") else 1.2,
         "ms": mark.size,
         "label": mark.label or None,
     }
     if mark.across is None and mark.up is None:
-        axes.plot(mark.x, mark.y, mark.shape, **look)
+        axes.plot(mark.x, mark.y, **look)
     else:
         axes.errorbar(
-            mark.x, mark.y, mark.up, mark.across, fmt=mark.shape, ecolor=mark.bar or mark.colour, elinewidth=0.9, **look
-        )  # fmt: skip
+            mark.x, mark.y, mark.up, mark.across, ecolor=mark.bar or mark.colour, elinewidth=0.9, **look
+        )
 
 
 def _bars(axes: Axes, mark: Bars) -> None:

@@ -9,11 +9,11 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.report.html import Picture
-from inercal.report.marks import Arrows, Axis, Line, Mark, Note, Panel
+from inercal.report.marks import Arrows, Axis, Dots, Line, Mark, Note, Panel
 from inercal.report.panels import draw
 from inercal.report.style import COLOURS, INK, QUIET
 
-_AZIMUTH, _ELEVATION = np.radians(28.0), np.radians(20.0)
+_AZIMUTH, _ELEVATION = np.radians(40.0), np.radians(22.0)
 """From where the rig is seen: turned from south to east, and above the horizon."""
 
 _STEP = 0.34
@@ -47,8 +47,8 @@ def rig(title: str, caption: str, joints: Sequence[Turn], instrument: Triad) -> 
     marks += _triad(instrument, np.zeros(2), 0.66, INK)
     reach = 1.0 + _STEP * len(joints) + 0.45
     marks += _triad(Triad(("north", "west", "up"), np.eye(3)), np.array([-reach - 1.15, -0.75]), 0.62, QUIET)
-    axes = Axis(limits=(-reach - 2.1, reach + 0.9)), Axis(limits=(-reach, reach))
-    return draw(title, caption, [[Panel(marks, *axes, equal=True, bare=True)]], 3.6)
+    axes = Axis(limits=(-reach - 2.1, reach + 0.9)), Axis(limits=(-reach + 0.3, reach - 0.2))
+    return draw(title, caption, [[Panel(marks, *axes, equal=True, bare=True)]], 3.4)
 
 
 def _seen(points: Array) -> Array:
@@ -83,13 +83,13 @@ def _turn(joint: Turn, radius: float, colour: str) -> list[Mark]:
     ends = _seen(np.outer([-(radius + 0.12), radius + 0.42], joint.axis))
     first, second = _across(joint.axis)
     angle = np.radians(np.linspace(-60.0, 215.0, 60))[:, None]
-    arc = _seen((radius + 0.2) * joint.axis + 0.17 * (np.cos(angle) * first + np.sin(angle) * second))
-    tip = 1.6 * (arc[-1] - arc[-4])
+    arc = _seen((radius + 0.2) * joint.axis + 0.19 * (np.cos(angle) * first + np.sin(angle) * second))
+    heading = float(np.degrees(np.arctan2(*(arc[-1] - arc[-3])[::-1])))
     far = _seen((radius + 0.6) * joint.axis)
     return [
         Line(ends[:, 0], ends[:, 1], "", colour, 0.9, (0, (6, 2))),
         Line(arc[:, 0], arc[:, 1], "", colour, 1.4),
-        Arrows(arc[-1:, 0], arc[-1:, 1], tip[:1], tip[1:], [colour], 0.004),
+        Dots(arc[-1:, 0], arc[-1:, 1], "", colour, (3, 0, heading - 90.0), 6.0),
         Note(far, f"{joint.name} +", colour, 8.0, "center", "center", bold=True, ground=True),
     ]
 
