@@ -76,7 +76,13 @@ def draw(
         if len(panels[0]) == 1:
             page.align_ylabels(grid[:, 0])
         if shown:
-            page.legend(list(shown.values()), list(shown), loc=_OUTSIDE[where], ncols=columns)
+            page.legend(
+                list(shown.values()),
+                list(shown),
+                loc=_OUTSIDE[where],
+                ncols=columns,
+                markerscale=_enlarged(panels),
+            )
         places = [
             (panel, axes)
             for row, line in zip(panels, grid, strict=True)
@@ -85,6 +91,18 @@ def draw(
         for scale in dict.fromkeys(panel.colours for panel, _ in places if panel.colours is not None):
             _scale(page, scale, [axes for panel, axes in places if panel.colours == scale])
         return Picture(title, caption, svg(page), page)
+
+
+def _enlarged(panels: Sequence[Sequence[Panel]]) -> float:
+    """How much larger the dots of a legend are, so that their colours can be told apart."""
+    sizes = [
+        mark.size
+        for row in panels
+        for panel in row
+        for mark in panel.marks
+        if isinstance(mark, Dots) and mark.label
+    ]
+    return max(1.0, 4.0 / max(sizes, default=4.0))
 
 
 def _scale(page: Figure, colours: Colours, panels: list[Axes]) -> None:

@@ -40,10 +40,11 @@ def rig(title: str, caption: str, joints: Sequence[Turn], instrument: Triad) -> 
     """A rig at zero angles, outer joint first: a ring for each joint with its axis and an arrow the way it turns plus,
     the axes of the instrument within, and north, west and up beside it."""
     marks: list[Mark] = []
+    outermost = 1.0 + _STEP * (len(joints) - 1)
     for k, joint in enumerate(joints):
         radius, colour = 1.0 + _STEP * (len(joints) - 1 - k), COLOURS[k % len(COLOURS)]
         inner = joints[k + 1].axis if k + 1 < len(joints) else None
-        marks += [*_ring(joint.axis, inner, radius, colour), *_turn(joint, radius, colour)]
+        marks += [*_ring(joint.axis, inner, radius, colour), *_turn(joint, outermost, colour)]
     marks += _triad(instrument, np.zeros(2), 0.66, INK)
     reach = 1.0 + _STEP * len(joints) + 0.45
     marks += _triad(Triad(("north", "west", "up"), np.eye(3)), np.array([-reach - 1.15, -0.75]), 0.62, QUIET)
@@ -79,7 +80,7 @@ def _ring(axis: Array, inner: Array | None, radius: float, colour: str) -> list[
 
 
 def _turn(joint: Turn, radius: float, colour: str) -> list[Mark]:
-    """The axis of a joint through its ring, and around its plus end an arrow the way it turns."""
+    """The axis of a joint, and around its plus end, outside all rings, an arrow the way it turns."""
     ends = _seen(np.outer([-(radius + 0.12), radius + 0.42], joint.axis))
     first, second = _across(joint.axis)
     angle = np.radians(np.linspace(-60.0, 215.0, 60))[:, None]
@@ -101,5 +102,5 @@ def _triad(triad: Triad, at: Array, size: float, colour: str) -> list[Mark]:
     marks: list[Mark] = [Arrows(start[:, 0], start[:, 1], tips[:, 0], tips[:, 1], [colour] * 3, 0.0035)]
     for name, tip in zip(triad.names, tips, strict=True):
         beyond = at + tip + 0.16 * tip / max(float(np.linalg.norm(tip)), 0.3)
-        marks.append(Note(beyond, name, colour, 7.5, "center", "center"))
+        marks.append(Note(beyond, name, colour, 7.5, "center", "center", ground=True))
     return marks
