@@ -6,17 +6,16 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from inercal.estimate.basis import Basis
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.site import Site
-from inercal.report.sensitivity import _even_grid, _map, interactions, maps
 from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.plans import grid, listed, named
 from inercal.rigs.tables import turntable
-from inercal.turntable.figures import sensitivity_page
+from inercal.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
+from inercal.turntable.figures.sensitivity import page as sensitivity_page
 from inercal.turntable.sensitivity.analysis import analyse
 from inercal.turntable.settings import Analysis, Design, TurntableSettings
 
@@ -90,7 +89,7 @@ def paper():
 @pytest.mark.slow
 def test_numbers_are_those_of_the_analysis(paper):
     analysed, _, found = paper
-    assert found.heads[:3] == ["Findings", "Ranking", "Figures"]
+    assert found.heads[:3] == ["Which errors matter", "Findings", "Ranking"]
     order = np.argsort(-analysed.aggregate.total, kind="stable")
     rows = [row for row in found.rows if len(row) == 5 and row[0].isdigit()]
     assert [row[1].split()[0] for row in rows] == [analysed.indices.factors[k] for k in order]
@@ -183,10 +182,8 @@ def test_a_cell_of_a_map_holds_the_value_of_its_position(shuffle):
     if shuffle:
         order = np.random.default_rng(3).permutation(len(angles))
         angles, values = angles[order], values[order]
-    axes = Figure().subplots()
-    image = _map(axes, angles, values, 1.0)
-    left, right, low, high = image.get_extent()
-    cells = np.asarray(image.get_array())
+    image = _map(angles, values)
+    (left, right, low, high), cells = image.extent, image.values
     for (phi1, phi2), value in zip(np.degrees(angles), values, strict=True):
         column = int((phi1 - left) / (right - left) * cells.shape[1])
         row = int((phi2 - low) / (high - low) * cells.shape[0])

@@ -17,15 +17,17 @@ from inercal.estimate.budget import TypeA, combine
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.rotations import exp, multiply, normalize
-from inercal.report import filtering
+from inercal.report import innovations as filtering
 from inercal.report.cells import Cell
-from inercal.report.figures import dots
-from inercal.report.histories import turning
-from inercal.report.selfcal import attitude_errors
+from inercal.report.coefficients import dots
+from inercal.report.courses import turning
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import Designed, Judged
 from inercal.selfcal.display import displayed, of_field
+from inercal.selfcal.figures.design import page as design_page
+from inercal.selfcal.figures.filters import attitude_errors
+from inercal.selfcal.figures.monte_carlo import page as campaign_page
 from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
@@ -99,7 +101,7 @@ def evidence(found=None, status=Status.OK, **changes):
     )
     bounds = Bounds(names(p), 0.9 * covariance, PRIOR[:p], np.zeros((0, p)))
     of = FilterProblem(study().world, study().noise, PRIOR[:p])
-    return replace(Calibration(estimate, of, recording, found, bounds), **changes)
+    return replace(Calibration(estimate, of, recording, found, bounds, study(plan=SHORT)), **changes)
 
 
 def words_of(svg):
@@ -130,16 +132,17 @@ def titles(pictures):
 
 
 def test_a_calibration_without_a_known_truth():
-    drawn = drawn_by.pictures(evidence(), study(plan=SHORT))
+    drawn = drawn_by.pictures(evidence())
     assert titles(drawn) == [
-        "The path",
+        "Uncertainties beside their bounds",
         "Convergence of the coefficients",
         "How the uncertainties fall",
+        "The path",
+        "Axes and signs of the gimbals",
         "Attitude against the encoders",
         "Change still to come of the accelerometers' coefficients, in percent",
         "Normalised innovations squared",
         "Innovations and whether they are white",
-        "Uncertainties beside their bounds",
         "Correlation of the coefficients",
         "Where the uncertainty comes from",
     ]
@@ -158,7 +161,7 @@ def test_a_calibration_without_a_known_truth():
 def test_a_simulation_is_set_against_its_truth():
     q, _ = gimbals(SHORT.angles(), study().world)
     found = evidence(compared={"gimbal-ukf": filtered("gimbal-ukf", seed=3)}, truth=TRUTH)
-    drawn = {picture.title: picture for picture in drawn_by.pictures(found, study(plan=SHORT), q)}
+    drawn = {picture.title: picture for picture in drawn_by.pictures(found, q)}
     assert "Red dots: the truth" in drawn["Convergence of the coefficients"].caption
     assert {"error-state", "gimbal-ukf"} <= set(texts(drawn["Error of the attitude"]))
     assert [f"q{k} [10⁻⁶]" in texts(drawn["Error of the attitude"]) for k in range(4)] == [True] * 4
@@ -188,7 +191,7 @@ def test_the_attitude_against_the_encoders_turns_from_these_to_the_estimate(monk
     read, _ = gimbals(found.recording.th, study().world)
     turned = multiply(read, exp(np.array([5.0 * ARCSEC, 0.0, 0.0])))
     estimated = replace(found.filtered, history=replace(found.filtered.history, attitude=turned))
-    drawn_by.pictures(replace(found, filtered=estimated), study(plan=SHORT))
+    drawn_by.pictures(replace(found, filtered=estimated))
     assert told["rotation"] / ARCSEC == pytest.approx(np.tile([5.0, 0.0, 0.0], (len(read), 1)), abs=1e-6)
 
 
@@ -244,7 +247,7 @@ def without_coefficients():
 )
 def test_every_case_has_a_page(found):
     found, settings = found(), study(plan=SHORT, goal={"kg0_x": 0.001 * PER_HOUR})
-    page = check(drawn_by.calibration_page(found, settings))
+    page = check(drawn_by.page(replace(found, settings=settings)))
     assert found.estimate.status.meaning in page
     assert "What the path cannot see" in page
     assert ("Filters side by side" in page) == bool(found.compared)
@@ -418,7 +421,7 @@ def test_the_page_of_a_design():
         "up to 5 turns",
         (),
     )
-    page = check(drawn_by.design_page(found, settings, told(found)))
+    page = check(design_page(found, settings, told(found)))
     assert page.index("Comparison of paths") < page.index("Turns") < page.index("What the path cannot see")
     for words in ("found", "ds_z", "(rest 5 s)", "up to 5 turns", "0.0005 °/√h", "10 µg", "The path found"):
         assert words in page
@@ -432,10 +435,10 @@ def test_a_design_is_set_against_its_goals():
     ratio = 0.002 * PRIOR[0] / (0.01 * PER_HOUR)
     assert table.columns[-1] == ("of goal", "")
     assert [row[-1] for row in table.rows] == [f"{ratio:.3g}", *["–"] * 17]
-    assert "Bar: the goal." in drawn_by.design_page(found, settings, told(found))
+    assert "Bar: the goal." in design_page(found, settings, told(found))
     without = Designed((judged("found", SHORT, np.full(18, 0.002), study()),), "", ())
     assert bounds_by_path(without).columns[-1] == ("prior", "")
-    assert "Bar: the goal." not in drawn_by.design_page(without, study(), told(without))
+    assert "Bar: the goal." not in design_page(without, study(), told(without))
     with_goal, plain = (
         dots("", "", ("a", "b"), ("1", "1"), {"found": np.array([2.0, 3.0])}, goal)
         for goal in (np.array([1.0, np.nan]), None)
@@ -450,7 +453,7 @@ def test_statistics_are_in_words():
     statistics = {"residual_rms": 1.001, "chi2": 16220.0, "nis_mean": 6.008, "steps": 2700.0}
     calibration = evidence()
     own = replace(calibration.estimate, statistics=statistics, result={"step_us": 4.0, "sample_share": 2e-5})
-    page = drawn_by.calibration_page(replace(calibration, estimate=own), study(plan=SHORT))
+    page = drawn_by.page(replace(calibration, estimate=own))
     for words in (
         "<dt>root-mean-square normalised innovation, expected 1</dt><dd>1.001</dd>",
         "<dt>normalised innovation squared of a row (NIS), mean</dt><dd>6.008</dd>",
@@ -489,7 +492,7 @@ def test_the_page_of_a_campaign():
         )
 
     sound, poor, cautious = (
-        drawn_by.campaign_page(found, study(), told(found)) for found in map(campaign, (1.0, 2.0, 0.3))
+        campaign_page(found, study(), told(found)) for found in map(campaign, (1.0, 2.0, 0.3))
     )
     assert "the stated uncertainties hold: 200 runs" in sound
     assert "the stated uncertainties are too small" in poor

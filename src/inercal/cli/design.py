@@ -65,7 +65,7 @@ def design_positions(
     estimate = _told("design positions", designed, timing, inputs, settings, REFERENCES)
 
     def page() -> str:
-        from inercal.turntable.figures import design_page
+        from inercal.turntable.figures.design import page as design_page
 
         return design_page(designed, settings, estimate)
 
@@ -105,7 +105,7 @@ def design_selfcal(
     estimate = _told("design selfcal", designed, timing, (study,), settings, REFERENCES)
 
     def page() -> str:
-        from inercal.selfcal.figures import design_page
+        from inercal.selfcal.figures.design import page as design_page
 
         return design_page(designed, settings, estimate)
 

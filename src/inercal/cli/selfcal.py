@@ -90,9 +90,9 @@ def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) ->
     from inercal.selfcal.task import compared
 
     def page() -> str:
-        from inercal.selfcal.figures import calibration_page
+        from inercal.selfcal import figures
 
-        return calibration_page(found, settings)
+        return figures.page(found)
 
     def histories(path: Path) -> None:
         from inercal.records.write import write_record
@@ -115,7 +115,7 @@ def _repeated(runs: Sequence[Calibration], output: ReportOutput) -> int:
     estimate = replace(estimate, timing={**of_runs[-1].timing, "solve": solve})
 
     def page() -> str:
-        from inercal.report.figures import repeats
+        from inercal.report.coefficients import repeats
         from inercal.report.html import render
 
         return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")

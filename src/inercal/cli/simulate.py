@@ -141,7 +141,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
     estimate = estimate if found.passed else replace(estimate, status=Status.INCONSISTENT)
 
     def page() -> str:
-        from inercal.selfcal.figures import campaign_page
+        from inercal.selfcal.figures.monte_carlo import page as campaign_page
 
         return campaign_page(found, settings, estimate)
 

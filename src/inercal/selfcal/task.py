@@ -35,8 +35,8 @@ from inercal.selfcal.settings import KINDS, SelfcalSettings
 class Calibration:
     """An ``estimate``, and the evidence behind it for pictures and tests.
 
-    ``compared`` holds what the other estimators found, by kind, where a comparison was asked for; ``truth`` (p,) are
-    the coefficients in the product form where the study states them.
+    ``settings`` are those of the study; ``compared`` holds what the other estimators found, by kind, where a comparison
+    was asked for; ``truth`` (p,) are the coefficients in the product form where the study states them.
     """
 
     estimate: Estimate
@@ -44,6 +44,7 @@ class Calibration:
     recording: Recording
     filtered: FilterResult
     bounds: Bounds
+    settings: SelfcalSettings
     compared: Mapping[str, FilterResult] = field(default_factory=dict)
     truth: Array | None = None
 
@@ -123,7 +124,7 @@ def calibrate(
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated, settings.base)
-    return Calibration(timed, of, recording, found, bounds, compared, truth)
+    return Calibration(timed, of, recording, found, bounds, settings, compared, truth)
 
 
 def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
