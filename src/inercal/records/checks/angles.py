@@ -26,7 +26,7 @@ _TURN = 2.0 * np.pi
 _DEG = np.pi / 180.0
 
 
-def angles(columns: Mapping[str, Column]) -> list[Finding]:
+def angle_findings(columns: Mapping[str, Column]) -> list[Finding]:
     """``wrap_2pi``, ``stuck_encoder`` and ``command_shift``; nothing where a row is a position of a table."""
     if _positions(columns):
         return []
