@@ -79,36 +79,20 @@ if TYPE_CHECKING:
     from inercal.errors import CalibrationError as CalibrationError
     from inercal.errors import InputError as InputError
     from inercal.estimate.result import Estimate as Estimate
+    from inercal.face.calibrations import apply as apply
+    from inercal.face.calibrations import compare as compare
+    from inercal.face.calibrations import load as load
     from inercal.face.noise import allan as allan
     from inercal.face.recordings import read as read
     from inercal.face.recordings import record as record
     from inercal.face.result import Result as Result
     from inercal.face.study import Study as Study
     from inercal.face.study import study as study
-    from inercal.face.verbs import (
-        apply as apply,
-    )
-    from inercal.face.verbs import (
-        calibrate as calibrate,
-    )
-    from inercal.face.verbs import (
-        compare as compare,
-    )
-    from inercal.face.verbs import (
-        design as design,
-    )
-    from inercal.face.verbs import (
-        load as load,
-    )
-    from inercal.face.verbs import (
-        sensitivity as sensitivity,
-    )
-    from inercal.face.verbs import (
-        simulate as simulate,
-    )
-    from inercal.face.verbs import (
-        temperature as temperature,
-    )
+    from inercal.face.verbs import calibrate as calibrate
+    from inercal.face.verbs import design as design
+    from inercal.face.verbs import sensitivity as sensitivity
+    from inercal.face.verbs import simulate as simulate
+    from inercal.face.verbs import temperature as temperature
     from inercal.records.record import Record as Record
 
 __version__ = "0.1.0"
