@@ -30,7 +30,13 @@ def selfcal(
     *,
     study: StudyFile,
     kind: Annotated[
-        Kind | None, Parameter(name="--filter", help="Estimator, in the place of that of the study.")
+        Kind | None,
+        Parameter(
+            name="--filter",
+            help="Estimator, in the place of that of the study. Points of svd-qukf are drawn by the "
+            "eigenvalues of the "
+            "covariance; by its singular values or its Cholesky factor with --set filter.factor=svd, or cholesky.",
+        ),
     ] = None,
     compare: Annotated[bool, Parameter(help="Run all estimators, and set them side by side.")] = False,
     stream: Annotated[

@@ -21,6 +21,13 @@ FactorKind = Literal["cholesky", "eigen", "svd"]
 KINDS: tuple[FilterKind, ...] = ("error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm")
 """All estimators, the product's default first."""
 
+FACTOR_OF: Mapping[FilterKind, FactorKind] = {
+    "svd-qukf": "eigen",
+    "gimbal-ukf": "cholesky",
+    "mukf": "cholesky",
+}
+"""Factor of the covariance that each sigma-point filter takes where the study names none."""
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -56,7 +63,7 @@ class Filter:
     """Which estimator, and how.
 
     ``extended`` estimates gyro scale errors and the zero of the encoders too; ``factor`` of the covariance for
-    sigma points (None: cholesky, but eigen for svd-qukf); ``integration`` of the gimbal-ukf; ``gating`` None is off.
+    sigma points (None: as in `FACTOR_OF`); ``integration`` of the gimbal-ukf; ``gating`` None is off.
     """
 
     kind: FilterKind = "error-state"

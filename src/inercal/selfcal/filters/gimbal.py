@@ -29,6 +29,7 @@ from inercal.selfcal.filters.filter_result import Problem, Start, State, Trace, 
 from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.platform.kinematics import Axes, angles, attitude, nearest_turn, parity
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
+from inercal.selfcal.settings import FACTOR_OF
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
@@ -54,7 +55,7 @@ def advance(
     lowest, fallbacks, cosine = _advance(
         state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
         world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
-        FACTORS[problem.filter.factor or "cholesky"], problem.filter.integration == "euler",
+        FACTORS[problem.filter.factor or FACTOR_OF["gimbal-ukf"]], problem.filter.integration == "euler",
         trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
     )  # fmt: skip
     return state, trace._replace(lowest_eigenvalue=lowest, fallbacks=fallbacks, gimbal_cosine=cosine)

@@ -35,6 +35,7 @@ from inercal.selfcal.platform.model import (
     propagate,
     specific_force,
 )
+from inercal.selfcal.settings import FACTOR_OF
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
@@ -54,7 +55,7 @@ def advance(
     lowest, fallbacks, cosine = _advance(
         state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
         world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
-        FACTORS[problem.filter.factor or "cholesky"],
+        FACTORS[problem.filter.factor or FACTOR_OF["mukf"]],
         trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
     )  # fmt: skip
     return state, trace._replace(lowest_eigenvalue=lowest, fallbacks=fallbacks, gimbal_cosine=cosine)

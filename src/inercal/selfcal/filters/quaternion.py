@@ -1,5 +1,8 @@
 """Estimator 1, the filter of the paper: sigma points of a quaternion as it is, with a factor of the covariance.
 
+The factor is that of the eigenvalues, which for a covariance is the paper's singular value decomposition at two thirds
+of its cost; a study may ask for ``svd`` itself, or for ``cholesky``.
+
 The state is q_bp (4) and the coefficients (p,), augmented with a noise of the process (4) and of the encoders'
 quaternion (4): 2 (12 + p) + 1 points, drawn once a step, alpha 1, beta 0, kappa 0. The four components are taken
 for a vector: their mean is an ordinary one, brought back to unit length after the update; points never are.
@@ -26,6 +29,7 @@ from inercal.selfcal.filters.filter_result import Problem, Start, State, Trace, 
 from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
 from inercal.selfcal.platform.kinematics import Axes, attitude, joint_axes, nearest_turn
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
+from inercal.selfcal.settings import FACTOR_OF
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
@@ -68,7 +72,7 @@ def advance(
     cosine, told = _advance(
         state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
         world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
-        FACTORS[problem.filter.factor or "eigen"],
+        FACTORS[problem.filter.factor or FACTOR_OF["svd-qukf"]],
         trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
     )  # fmt: skip
     return state, trace._replace(lowest_eigenvalue=told[0], fallbacks=int(told[1]), gimbal_cosine=cosine)
