@@ -18,6 +18,14 @@ from inercal.units import shown
 KINDS = ("imu", "turntable", "selfcal", "aoa")
 """The kinds of study, one for each system, as the commands name them."""
 
+_LOAD = {
+    "imu": "load_imu_study",
+    "turntable": "load_turntable_study",
+    "selfcal": "load_selfcal_study",
+    "aoa": "load_aoa_study",
+}
+"""What reads the file of each kind, in `inercal.studies.load`."""
+
 _SITE = ("latitude", "height", "gravity")
 """Keys of the table [site] that may stand alone."""
 
@@ -119,7 +127,7 @@ def study(path_or_kind: str | Path, /, **keys: Any) -> Study:
 
 def read_study(kind: str, path: Path, overrides: Iterable[str] = ()) -> Study:
     """Read a study of that kind; ``overrides`` as of ``--set``: ``imu.static_start=50 s``. Raises `StudyError`."""
-    load = getattr(import_module("inercal.studies.load"), f"load_{kind}_study")
+    load = getattr(import_module("inercal.studies.load"), _LOAD[kind])
     return Study(kind, load(path, overrides), path)
 
 

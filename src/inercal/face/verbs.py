@@ -96,7 +96,7 @@ def _imu_study(record: Record, given: dict[str, str]) -> Study:
             "study",
             'missing, expected one, or of an IMU the site: latitude="48 deg" or gravity="9.81744(2) m/s^2"',
         )
-    return study("imu", **({"method": "ferraris"} if record.labels else {}), **given)
+    return study("imu", **(({"method": "ferraris"} if record.labels else {}) | given))
 
 
 def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
