@@ -37,6 +37,7 @@ FLOORS = [
     {"stream"},
     {"examples"},
     {"validate"},
+    {"face"},
     {"cli", "__main__"},
 ]
 SYSTEMS = {"imu", "turntable", "selfcal", "aoa"}
@@ -118,10 +119,10 @@ def wrong_imports(module):
         if len({room(module), room(other)} & SYSTEMS) > 1:
             yield f"{module} imports {other}: one system knows another"
         of_task = other.endswith(".task") and room(other) in SYSTEMS
-        if of_task and room(module) not in ("cli", "validate", room(other)):
-            yield f"{module} imports {other}: only the command line and the validation run tasks"
-        if is_figures(other) and room(module) != "cli" and not is_figures(module):
-            yield f"{module} imports {other}: only the command line asks for figures"
+        if of_task and room(module) not in ("cli", "face", "validate", room(other)):
+            yield f"{module} imports {other}: only the faces and the validation run tasks"
+        if is_figures(other) and room(module) not in ("cli", "face") and not is_figures(module):
+            yield f"{module} imports {other}: only the faces ask for figures"
 
 
 def test_imports_come_from_below():
@@ -181,6 +182,24 @@ def test_no_circles_of_any_kind():
     lazy = "inercal"  # its own names are resolved when asked for
     graph = {module: set(all_imports(module)) - {module} for module in MODULES if module != lazy}
     graphlib.TopologicalSorter(graph).prepare()
+
+
+def test_no_package_has_a_module_of_the_name_of_what_it_defines():
+    """Importing such a module would put it in the place of the function or class of that name."""
+    taken = []
+    for package in (module for module, path in SOURCES.items() if path.name == "__init__.py"):
+        inside = {
+            each.removeprefix(f"{package}.").split(".")[0]
+            for each in MODULES
+            if each.startswith(f"{package}.")
+        }
+        named = [
+            {node.name} if isinstance(node, ast.FunctionDef | ast.ClassDef) else set(names_defined(node))
+            for node in TREES[package].body
+        ]
+        own = set().union(*named, inercal.__all__ if package == "inercal" else ())
+        taken += [f"{package}.{name}" for name in own & inside]
+    assert taken == []
 
 
 @pytest.mark.parametrize("system", WITHIN)
@@ -306,10 +325,10 @@ def names_defined(tree):
 
 
 def is_called_from_outside(module, node):
-    """Python's own names, checks that pydantic runs, and the commands."""
+    """Python's own names, checks that pydantic runs, what notebooks call, and the commands."""
     checked = any("_validator" in ast.unparse(each) for each in node.decorator_list)
-    of_pydantic = node.name == "nullable_schema"
-    return node.name.startswith("__") or checked or of_pydantic or room(module) == "cli"
+    of_others = node.name in ("nullable_schema", "_repr_html_")
+    return node.name.startswith("__") or checked or of_others or room(module) == "cli"
 
 
 def prints(node):

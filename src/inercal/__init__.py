@@ -1,6 +1,8 @@
 """inercal: calibrate inertial instruments, and say how sure one can be of every number.
 
-This page defines the words. Nothing here computes.
+This page defines the words. Nothing here computes. In Python, ``import inercal as ic`` brings one verb for each task:
+``ic.read``, ``ic.record``, ``ic.study``, ``ic.calibrate``, ``ic.simulate``, ``ic.design``, ``ic.sensitivity``,
+``ic.allan``, ``ic.temperature``, ``ic.compare``, ``ic.apply``, ``ic.load``; each has an example in its ``help``.
 
 Frames, signs, units
     SI and radians inside. Another unit is written into a name (``bias_deg_per_h``) or beside a number at the
@@ -68,47 +70,75 @@ Map, lower floors first; each imports only from those above its own line
     studies, report, examples  files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
     validate                   cases with published or closed-form numbers, run by `inercal validate`
+    face                       the verbs of Python, and the results that they give back
     cli                        one module per verb
 """
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from inercal.aoa.task import measure as measure_angle_of_attack
-    from inercal.estimate.files import load as load
+    from inercal.errors import CalibrationError as CalibrationError
+    from inercal.errors import InputError as InputError
     from inercal.estimate.result import Estimate as Estimate
-    from inercal.imu.task import calibrate as calibrate_imu
-    from inercal.records.read import read as read
+    from inercal.face.calibrations import apply as apply
+    from inercal.face.calibrations import compare as compare
+    from inercal.face.calibrations import load as load
+    from inercal.face.noise import allan as allan
+    from inercal.face.recordings import read as read
+    from inercal.face.recordings import record as record
+    from inercal.face.result import Result as Result
+    from inercal.face.study import Study as Study
+    from inercal.face.study import study as study
+    from inercal.face.verbs import calibrate as calibrate
+    from inercal.face.verbs import design as design
+    from inercal.face.verbs import sensitivity as sensitivity
+    from inercal.face.verbs import simulate as simulate
+    from inercal.face.verbs import temperature as temperature
     from inercal.records.record import Record as Record
-    from inercal.selfcal.task import calibrate as calibrate_platform
-    from inercal.sensitivities.exact import analyse as exact_sobol
-    from inercal.turntable.task import calibrate as calibrate_turntable
 
 __version__ = "0.1.0"
 
-#: public name -> (module, name there); resolved when first asked for (PEP 562), so that importing is quick
+#: public name -> module that defines it; resolved when first asked for (PEP 562), so that importing is quick
 _WHERE = {
-    "Estimate": ("inercal.estimate.result", "Estimate"),
-    "Record": ("inercal.records.record", "Record"),
-    "calibrate_imu": ("inercal.imu.task", "calibrate"),
-    "calibrate_platform": ("inercal.selfcal.task", "calibrate"),
-    "calibrate_turntable": ("inercal.turntable.task", "calibrate"),
-    "exact_sobol": ("inercal.sensitivities.exact", "analyse"),
-    "load": ("inercal.estimate.files", "load"),
-    "measure_angle_of_attack": ("inercal.aoa.task", "measure"),
-    "read": ("inercal.records.read", "read"),
+    "CalibrationError": "inercal.errors",
+    "Estimate": "inercal.estimate.result",
+    "InputError": "inercal.errors",
+    "Record": "inercal.records.record",
+    "Result": "inercal.face.result",
+    "Study": "inercal.face.study",
+    "allan": "inercal.face.noise",
+    "apply": "inercal.face.calibrations",
+    "calibrate": "inercal.face.verbs",
+    "compare": "inercal.face.calibrations",
+    "design": "inercal.face.verbs",
+    "load": "inercal.face.calibrations",
+    "read": "inercal.face.recordings",
+    "record": "inercal.face.recordings",
+    "sensitivity": "inercal.face.verbs",
+    "simulate": "inercal.face.verbs",
+    "study": "inercal.face.study",
+    "temperature": "inercal.face.verbs",
 }
 
 __all__ = [
+    "CalibrationError",
     "Estimate",
+    "InputError",
     "Record",
-    "calibrate_imu",
-    "calibrate_platform",
-    "calibrate_turntable",
-    "exact_sobol",
+    "Result",
+    "Study",
+    "allan",
+    "apply",
+    "calibrate",
+    "compare",
+    "design",
     "load",
-    "measure_angle_of_attack",
     "read",
+    "record",
+    "sensitivity",
+    "simulate",
+    "study",
+    "temperature",
 ]
 
 
@@ -118,8 +148,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'inercal' has no attribute {name!r}")
     from importlib import import_module
 
-    module, attribute = _WHERE[name]
-    return getattr(import_module(module), attribute)
+    return getattr(import_module(_WHERE[name]), name)
 
 
 def __dir__() -> list[str]:

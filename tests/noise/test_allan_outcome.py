@@ -8,7 +8,7 @@ from inercal.estimate.files import load, save
 from inercal.findings import Status
 from inercal.inputs import Source
 from inercal.instruments.noise import SYMBOLS, NoiseModel
-from inercal.noise.outcome import noise_of, within
+from inercal.noise.outcome import noise_of
 from inercal.noise.rest import unrest
 from inercal.records.column import Column
 from inercal.records.record import Record
@@ -240,7 +240,7 @@ def test_an_instrument_that_moves_is_not_at_rest(seconds, peak):
     begin, _, end = where[0].removesuffix(" s from the start").partition(" s to ")
     assert float(begin) == pytest.approx(120.0, abs=2.1)
     assert float(end) == pytest.approx(120.0 + seconds, abs=2.1)
-    still = noise_of(within(moving, None, 119.0)).estimate
+    still = noise_of(moving.between(end=119.0)).estimate
     assert still.status is Status.OK
     assert "not_at_rest" not in codes(still)
     assert abs(still["N_gyro_x"].value - 0.01) < 4.0 * still["N_gyro_x"].u
@@ -288,14 +288,14 @@ def test_a_span_of_the_record():
     """Times count from the first stamp of each clock; a clock without an end in the span keeps what lies in it."""
     t = 50.0 + np.arange(1000) / RATE
     whole = record(column("acc_x", "g", np.arange(1000.0), t=t), column("gyro_x", "deg/s", np.arange(200.0)))
-    part = within(whole, 1.0, 3.0)
+    part = whole.between(1.0, 3.0)
     np.testing.assert_array_equal(part["acc_x"].values, np.arange(100.0, 301.0))
     np.testing.assert_array_equal(part["gyro_x"].values, np.arange(100.0, 200.0))
-    assert within(whole, None, None) is whole
+    assert whole.between() is whole
     with pytest.raises(InputError, match="found 20 s to 30 s, expected a span within the record"):
-        within(whole, 20.0, 30.0)
+        whole.between(20.0, 30.0)
     with pytest.raises(InputError, match=r"found 20 s and later, expected .* which lasts 9.99 s"):
-        within(whole, 20.0, None)
+        whole.between("20 s")
 
 
 @pytest.mark.parametrize("samples", [21, 51, 200])

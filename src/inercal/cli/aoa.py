@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
-from inercal.cli.outcome import WHOLE, hand_over
+from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
+from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
 from inercal.errors import InputError, StudyError
 
 if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
-    from inercal.aoa.task import Measurement
-    from inercal.records.record import Record
     from inercal.stream.lines import Lines
 
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
@@ -103,6 +100,7 @@ def aoa(
     ] = False,
     every: Every = None,
     map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
@@ -111,72 +109,30 @@ def aoa(
     keys = [*(overrides or ()), *how.keys]
     how.check(stream)
     if stream:
+        span.refuse("a stream")
         _live(streamed(files), study, map_file, keys, interval_of(every), streaming, output)
         return 0
     paths = recorded("aoa", files, streaming, every)
 
     from inercal._jit import compiling
-    from inercal.aoa.task import load_kernels, measure
-    from inercal.records.read import source_of
+    from inercal.face import aoa as system
+    from inercal.face.runs import one_run
+    from inercal.face.study import read_study
     from inercal.records.write import SUFFIXES
-    from inercal.studies.load import files_of, load_aoa_study
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
-    settings = load_aoa_study(study, keys)
-    studied = files_of(study, settings.given, unread="motion")
-    output.spare(studied)
-    methods = how.methods(settings)
+    told = read_study("aoa", study, keys)
+    output.spare(told.files)
+    methods = how.methods(told.settings)
     clock = time.perf_counter()
-    record = _one_run(read_repeats(paths, map_file, output))
+    record = one_run(read_repeats(paths, map_file, output, span), system.ONE_RUN)
     read_s = time.perf_counter() - clock
-    smoothed = " smoothed" if settings.estimator.smooth or how.compare else ""
+    smoothed = " smoothed" if told.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
-        load_kernels(settings, methods, how.compare)
-    with of_study(study), working(output) as progress:
-        found = measure(record, settings, methods, how.compare, progress)
-    timing = {"read": read_s, "solve": found.estimate.timing["solve"]}
-    inputs = (*found.estimate.inputs, *map(source_of, studied))
-    found = replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs))
-    return _handed_over(found, how, output)
-
-
-def _one_run(records: Sequence[Record]) -> Record:
-    """The record, where there is one; raises `InputError`."""
-    if len(records) > 1:
-        raise InputError(
-            records[1].sources[0].path,
-            f"has the channels of {records[0].sources[0].path}, expected one run: measure them one after the other, "
-            "each with the result of the one before (--out run1.json) as its prior (--set estimator.prior=run1.json)",
-        )
-    return records[0]
-
-
-def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -> int:
-    """Write what was asked for, say what was found, and give the exit code."""
-    from inercal.aoa.result.display import delays, rest_of_fit, use_of_fit
-    from inercal.aoa.result.tables import answer, on_terminal
-
-    def page() -> str:
-        from inercal.aoa import figures
-
-        return figures.page(found)
-
-    def rows(path: Path) -> None:
-        from inercal.aoa.result.columns import angles_record, points_record
-        from inercal.records.write import write_record
-
-        record = (
-            points_record(found.points, found.recording, found.settings)
-            if how.points
-            else angles_record(found.recording, found.angles, found.settings)
-        )
-        write_record(record, path)
-
-    estimate, points = found.estimate, found.points if how.points else ()
-    tables = [*answer(estimate, points, found.settings), *on_terminal(estimate)]
-    shown = [f"{table.title}\n{table.text()}" for table in tables]
-    shown += [rest_of_fit(estimate), delays(estimate), use_of_fit(estimate)]
-    return hand_over(estimate, shown, page, output, "angles", rows)
+        system.prepare(told, how.compare, methods)
+    with working(output) as progress:
+        found = system.calibrate([record], told, how.compare, progress, methods, how.points)
+    return give(found, output, read_s, "angles")
 
 
 def _live(
@@ -192,12 +148,13 @@ def _live(
     from inercal._jit import compiling
     from inercal.aoa.fusion.live import load_kernels
     from inercal.aoa.fusion.problem import problem
+    from inercal.face.study import read_study
     from inercal.stream.aoa import Aoa
-    from inercal.studies.load import load_aoa_study
 
     streaming.check(output, (file, map_file, study))
-    settings = load_aoa_study(study, keys)
-    with of_study(study):
+    told = read_study("aoa", study, keys)
+    settings = told.settings
+    with told.at_fault():
         if settings.estimator.smooth:
             raise StudyError(
                 "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
@@ -206,7 +163,7 @@ def _live(
             load_kernels(problem(settings))
 
     def measurement(lines: Lines) -> Aoa:
-        with of_study(study):
+        with told.at_fault():
             return Aoa(lines, settings, interval, output.say_finding)
 
     run_stream(measurement, file, map_file, output, streaming)

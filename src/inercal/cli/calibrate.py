@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING
 
 from inercal.cli.options import (
     Files,
@@ -14,37 +13,16 @@ from inercal.cli.options import (
     Overrides,
     ReportOutput,
     RunFiles,
+    Span,
     StudyFile,
-    of_study,
     read_record,
     read_repeats,
     working,
 )
-from inercal.cli.outcome import WHOLE, hand_over, printed
+from inercal.cli.outcome import WHOLE, give
 
 if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
     from inercal.records.record import Record
-
-
-class Calibrated(Protocol):
-    """What the calibration of any system brings back."""
-
-    @property
-    def estimate(self) -> Estimate:
-        """The estimate."""
-
-
-class Settings(Protocol):
-    """What any study tells."""
-
-    @property
-    def given(self) -> Mapping[str, Any]:
-        """Its keys as they were given."""
-
-
-S = TypeVar("S", bound=Settings)
-C = TypeVar("C", bound=Calibrated)
 
 
 def calibrate_imu(
@@ -53,37 +31,12 @@ def calibrate_imu(
     *,
     study: StudyFile,
     map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
-    from inercal.estimate.repeat import combine_runs
-    from inercal.imu.task import calibrate
-    from inercal.studies.load import load_imu_study
-
-    solved = _solve(
-        files,
-        study,
-        map_file,
-        output,
-        lambda: load_imu_study(study, overrides or ()),
-        read_repeats,
-        calibrate,
-    )
-    runs = [estimate for _, estimate in solved]
-    estimate = runs[0] if len(runs) == 1 else combine_runs(runs)
-    estimate = replace(estimate, timing={**runs[-1].timing, "solve": estimate.timing["solve"]})
-
-    def page() -> str:
-        from inercal.imu import figures
-        from inercal.report.coefficients import repeats
-        from inercal.report.html import render
-
-        if len(runs) == 1:
-            return figures.page(replace(solved[0][0], estimate=estimate))
-        return render(estimate, repeats(estimate), "Calibration of an inertial measurement unit")
-
-    return hand_over(estimate, [printed(estimate)], page, output)
+    return _calibrated("imu", files, study, map_file, span, overrides, output, read_repeats)
 
 
 def calibrate_turntable(
@@ -92,60 +45,38 @@ def calibrate_turntable(
     *,
     study: StudyFile,
     map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
-    from inercal.studies.load import load_turntable_study
-    from inercal.turntable.display import tolerances
-    from inercal.turntable.task import calibrate
-
-    ((found, estimate),) = _solve(
-        files,
-        study,
-        map_file,
-        output,
-        lambda: load_turntable_study(study, overrides or ()),
-        lambda *one: [read_record(*one)],
-        calibrate,
+    return _calibrated(
+        "turntable", files, study, map_file, span, overrides, output, lambda *one: [read_record(*one)]
     )
-    shown = replace(found, estimate=estimate).shown
-
-    def page() -> str:
-        from inercal.turntable import figures
-
-        return figures.page(replace(found, estimate=estimate))
-
-    return hand_over(estimate, [printed(shown), tolerances(estimate)], page, output)
 
 
-def _solve(
+def _calibrated(
+    kind: str,
     files: list[Path],
     study: Path,
     map_file: Path | None,
+    span: Span,
+    overrides: list[str] | None,
     output: ReportOutput,
-    settings: Callable[[], S],
-    read: Callable[[Sequence[Path], Path | None, ReportOutput], list[Record]],
-    calibrate: Callable[[Record, S, Callable[[str], None]], C],
-) -> list[tuple[C, Estimate]]:
-    """Read study and records and calibrate with each; the estimates come with their times and inputs."""
-    from inercal.records.read import source_of
-    from inercal.studies.load import files_of
+    read: Callable[[Sequence[Path], Path | None, ReportOutput, Span], list[Record]],
+) -> int:
+    """Read study and records, calibrate, and hand over."""
+    from importlib import import_module
+
+    from inercal.face.study import read_study
 
     output.check(WHOLE, (*files, map_file, study))
-    told = settings()
-    studied = files_of(study, told.given)
-    output.spare(studied)
+    told = read_study(kind, study, overrides or ())
+    output.spare(told.files)
     clock = time.perf_counter()
-    records = read(files, map_file, output)
+    records = read(files, map_file, output, span)
     read_s = time.perf_counter() - clock
-    solved = []
-    with of_study(study), working(output) as progress:
-        for number, record in enumerate(records, start=1):
-            of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
-            found = calibrate(record, told, lambda text, of_run=of_run: progress(of_run + text))  # type: ignore[misc]
-            estimate = found.estimate
-            timing = {"read": read_s, "solve": estimate.timing["solve"]}
-            inputs = (*estimate.inputs, *map(source_of, studied))
-            solved.append((found, replace(estimate, timing=timing, inputs=inputs)))
-    return solved
+    system = import_module(f"inercal.face.{kind}")
+    with working(output) as progress:
+        found = system.calibrate(records, told, progress=progress)
+    return give(found, output, read_s)

@@ -5,15 +5,12 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from inercal.cli.options import ReportOutput
-from inercal.cli.outcome import WHOLE, hand_over
-
-if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
+from inercal.cli.outcome import WHOLE, give
 
 _CALIBRATION = "Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out."
 
@@ -29,8 +26,8 @@ def compare(
     from inercal.estimate.compare import Saved
     from inercal.estimate.compare import compare as compared
     from inercal.estimate.files import load
+    from inercal.face.comparison import of_comparison
     from inercal.records.read import source_of
-    from inercal.report.comparison import page, table
 
     output.check(WHOLE, (first, second))
     clock = time.perf_counter()
@@ -38,19 +35,6 @@ def compare(
     inputs = (source_of(first), source_of(second))
     read = time.perf_counter()
     estimate = compared(*files)
-    timing = {"read": read - clock, "solve": time.perf_counter() - read}
-    estimate = replace(estimate, inputs=inputs, timing=timing)
-    shown = _of_field(estimate) if files[0].estimate.command == "selfcal" else estimate
-    return hand_over(estimate, [table(shown)], lambda: page(shown), output, "comparison")
-
-
-def _of_field(estimate: Estimate) -> Estimate:
-    """The comparison of two self-calibrations with its rows in deg/h, arcsec, ug and ppm."""
-    from inercal.selfcal.display import shown_unit
-
-    lengths = ("first", "u_first", "second", "u_second", "difference", "u", "U")
-    rows = []
-    for row in estimate.result["coefficients"]:
-        unit, size = shown_unit(row["unit"])
-        rows.append({**row, **{key: row[key] / size for key in lengths}, "unit": unit})
-    return replace(estimate, result={**estimate.result, "coefficients": rows})
+    timing = {"solve": time.perf_counter() - read}
+    found = of_comparison(replace(estimate, inputs=inputs, timing=timing), files[0].estimate.command)
+    return give(found, output, read - clock, "comparison")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from inercal.cli.options import Files, MapFile, ReportOutput, read_record
+from inercal.cli.options import Files, MapFile, ReportOutput, Span, read_record
 from inercal.cli.outcome import WHOLE, emit, timed, told
 
 
@@ -13,6 +13,7 @@ def inspect(
     /,
     *,
     map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Look at a recording before it is used."""
@@ -28,7 +29,7 @@ def inspect(
     )
 
     output.check(WHOLE, (*files, map_file))
-    record = read_record(files, map_file, output)
+    record = read_record(files, map_file, output, span)
     if {"wc_x", "th_x", "acc_x"} <= record.columns.keys():  # a platform in gimbals
         from inercal.selfcal.reading import worth_saying
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import show
-from inercal.errors import InputError, StudyError
+from inercal.errors import InputError
 
 if TYPE_CHECKING:
     from cyclopts import Token
@@ -146,28 +146,72 @@ class ReportOutput(FileOutput):
         super().check(suffixes, inputs)
 
 
-def read_record(files: Sequence[Path], map_file: Path | None, output: FileOutput) -> Record:
-    """Read recordings, with a progress bar where it takes long."""
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Span:
+    """The options of a command that reads a recording: which part of it."""
+
+    begin: Annotated[
+        str | None, Parameter(help='Leave out what comes before, such as "10 s" after the first stamp.')
+    ] = None
+    end: Annotated[
+        str | None, Parameter(help='Leave out what comes after, such as "30 min" after the first stamp.')
+    ] = None
+
+    def check(self) -> None:
+        """Refuse what is no time, before anything is read; raises `InputError`."""
+        from inercal.records.span import seconds
+
+        for option, text in self.given.items():
+            seconds(text, option)
+
+    @property
+    def given(self) -> dict[str, str]:
+        """The options that were given."""
+        both = {"--begin": self.begin, "--end": self.end}
+        return {option: text for option, text in both.items() if text is not None}
+
+    def of(self, record: Record) -> Record:
+        """The part of a record; raises `InputError`, naming the options, where nothing lies within."""
+        try:
+            return record.between(self.begin, self.end)
+        except InputError as error:
+            raise InputError(", ".join(self.given), error.message) from error
+
+    def refuse(self, beside: str) -> None:
+        """Refuse the options where there is no recording to take a part of; raises `InputError`."""
+        for option in self.given:
+            raise InputError(option, f"found with {beside}, expected a recording")
+
+
+def read_record(
+    files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
+) -> Record:
+    """Read recordings, with a progress bar where it takes long, and take the part that is asked for."""
     from inercal.records.maps import read_map
     from inercal.records.read import read
 
+    span.check()
     record_map = None if map_file is None else read_map(map_file)
     with reading(output) as progress:
         record = read(files, record_map, progress)
     output.spare(source.path for source in record.sources)  # a map may have named others
-    return record
+    return span.of(record)
 
 
-def read_repeats(files: Sequence[Path], map_file: Path | None, output: FileOutput) -> list[Record]:
+def read_repeats(
+    files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
+) -> list[Record]:
     """As `read_record`, but files with the same channels are the records of repeat runs."""
     from inercal.records.maps import read_map
     from inercal.records.read import read_runs
 
+    span.check()
     record_map = None if map_file is None else read_map(map_file)
     with reading(output) as progress:
         records = read_runs(files, record_map, progress)
     output.spare(source.path for record in records for source in record.sources)
-    return records
+    return [span.of(record) for record in records]
 
 
 def whole_number(kind: object, tokens: Sequence[Token]) -> int:
@@ -177,17 +221,6 @@ def whole_number(kind: object, tokens: Sequence[Token]) -> int:
         return int(typed.value)
     except ValueError as error:
         raise InputError(typed.keyword, f"found {typed.value!r}, expected a whole number") from error
-
-
-@contextmanager
-def of_study(path: Path) -> Iterator[None]:
-    """Name the study where a task finds fault with one of its keys; what is wrong with a recording stays as it is."""
-    try:
-        yield
-    except InputError as error:
-        if type(error) not in (InputError, StudyError):
-            raise
-        raise StudyError(path, str(error)) from error
 
 
 @contextmanager

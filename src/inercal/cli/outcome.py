@@ -12,6 +12,7 @@ from inercal.cli.options import FileOutput, ReportOutput
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
+    from inercal.face.result import Result
     from inercal.findings import Finding
     from inercal.inputs import Source
 
@@ -61,7 +62,7 @@ def hand_over(
     page: Callable[[], str],
     output: ReportOutput,
     what: str = "calibration",
-    write: Callable[[Path], None] | None = None,
+    write: Callable[[Path], object] | None = None,
     whole: tuple[str, ...] = WHOLE,
 ) -> int:
     """Write what was asked for, say the verdict, and give the exit code.
@@ -88,6 +89,18 @@ def hand_over(
     text = "".join(f"{table}\n\n" for table in tables if table)
     emit(estimate, f"{text}{estimate.status.value}: {estimate.message}", output)
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
+
+
+def give(result: Result, output: ReportOutput, read_s: float, what: str = "calibration") -> int:
+    """Hand over a result of the face; ``what`` it is, in a word."""
+    write = None if result.view.rows is None else result.save
+    estimate = read_in(result.estimate, read_s)
+    return hand_over(estimate, result.view.tables(), result.view.page, output, what, write)
+
+
+def read_in(estimate: Estimate, read_s: float) -> Estimate:
+    """The estimate with the time that reading took [s], beside that of its solution."""
+    return replace(estimate, timing={"read": read_s, "solve": estimate.timing["solve"]})
 
 
 def timed(estimate: Estimate) -> Estimate:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, Overrides, ReportOutput, StudyFile, of_study, read_repeats, working
-from inercal.cli.outcome import WHOLE, hand_over, printed
+from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
+from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.selfcal.settings import SelfcalSettings
-    from inercal.selfcal.task import Calibration
     from inercal.stream.lines import Lines
 
 Kind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
@@ -34,7 +30,13 @@ def selfcal(
     *,
     study: StudyFile,
     kind: Annotated[
-        Kind | None, Parameter(name="--filter", help="Estimator, in the place of that of the study.")
+        Kind | None,
+        Parameter(
+            name="--filter",
+            help="Estimator, in the place of that of the study. Points of svd-qukf are drawn by the "
+            "eigenvalues of the "
+            "covariance; by its singular values or its Cholesky factor with --set filter.factor=svd, or cholesky.",
+        ),
     ] = None,
     compare: Annotated[bool, Parameter(help="Run all estimators, and set them side by side.")] = False,
     stream: Annotated[
@@ -42,6 +44,7 @@ def selfcal(
     ] = False,
     every: Every = None,
     map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
@@ -51,76 +54,31 @@ def selfcal(
     if stream:
         if compare:
             raise InputError("--compare", "found with a stream, expected one estimator")
+        span.refuse("a stream")
         _live(streamed(files), study, map_file, keys, interval_of(every), streaming, output)
         return 0
     paths = recorded("selfcal", files, streaming, every)
 
     from inercal._jit import compiling
-    from inercal.records.read import source_of
+    from inercal.face import selfcal as system
+    from inercal.face.study import read_study
     from inercal.records.write import SUFFIXES
-    from inercal.selfcal.task import calibrate, load_kernels
-    from inercal.studies.load import load_selfcal_study
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
-    settings = load_selfcal_study(study, keys)
+    told = read_study("selfcal", study, keys)
     clock = time.perf_counter()
-    records = read_repeats(paths, map_file, output)
+    records = read_repeats(paths, map_file, output, span)
     read_s = time.perf_counter() - clock
     if len(records) > 1 and compare:
         raise InputError("--compare", f"found {len(records)} runs, expected one")
     if len(records) > 1 and output.out is not None and output.out.suffix.lower() in SUFFIXES:
         raise InputError(output.out, f"found {len(records)} runs, expected one for a history, or .json")
-    of_all = " all" if compare else f" {settings.filter.kind}"
-    with of_study(study), compiling(f"selfcal{of_all}", output.say):
-        load_kernels(settings, compare)
-    runs = []
-    with of_study(study), working(output) as progress:
-        for number, record in enumerate(records, start=1):
-            of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
-            found = calibrate(record, settings, compare, lambda text, of_run=of_run: progress(of_run + text))  # type: ignore[misc]
-            timing = {"read": read_s, "solve": found.estimate.timing["solve"]}
-            inputs = (*found.estimate.inputs, source_of(study))
-            runs.append(replace(found, estimate=replace(found.estimate, timing=timing, inputs=inputs)))
-    return _one(runs[0], settings, output) if len(runs) == 1 else _repeated(runs, output)
-
-
-def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) -> int:
-    """Hand over the calibration of one run."""
-    from inercal.selfcal.display import displayed
-    from inercal.selfcal.task import compared
-
-    def page() -> str:
-        from inercal.selfcal import figures
-
-        return figures.page(found)
-
-    def histories(path: Path) -> None:
-        from inercal.records.write import write_record
-        from inercal.selfcal.result.columns import history_record
-
-        write_record(history_record(found.filtered, found.recording, found.problem.world), path)
-
-    tables = [printed(displayed(found.estimate)), *(f"{t.title}\n{t.text()}" for t in compared(found))]
-    return hand_over(found.estimate, tables, page, output, "calibration", histories)
-
-
-def _repeated(runs: Sequence[Calibration], output: ReportOutput) -> int:
-    """Hand over what repeat runs say together."""
-    from inercal.estimate.repeat import combine_runs
-    from inercal.selfcal.display import displayed
-
-    of_runs = [found.estimate for found in runs]
-    estimate, shown = combine_runs(of_runs), combine_runs([displayed(each) for each in of_runs])
-    solve = sum(each.timing["solve"] for each in of_runs)
-    estimate = replace(estimate, timing={**of_runs[-1].timing, "solve": solve})
-
-    def page() -> str:
-        from inercal.report.coefficients import repeats
-        from inercal.report.html import render
-
-        return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")
-
-    return hand_over(estimate, [printed(shown)], page, output)
+    of_all = " all" if compare else f" {told.settings.filter.kind}"
+    with compiling(f"selfcal{of_all}", output.say):
+        system.prepare(told, compare)
+    with working(output) as progress:
+        found = system.calibrate(records, told, compare, progress)
+    return give(found, output, read_s)
 
 
 def _live(
@@ -134,22 +92,22 @@ def _live(
 ) -> None:
     """Calibrate row by row."""
     from inercal._jit import compiling
+    from inercal.face.study import read_study
     from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.find_base import stated_well
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
-    from inercal.studies.load import load_selfcal_study
 
     streaming.check(output, (file, map_file, study))
-    settings = load_selfcal_study(study, keys)
-    with of_study(study):
-        stated_well(settings, "a stream")
-        told = problem(settings)
+    of = read_study("selfcal", study, keys)
+    with of.at_fault():
+        stated_well(of.settings, "a stream")
+        told = problem(of.settings)
         filter_of(told)
         with compiling(f"selfcal stream {told.filter.kind}", output.say):
             load_kernels(told)
 
     def calibration(lines: Lines) -> Selfcal:
-        with of_study(study):
+        with of.at_fault():
             return Selfcal(lines, told, interval, output.say_finding)
 
     run_stream(calibration, file, map_file, output, streaming)

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, of_study, reading, whole_number
+from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, reading, whole_number
 from inercal.cli.outcome import WHOLE, emit, hand_over, told
 from inercal.errors import InputError
-
-if TYPE_CHECKING:
-    from numpy.random import Generator
-
-    from inercal.records.record import Record
 
 Seed = Annotated[
     int, Parameter(converter=whole_number, help="Seed of the random numbers, 0 or more; 1 if absent.")
@@ -38,14 +32,7 @@ def simulate_turntable(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Simulate a test of an instrument on a turntable."""
-    from inercal.studies.load import files_of, load_turntable_study
-    from inercal.turntable.task import simulate
-
-    _check(study, seed, output)
-    settings = load_turntable_study(study, overrides or ())
-    inputs = files_of(study, settings.given)
-    output.spare(inputs)
-    _write("turntable", partial(simulate, settings), study, inputs, settings.given, seed, output)
+    _simulated("turntable", study, seed, overrides, output)
 
 
 def simulate_selfcal(
@@ -64,21 +51,11 @@ def simulate_selfcal(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Simulate a platform that turns through the plan of a study, once or many times."""
-    from inercal.selfcal.before.simulate import experiment, to_record
-    from inercal.selfcal.before.simulate import simulate as simulate_run
-    from inercal.studies.load import load_selfcal_study
-
     if runs is not None:
         return _campaign(study, runs, seed, overrides or (), output)
     if output.report is not None:
         raise InputError("--report", "found without --runs, expected them together")
-    _check(study, seed, output)
-    settings = load_selfcal_study(study, overrides or ())
-
-    def simulate(rng: Generator) -> Record:
-        return to_record(simulate_run(experiment(settings), rng).recording)
-
-    _write("selfcal", simulate, study, (study,), settings.given, seed, output)
+    _simulated("selfcal", study, seed, overrides, output)
     return 0
 
 
@@ -91,37 +68,26 @@ def simulate_aoa(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Simulate a wind-tunnel model that moves as its study plans."""
-    from inercal.aoa.simulate import simulate as simulate_run
-    from inercal.aoa.simulate import to_record
-    from inercal.studies.load import files_of, load_aoa_study
-
-    _check(study, seed, output)
-    settings = load_aoa_study(study, overrides or ())
-    inputs = files_of(study, settings.given, unread="estimator")
-    output.spare(inputs)
-
-    def simulate(rng: Generator) -> Record:
-        return to_record(simulate_run(settings, rng).recording, settings)
-
-    _write("aoa", simulate, study, inputs, settings.given, seed, output)
+    _simulated("aoa", study, seed, overrides, output)
 
 
 def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._jit import compiling
+    from inercal.face.study import read_study
     from inercal.findings import Status
     from inercal.records.read import source_of
     from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.filters.run import load_kernels
     from inercal.selfcal.monte_carlo import REFERENCES, campaign
-    from inercal.studies.load import load_selfcal_study
 
     if not 2 <= runs <= _MOST_RUNS:
         raise InputError("--runs", f"found {runs}, expected 2 to {_MOST_RUNS:,}")
     _not_negative(seed)
     output.check(WHOLE, (study,))
-    settings = load_selfcal_study(study, overrides)
-    with of_study(study):
+    of = read_study("selfcal", study, overrides)
+    settings = of.settings
+    with of.at_fault():
         with compiling(f"campaign {settings.filter.kind}", output.say_now):
             load_kernels(settings.filter.kind, problem(settings))
         clock = time.perf_counter()
@@ -164,28 +130,27 @@ def _not_negative(seed: int) -> None:
         raise InputError("--seed", f"found {seed}, expected 0 or more")
 
 
-def _write(
-    kind: str,
-    simulate: Callable[[Generator], Record],
-    study: Path,
-    inputs: Sequence[Path],
-    given: Mapping[str, Any],
-    seed: int,
-    output: FileOutput,
+def _simulated(
+    kind: str, study: Path, seed: int, overrides: Iterable[str] | None, output: FileOutput
 ) -> None:
     """Simulate, and write the record."""
     import numpy as np
 
+    from inercal.face.study import read_study
+    from inercal.face.verbs import simulate
     from inercal.records.read import source_of
     from inercal.records.write import write_record
 
+    _check(study, seed, output)
     assert output.out is not None
-    with of_study(study):
-        record = simulate(np.random.default_rng(seed))
+    of = read_study(kind, study, overrides or ())
+    inputs = of.files_without("estimator" if kind == "aoa" else "")
+    output.spare(inputs)
+    record = simulate(of, np.random.default_rng(seed))
     with reading(output, "writing") as progress:
         write_record(record, output.out, progress)
     rows = len(next(iter(record.columns.values())).t)
     words = f"{rows} rows written to {output.out}"
     result = {"out": str(output.out), "rows": rows, "seed": seed, "columns": list(record.columns)}
     sources = map(source_of, inputs)
-    emit(told(f"simulate {kind}", words, result, sources, settings=given, seed=seed), words, output)
+    emit(told(f"simulate {kind}", words, result, sources, settings=of.keys, seed=seed), words, output)

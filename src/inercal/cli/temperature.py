@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, ReportOutput, read_record
-from inercal.cli.outcome import WHOLE, hand_over, printed
+from inercal.cli.options import MapFile, ReportOutput, Span, read_record
+from inercal.cli.outcome import WHOLE, give
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def temperature(
     /,
     *,
     map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
     at: Annotated[
         str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
     ] = "25 degC",
@@ -31,6 +32,7 @@ def temperature(
     """Fit what a sensor's output or its calibration does with temperature."""
     from dataclasses import replace
 
+    from inercal.face.imu import of_temperature
     from inercal.units import parse_quantity
 
     reference = parse_quantity(at, "temperature", "--at").value
@@ -39,24 +41,17 @@ def temperature(
     if all(file.suffix.lower() in WHOLE for file in files):
         if map_file is not None:
             raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
+        span.refuse("calibrations")
         model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
     else:
         from inercal.imu.temperature.sweep import fit_recording
 
-        record = read_record(files, map_file, output)
+        record = read_record(files, map_file, output, span)
         read_s = time.perf_counter() - clock
         model = fit_recording(record, reference)
     solve_s = time.perf_counter() - clock - read_s
-    timing = {"read": read_s, "solve": solve_s}
-    estimate = replace(model.estimate, timing=timing)
-
-    def page() -> str:
-        from inercal.imu.temperature.figures import pictures
-        from inercal.report.html import render
-
-        return render(estimate, pictures(model), "Bias and scale factor against temperature")
-
-    return hand_over(estimate, [printed(estimate)], page, output, "temperature model")
+    found = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
+    return give(found, output, read_s, "temperature model")
 
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:

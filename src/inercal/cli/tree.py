@@ -7,7 +7,7 @@ import textwrap
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
+from cyclopts import App, CycloptsError, Parameter
 from cyclopts.help import PlainFormatter
 
 from inercal import __version__
@@ -287,11 +287,21 @@ def call(arguments: list[str]) -> int | None:
                 asked.usage = usage(asked, verb, kind)
     try:
         code: int | None = root(arguments)
-    except MissingArgumentError as error:
-        raise UsageError(_missing(error)) from error
     except CycloptsError as error:
-        raise UsageError(str(error)) from error
+        raise UsageError(_refused(root, error)) from error
     return code
+
+
+def _refused(root: App, error: CycloptsError) -> str:
+    """What is wrong with a command line, in a sentence."""
+    from inercal.cli.refusals import refusal
+
+    kinds: dict[str, list[str]] = {}
+    for verb, kind in COMMANDS:
+        kinds.setdefault(verb, []).extend([kind] if kind else [])
+    verb, kind = (*(error.command_chain or ()), "", "")[:2]
+    called = usage(root[verb][kind] if kind else root[verb], verb, kind) if (verb, kind) in COMMANDS else ""
+    return refusal(error, kinds, called)
 
 
 def usage(command: App, verb: str, kind: str) -> str:
@@ -302,12 +312,3 @@ def usage(command: App, verb: str, kind: str) -> str:
     parts = [each.name if each.required else f"[{each.name}]" for each in arguments]
     parts += [f"{each.name} {each.hint.__name__.upper()}" for each in options]
     return " ".join(["inercal", verb, *([kind] if kind else []), *parts, "[OPTIONS]"])
-
-
-def _missing(error: MissingArgumentError) -> str:
-    """What is missing: a value after an option, or the argument altogether."""
-    argument = error.argument
-    if argument is None or error.keyword is not None or argument.tokens:
-        return str(error)
-    words = (argument.parameter.help or "").rstrip(".")
-    return f"{' '.join(error.command_chain or ())}: {argument.name} is missing, expected it ({words})"

@@ -57,7 +57,7 @@ def coverage_factor(dof: float, level: float = COVERAGE) -> float:
     return float(ndtri(p) if math.isinf(dof) else stdtrit(dof, p))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
     """Everything a calibration says; `of` and `without` make one.
 
@@ -150,6 +150,14 @@ class Estimate:
         nothing = Uncertainty(np.zeros((0, 0)), np.zeros(0))
         more: dict[str, Any] = {"statistics": statistics, "result": result, "beside": beside}
         return cls.of(basis, (), (), np.zeros(0), nothing, (status, message), findings=findings, **more)
+
+    def __repr__(self) -> str:
+        """Ten lines at most: the verdict, and the first coefficients in SI."""
+        rows = self.table().splitlines() if self.names else []
+        more = [f"  and {len(rows) - 7} coefficients more"] if len(rows) > 8 else []
+        findings = ", ".join(dict.fromkeys(finding.code for finding in self.findings))
+        head = f"Estimate by {self.command}, {self.status.value}: {self.message}"
+        return "\n".join([head, *(rows[:7] if more else rows), *more, f"findings: {findings or 'none'}"])
 
     @property
     def u(self) -> Array:

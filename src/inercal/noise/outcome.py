@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.errors import InputError, RecordError
+from inercal.errors import RecordError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate
@@ -96,7 +95,7 @@ class Noise:
     channels: tuple[ChannelNoise, ...]
 
 
-def noise_of(record: Record, given: Mapping[str, Any] | None = None) -> Noise:
+def noise_of(record: Record) -> Noise:
     """Allan deviations and noise coefficients of every channel of a record at rest that measures motion.
 
     Raises
@@ -126,39 +125,8 @@ def noise_of(record: Record, given: Mapping[str, Any] | None = None) -> Noise:
                 findings.append(Finding("not_at_rest", f"{column.name} {found.words}", where, harm))
                 disturbed[column.name] = found
     of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in said.items()]
-    estimate = _assemble(record, channels, [*of_fits, *findings], disturbed, given or {})
+    estimate = _assemble(record, channels, [*of_fits, *findings], disturbed)
     return Noise(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
-
-
-def within(record: Record, begin: float | None, end: float | None) -> Record:
-    """The part of a record from ``begin`` to ``end`` [s], both from the first stamp of each clock; None: all.
-
-    Raises
-    ------
-    InputError
-        Nothing lies within.
-    """
-    if begin is None and end is None:
-        return record
-    low, high = 0.0 if begin is None else begin, np.inf if end is None else end
-    cut: dict[int, tuple[NDArray[np.bool_], Array]] = {}
-    columns = {}
-    for name, column in record.columns.items():
-        if id(column.t) not in cut:
-            start = np.nanmin(column.t, initial=np.inf)
-            inside = (column.t >= start + low) & (column.t <= start + high)
-            cut[id(column.t)] = inside, column.t[inside]
-        inside, t = cut[id(column.t)]
-        columns[name] = replace(column, t=t, values=column.values[inside])
-    if not any(inside.any() for inside, _ in cut.values()):
-        stamps = (column.t[np.isfinite(column.t)] for column in record.columns.values())
-        lasts = max((float(np.ptp(t)) for t in stamps if t.size), default=0.0)
-        later = "and later" if np.isinf(high) else f"to {high:g} s"
-        raise InputError(
-            "--begin, --end",
-            f"found {low:g} s {later}, expected a span within the record, which lasts {lasts:.4g} s",
-        )
-    return replace(record, columns=columns, labels=())
 
 
 def _groups(record: Record) -> list[list[Column]]:
@@ -221,7 +189,6 @@ def _assemble(
     channels: list[ChannelNoise],
     findings: list[Finding],
     disturbed: Mapping[str, Unrest],
-    given: Mapping[str, Any],
 ) -> Estimate:
     """Put the estimate together: N, B, K, R, Q of each channel.
 
@@ -254,7 +221,9 @@ def _assemble(
         blocks.append(block)
     longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
     return Estimate.of(
-        Basis(COMMAND, MODEL, inputs=record.sources, provenance=provenance(given), references=REFERENCES),
+        Basis(
+            COMMAND, MODEL, inputs=record.sources, provenance=provenance(record.span), references=REFERENCES
+        ),
         names,
         units,
         np.array(values),

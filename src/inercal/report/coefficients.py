@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from inercal.arrays import Array
 from inercal.estimate.result import Estimate, rounded
 from inercal.instruments.terms import term
 from inercal.report.html import Picture
-from inercal.report.marks import Axis, Bars, Cells, Colours, Dots, Level, Mark, Panel, Strips
+from inercal.report.marks import Axis, Bars, Cells, Colours, Dots, Level, Mark, Note, Panel, Strips
 from inercal.report.panels import draw
 from inercal.report.style import ALARM, COLOURS, DIVERGING, INK, SEQUENTIAL, plain_unit
 
@@ -182,7 +183,10 @@ def limits(
 
 
 def values(estimate: Estimate) -> Picture:
-    """The coefficients with their expanded uncertainties, a panel for each kind."""
+    """The coefficients with their expanded uncertainties, a panel for each kind; where there are none, the reason."""
+    if not estimate.names:
+        words = Panel([Note((0.0, 0.5), fill(estimate.message, 90))], bare=True)
+        return draw("No coefficients", estimate.message, [[words]], 0.7)
     groups: dict[tuple[str, str], list[int]] = {}
     for k, (name, unit) in enumerate(zip(estimate.names, estimate.units, strict=True)):
         of = term(name)

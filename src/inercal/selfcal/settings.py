@@ -25,6 +25,12 @@ KINDS: tuple[FilterKind, ...] = ("error-state", "mukf", "svd-qukf", "gimbal-ukf"
 
 _OF_A_SAMPLE = above_zero("a standard deviation of a sample")
 _OF_A_TURN = Bounds(lambda angle: 0.0 < angle <= 2.0 * math.pi, "an angle above 0 and up to 360 deg")
+FACTOR_OF: Mapping[FilterKind, FactorKind] = {
+    "svd-qukf": "eigen",
+    "gimbal-ukf": "cholesky",
+    "mukf": "cholesky",
+}
+"""Factor of the covariance that each sigma-point filter takes where the study names none."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.channels import may_be_empty, of_a_table
-from inercal.records.checks.angles import angles
+from inercal.records.checks.angles import angle_findings
 from inercal.records.checks.time import time_axis, time_unit
 from inercal.records.checks.values import (
     accelerometer_unit,
@@ -59,7 +59,7 @@ def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
                 findings += temperature_unit(column)
         findings += accelerometer_unit(columns)
         findings += gyro_unit(columns)
-        findings += angles(columns)
+        findings += angle_findings(columns)
     return tuple(findings)
 
 

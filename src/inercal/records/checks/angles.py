@@ -27,7 +27,7 @@ _DEG = np.pi / 180.0
 _GIMBALS = ("th_x", "th_y", "th_z")
 
 
-def angles(columns: Mapping[str, Column]) -> list[Finding]:
+def angle_findings(columns: Mapping[str, Column]) -> list[Finding]:
     """``wrap_2pi``, ``stuck_encoder`` and ``command_shift``; nothing where a row is a position of a table."""
     if _positions(columns):
         return []

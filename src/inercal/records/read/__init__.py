@@ -15,7 +15,7 @@ from inercal.errors import InputError, MapError, RecordError
 from inercal.findings import Finding
 from inercal.inputs import Source
 from inercal.records.checks import check
-from inercal.records.read.join import FileTable, join
+from inercal.records.read.join import FileTable, joined
 from inercal.records.read.table import Format, Part
 from inercal.records.record import Record
 from inercal.units import Unit
@@ -155,7 +155,7 @@ def _tables(
 
 def _record(tables: Sequence[FileTable], record_map: RecordMap | None) -> Record:
     """The record of tables that belong together."""
-    columns = join(tables, record_map)
+    columns = joined(tables, record_map)
     sources = [
         *(file.source for file in tables),
         *([] if record_map is None else [source_of(record_map.path)]),

@@ -21,6 +21,12 @@ def bare(title: str) -> str:
     return re.sub(r"(?<=\S)\s*[\[(].*", "", title).strip()
 
 
+def titled(title: str) -> tuple[str, str | None]:
+    """Name and unit of a title: ``acc_x`` and ``m/s^2`` of ``acc_x [m/s^2]``; the title itself if it is no such."""
+    match = _TITLE.fullmatch(title.strip())
+    return (title, None) if match is None else (match[1], match[2])
+
+
 def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -> tuple[Channel, ...]:
     """The channels among titled columns; columns of other names are none of ours.
 

@@ -35,7 +35,7 @@ class FileTable:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def join(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, Column]:
+def joined(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, Column]:
     """Columns by name, sign, scale and unit applied; tables whose time stamps are equal share one time axis.
 
     Raises

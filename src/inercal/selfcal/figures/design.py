@@ -8,6 +8,7 @@ import numpy as np
 
 from inercal.report.coefficients import dots
 from inercal.report.courses import path
+from inercal.report.html import Picture
 from inercal.report.html import page as framed
 from inercal.selfcal.display import of_field
 from inercal.selfcal.figures.facts import facts
@@ -20,19 +21,25 @@ if TYPE_CHECKING:
     from inercal.selfcal.settings import SelfcalSettings
 
 
+def main(designed: Designed) -> Picture:
+    """The picture that answers the question: the path found."""
+    plan = designed.plan
+    return path(
+        plan.step * np.arange(len(plan.angles()), dtype=float),
+        plan.angles(),
+        JOINTS,
+        "The path found",
+        "Gimbal angles; the background has the colour of the joint that turns: th_x the outer, th_y the inner one, "
+        "th_z the platform's.",
+    )
+
+
 def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of a search for a path as one self-contained HTML page."""
     bounds, plan = designed.bounds, designed.plan
     units, size = of_field(len(bounds.names))
     drawn = [
-        path(
-            plan.step * np.arange(len(plan.angles()), dtype=float),
-            plan.angles(),
-            JOINTS,
-            "The path found",
-            "Gimbal angles; the background has the colour of the joint that turns: th_x the outer, th_y the inner one, "
-            "th_z the platform's.",
-        ),
+        main(designed),
         dots(
             "Bounds by path",
             "Standard uncertainty of each coefficient at the end of each path, the best that any filter can reach with "

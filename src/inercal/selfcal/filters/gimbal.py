@@ -32,6 +32,7 @@ from inercal.selfcal.platform.kinematics import Axes, angles, attitude, nearest_
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.settings import FACTOR_OF
 
 Array: TypeAlias = NDArray[np.float64]
 Cosines: TypeAlias = tuple[float, float, float, float, float, float]
@@ -51,7 +52,7 @@ def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> St
 def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
     """Take the filter through m steps, as `inercal.selfcal.filters.error_state.advance` does."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
-    factor = FACTORS[problem.filter.factor or "cholesky"]
+    factor = FACTORS[problem.filter.factor or FACTOR_OF["gimbal-ukf"]]
     euler = problem.filter.integration == "euler"
     health = _advance(state, problem.model, factor, euler, steps, out)
     return state, Trace(out, *health)

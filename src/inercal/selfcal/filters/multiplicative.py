@@ -38,6 +38,7 @@ from inercal.selfcal.platform.model import (
 )
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.settings import FACTOR_OF
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = 
     Innovations of the accelerometers are those that are left once the encoders are known.
     """
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
-    factor = FACTORS[problem.filter.factor or "cholesky"]
+    factor = FACTORS[problem.filter.factor or FACTOR_OF["mukf"]]
     health = _advance(state, problem.model, factor, steps, out)
     return state, Trace(out, *health)
 

@@ -1,5 +1,8 @@
 """Estimator 1, the filter of the paper: sigma points of a quaternion as it is, with a factor of the covariance.
 
+The factor is that of the eigenvalues, which for a covariance is the paper's singular value decomposition at two thirds
+of its cost; a study may ask for ``svd`` itself, or for ``cholesky``.
+
 The state is q_bp (4) and the coefficients (p,), augmented with a noise of the process (4) and of the encoders'
 quaternion (4): 2 (12 + p) + 1 points, drawn once a step, alpha 1, beta 0, kappa 0. The four components are taken
 for a vector: their mean is an ordinary one, brought back to unit length after the update; points never are.
@@ -29,6 +32,7 @@ from inercal.selfcal.platform.kinematics import attitude, joint_axes, nearest_tu
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.settings import FACTOR_OF
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = tuple[Quaternion, Quaternion, Quaternion]
@@ -52,7 +56,7 @@ def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> St
 def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
     """Take the filter through m steps, as `inercal.selfcal.filters.error_state.advance` does."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
-    factor = FACTORS[problem.filter.factor or "eigen"]
+    factor = FACTORS[problem.filter.factor or FACTOR_OF["svd-qukf"]]
     health = _advance(state, problem.model, factor, steps, out)
     return state, Trace(out, *health)
 

@@ -29,7 +29,7 @@ from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.budget import stated, within
 from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.settings import SelfcalSettings
+from inercal.selfcal.settings import FACTOR_OF, SelfcalSettings
 
 COMMAND = "selfcal"
 
@@ -76,6 +76,12 @@ _BY_KIND = {
 _BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
 
 
+def _factor(kind: str, settings: SelfcalSettings) -> dict[str, str]:
+    """The factor of the covariance that a sigma-point filter took; nothing of an estimator without one."""
+    own = next((factor for name, factor in FACTOR_OF.items() if name == kind), None)
+    return {} if own is None else {"factor": settings.filter.factor or own}
+
+
 def assemble(
     recording: Recording,
     settings: SelfcalSettings,
@@ -113,6 +119,7 @@ def assemble(
     interval = float(np.median(recording.dt))
     result: dict[str, Any] = {
         "filter": filtered.kind,
+        **_factor(filtered.kind, settings),
         "bounds": {},
         "at_prior": [],
         "goal": {},

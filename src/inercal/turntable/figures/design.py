@@ -24,6 +24,19 @@ if TYPE_CHECKING:
     from inercal.turntable.settings import TurntableSettings
 
 
+def main(designed: Designed, settings: TurntableSettings) -> Picture:
+    """The picture that answers the question: where gravity lies on the instrument in the positions chosen."""
+    angles, chain = designed.plan.angles, settings.chain
+    return draw(
+        "Positions chosen",
+        f"Direction of gravity on the axes of the instrument in the {len(angles)} positions, on two hemispheres "
+        "seen along −z (equal-area projection; circles at 30° and 60° from the pole). Numbers as in the list of "
+        "positions; near ones share a label.",
+        [hemispheres(gravity_reference() @ chain.attitude(angles))],
+        3.2,
+    )
+
+
 def page(designed: Designed, settings: TurntableSettings, estimate: Estimate) -> str:
     """The report of a search for positions as one self-contained HTML page."""
     judged, unit = designed.judged, designed.unit
@@ -88,14 +101,7 @@ def _design_pictures(
     """The chosen positions, the uncertainties by plan, and where they come from."""
     angles, chain = designed.plan.angles, settings.chain
     drawn = [
-        draw(
-            "Positions chosen",
-            f"Direction of gravity on the axes of the instrument in the {len(angles)} positions, on two hemispheres "
-            "seen along −z (equal-area projection; circles at 30° and 60° from the pole). Numbers as in the list of "
-            "positions; near ones share a label.",
-            [hemispheres(gravity_reference() @ chain.attitude(angles))],
-            3.2,
-        ),
+        main(designed, settings),
         rig(chain),
     ]
     if len(chain.joints) == 2:

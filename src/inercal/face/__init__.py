@@ -1,0 +1,1 @@
+"""The face for Python: the verbs of `inercal`, and what they give back."""

@@ -1,0 +1,112 @@
+"""A model on a sting in Python: its angle of attack over time, and its simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inercal.aoa import task
+from inercal.estimate.result import Estimate
+from inercal.face.result import Result, View
+from inercal.face.runs import Progress, calibrations, one_run
+from inercal.face.study import Study
+from inercal.records.record import Record
+
+if TYPE_CHECKING:
+    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.report.html import Picture
+
+ONE_RUN = (
+    "measure them one after the other, each with the result of the one before (--out run1.json) as its prior "
+    "(--set estimator.prior=run1.json)"
+)
+
+
+def prepare(study: Study, compare: bool = False, methods: Methods | None = None) -> None:
+    """Load, or compile, the kernels of `calibrate`, so that they do not count in its time."""
+    with study.at_fault():
+        task.load_kernels(study.settings, methods, compare)
+
+
+def calibrate(
+    records: Sequence[Record],
+    study: Study,
+    compare: bool = False,
+    progress: Progress = lambda _: None,
+    methods: Methods | None = None,
+    by_point: bool = False,
+) -> Result:
+    """Measure the angle of attack; ``evidence`` is the `inercal.aoa.task.Measurement`.
+
+    Parameters and errors are those of `inercal.calibrate`. ``methods`` ask for the paper's way; ``by_point`` for a row
+    for each pause in the place of one for each sample.
+    """
+    record = one_run(records, ONE_RUN)
+
+    def run(given: Record, settings: AoaSettings, said: Progress) -> task.Measurement:
+        return task.measure(given, settings, methods, compare, said)
+
+    return _result(calibrations([record], study, progress, run)[0], by_point)
+
+
+def _result(found: task.Measurement, by_point: bool) -> Result:
+    """A measurement as a result."""
+    from inercal.aoa.result.columns import angles_record, points_record
+    from inercal.aoa.result.display import delays, displayed, rest_of_fit, use_of_fit
+    from inercal.aoa.result.tables import answer, on_terminal
+
+    estimate, angles = found.estimate, found.angles
+
+    def tables() -> list[str]:
+        listed = [*answer(estimate, found.points if by_point else (), found.settings), *on_terminal(estimate)]
+        words = [rest_of_fit(estimate), delays(estimate), use_of_fit(estimate)]
+        return [*(f"{table.title}\n{table.text()}" for table in listed), *words]
+
+    def page() -> str:
+        from inercal.aoa import figures
+
+        return figures.page(found)
+
+    def rows() -> Record:
+        if by_point:
+            return points_record(found.points, found.recording, found.settings)
+        return angles_record(found.recording, angles, found.settings)
+
+    def picture() -> Picture:
+        from inercal.aoa import figures
+
+        return figures.main(found)
+
+    view = View(displayed(estimate), _answer(estimate.result), tables, page, picture, rows)
+    return Result(estimate, view, found)
+
+
+def _answer(told: dict[str, Any] | Any) -> str:
+    """The range of the angle and its uncertainty, in a line."""
+    ends, u = told["angle"]["range"], told["angle"]["u"]["median"]
+    if ends is None:
+        return "no angles"
+    low, high = np.degrees(ends)
+    known = "" if u is None else f", u {np.degrees(u):.2g} deg (median)"
+    return f"theta from {low:.4g} to {high:.4g} deg{known}, by {told['method']}"
+
+
+def simulate(study: Study, rng: np.random.Generator) -> Record:
+    """A simulated record of a model that moves as the study plans."""
+    from inercal.aoa.simulate import simulate as simulate_run
+    from inercal.aoa.simulate import to_record
+
+    with study.at_fault():
+        return to_record(simulate_run(study.settings, rng).recording, study.settings)
+
+
+def loaded(estimate: Estimate) -> Result:
+    """A result that was saved, in the units of the command line; its angles are in files of their own."""
+    from inercal.aoa.result.display import displayed
+    from inercal.face.imu import loaded as plain
+
+    whole, shown = plain(estimate), displayed(estimate)
+    return replace(whole, view=replace(plain(shown).view, answer=_answer(estimate.result)))

@@ -1,0 +1,158 @@
+"""Calibrations used: loaded, compared with each other, applied to recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate
+from inercal.face.result import Result
+from inercal.findings import Finding, Status
+from inercal.records.record import Record
+
+
+def compare(first: Result | Estimate | str | Path, second: Result | Estimate | str | Path) -> Result:
+    """Compare two calibrations of one instrument, run to run.
+
+    Parameters
+    ----------
+    first, second : Result, or path of a saved one
+        The later one second.
+
+    Returns
+    -------
+    Result
+        The differences second - first; `Status.INCONSISTENT` where they are larger than their uncertainties explain.
+
+    Raises
+    ------
+    InputError
+        No coefficient in common, or a coefficient whose units do not agree.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> from inercal.examples import FOLDER
+    >>> log = ic.read(FOLDER / "ferraris.csv.gz", map=FOLDER / "ferraris-map.toml")
+    >>> found = ic.calibrate(log, gravity="9.81(1) m/s^2")
+    >>> ic.compare(found, found)["K1_x"].value
+    0.0
+    """
+    from inercal.estimate.compare import Saved
+    from inercal.estimate.compare import compare as compared
+    from inercal.face.comparison import of_comparison
+
+    files = [Saved(*estimate_of(each, where)) for each, where in ((first, "first"), (second, "second"))]
+    return of_comparison(compared(*files), files[0].estimate.command)
+
+
+def apply(calibration: Result | Estimate | str | Path, record: Record, invert: bool = False) -> Record:
+    """Correct a recording with a calibration.
+
+    Parameters
+    ----------
+    calibration : Result, or path of a saved one
+        Of an IMU or a platform.
+    record : Record
+        With the channels that were calibrated, in units of the same kind.
+    invert : bool
+        The record holds true values, and outputs of the instrument are made of them.
+
+    Returns
+    -------
+    Record
+        Specific force [m/s^2] and rate [rad/s]; what the calibration says of itself is among its findings.
+
+    Raises
+    ------
+    InputError
+        The calibration is not of such an instrument, or the record not of this one.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> from inercal.examples import FOLDER
+    >>> log = ic.read(FOLDER / "ferraris.csv.gz", map=FOLDER / "ferraris-map.toml")
+    >>> ic.apply(ic.calibrate(log, gravity="9.81 m/s^2"), log)["acc_x"].unit.symbol
+    'm/s^2'
+    """
+    from inercal.convert.correct import apply_to
+
+    model, findings = model_of(*estimate_of(calibration, "calibration"))
+    corrected = apply_to(record, model, invert)
+    return replace(corrected, findings=(*findings, *worth_saying(corrected, model)))
+
+
+def model_of(estimate: Estimate, where: object = "calibration") -> tuple[Any, tuple[Finding, ...]]:
+    """The instrument of a calibration, and what to say of that: a bad verdict, terms that are not applied."""
+    from inercal.convert import correct, platform
+
+    verdict = f"the calibration ended {estimate.status.value}: {estimate.message}"
+    bad = () if estimate.status is Status.OK else (Finding("bad_verdict", verdict, str(where)),)
+    if estimate.command == platform.COMMAND:
+        return platform.platform_model(estimate, where), (*bad, *platform.not_applied(estimate, where))
+    return correct.imu_model(estimate, where), (*bad, *correct.not_applied(estimate, where))
+
+
+def worth_saying(record: Record, model: Any) -> tuple[Finding, ...]:
+    """Findings of a record, but for the rate and the accelerometers that nobody needs of a platform."""
+    from inercal.convert.platform import PlatformModel
+    from inercal.selfcal.reading import worth_saying as of_platform
+
+    if isinstance(model, PlatformModel):
+        return tuple(of_platform(record, record.columns.values()))
+    return record.findings
+
+
+def load(path: str | Path) -> Result:
+    """Read a result that was saved, by `Result.save` or ``--out``.
+
+    Raises
+    ------
+    InputError
+        In one sentence: no such file, or not one of inercal's.
+
+    Examples
+    --------
+    >>> import inercal as ic, pathlib, tempfile
+    >>> from inercal.examples import FOLDER
+    >>> log = ic.read(FOLDER / "ferraris.csv.gz", map=FOLDER / "ferraris-map.toml")
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "cal.json"
+    >>> _ = ic.calibrate(log, gravity="9.81 m/s^2").save(path)
+    >>> ic.load(path).status.value
+    'ok'
+    """
+    from inercal.estimate.files import load as read_estimate
+    from inercal.face.comparison import of_comparison
+
+    estimate = read_estimate(path)
+    match estimate.command:
+        case "compare":
+            return of_comparison(estimate, "")
+        case "selfcal" | "aoa" as kind:
+            found: Result = import_module(f"inercal.face.{kind}").loaded(estimate)
+            return found
+        case _:
+            from inercal.face.imu import loaded
+
+            return loaded(estimate)
+
+
+def estimate_of(given: Result | Estimate | str | Path, where: str = "result") -> tuple[Estimate, str]:
+    """The estimate of a result, or of the file of one, and what to call it."""
+    from inercal.estimate.files import load as read_estimate
+
+    match given:
+        case Result():
+            return given.estimate, where
+        case Estimate():
+            return given, where
+        case str() | Path():
+            return read_estimate(given), str(given)
+        case _:
+            raise InputError(
+                where, f"found {type(given).__name__}, expected a result or the path of a saved one"
+            )

@@ -1,0 +1,89 @@
+"""An IMU in Python: calibrated by any method, from one or several runs, and over temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from inercal.estimate.result import Estimate
+from inercal.face.result import Result, View, coefficients
+from inercal.face.study import Study
+from inercal.imu.task import calibrate as calibrate_run
+from inercal.records.record import Record
+
+if TYPE_CHECKING:
+    from inercal.imu.temperature.model import TemperatureModel
+    from inercal.report.html import Picture
+
+
+def calibrate(
+    records: Sequence[Record],
+    study: Study,
+    compare: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Result:
+    """Calibrate an IMU from one run, or from repeat runs together; ``evidence`` has a calibration for each.
+
+    Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
+    """
+    from inercal.estimate.repeat import combine_runs
+    from inercal.face.runs import calibrations, with_span
+
+    found = calibrations(records, study, progress, calibrate_run)
+    runs = [each.estimate for each in found]
+    estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
+
+    def page() -> str:
+        from inercal.imu import figures
+        from inercal.report.coefficients import repeats
+        from inercal.report.html import render
+
+        if len(found) == 1:
+            return figures.page(found[0])
+        return render(estimate, repeats(estimate), "Calibration of an inertial measurement unit")
+
+    return Result(estimate, of_coefficients(estimate, page), found[0] if len(found) == 1 else tuple(found))
+
+
+def of_temperature(model: TemperatureModel) -> Result:
+    """What a sensor does with temperature, as a result."""
+    from inercal.report.html import render
+
+    def page() -> str:
+        from inercal.imu.temperature.figures import pictures
+
+        return render(model.estimate, pictures(model), "Bias and scale factor against temperature")
+
+    return Result(model.estimate, of_coefficients(model.estimate, page), model)
+
+
+def of_coefficients(
+    shown: Estimate, page: Callable[[], str], more: Callable[[], Sequence[str]] = tuple
+) -> View:
+    """The view of a result that is its coefficients, with ``more`` tables behind that of them."""
+
+    def values() -> Picture:
+        from inercal.report.coefficients import values
+
+        return values(shown)
+
+    return View(
+        shown,
+        coefficients(shown),
+        lambda: [shown.table() if shown.names else "", *more()],
+        page,
+        values,
+    )
+
+
+def loaded(estimate: Estimate) -> Result:
+    """A result that was saved, in the units that it was saved in."""
+    from inercal.report.coefficients import budget, correlation
+    from inercal.report.html import render
+
+    def page() -> str:
+        drawn = [correlation(estimate)] if len(estimate.names) > 1 else []
+        drawn += [budget(estimate)] if estimate.names and estimate.budget else []
+        return render(estimate, drawn, f"inercal {estimate.command}")
+
+    return Result(estimate, of_coefficients(estimate, page))

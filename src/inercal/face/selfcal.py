@@ -1,0 +1,139 @@
+"""A platform in gimbals in Python: its self-calibration, simulation, and the path on which it calibrates best."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate
+from inercal.face.imu import of_coefficients
+from inercal.face.result import Result, View
+from inercal.face.runs import Progress, calibrations, with_span, without_coefficients
+from inercal.face.study import Study
+from inercal.records.record import Record
+from inercal.selfcal import task
+from inercal.selfcal.display import displayed
+
+if TYPE_CHECKING:
+    from inercal.report.html import Picture
+    from inercal.selfcal.settings import SelfcalSettings
+
+
+def prepare(study: Study, compare: bool = False) -> None:
+    """Load, or compile, the kernels of `calibrate`, so that they do not count in its time."""
+    with study.at_fault():
+        task.load_kernels(study.settings, compare)
+
+
+def calibrate(
+    records: Sequence[Record], study: Study, compare: bool = False, progress: Progress = lambda _: None
+) -> Result:
+    """Calibrate a platform from one run, or from repeat runs together; ``evidence`` has a calibration for each.
+
+    Parameters and errors are those of `inercal.calibrate`.
+    """
+    if len(records) > 1 and compare:
+        raise InputError("compare", f"found {len(records)} runs, expected one")
+
+    def run(record: Record, settings: SelfcalSettings, said: Progress) -> task.Calibration:
+        return task.calibrate(record, settings, compare, said)
+
+    found = calibrations(records, study, progress, run)
+    return _one(found[0]) if len(found) == 1 else _repeated(found, records)
+
+
+def _one(found: task.Calibration) -> Result:
+    """The result of one run."""
+    from inercal.selfcal.result.columns import history_record
+
+    def page() -> str:
+        from inercal.selfcal import figures
+
+        return figures.page(found)
+
+    def more() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in task.compared(found)]
+
+    def rows() -> Record:
+        return history_record(found.filtered, found.recording, found.problem.world)
+
+    kept = found.filtered.history is not None
+    view = of_coefficients(displayed(found.estimate), page, more)
+    return Result(found.estimate, replace(view, rows=rows if kept else None), found)
+
+
+def _repeated(found: Sequence[task.Calibration], records: Sequence[Record]) -> Result:
+    """What repeat runs say together."""
+    from inercal.estimate.repeat import combine_runs
+
+    runs = [each.estimate for each in found]
+    estimate, shown = combine_runs(runs), combine_runs([displayed(each) for each in runs])
+
+    def page() -> str:
+        from inercal.report.coefficients import repeats
+        from inercal.report.html import render
+
+        return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")
+
+    return Result(with_span(estimate, records[0]), of_coefficients(shown, page), tuple(found))
+
+
+def simulate(study: Study, rng: np.random.Generator) -> Record:
+    """A simulated record of a platform that turns through the plan of the study."""
+    from inercal.selfcal.before.simulate import experiment, to_record
+    from inercal.selfcal.before.simulate import simulate as simulate_run
+
+    with study.at_fault():
+        return to_record(simulate_run(experiment(study.settings), rng).recording)
+
+
+def prepare_design(study: Study) -> None:
+    """Load, or compile, the kernels of `design`."""
+    from inercal.selfcal.before.bounds import bounds
+    from inercal.selfcal.filters.problem import problem
+    from inercal.selfcal.platform.plan import Plan, Rest, motion
+
+    settings = study.settings
+    with study.at_fault():
+        bounds(motion(Plan((Rest(0.2),)), settings.world), problem(settings))
+
+
+def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
+    """Find the path that calibrates best; ``evidence`` is the `inercal.selfcal.before.path_design.Designed`."""
+    from inercal.selfcal.before.path_design import REFERENCES
+    from inercal.selfcal.before.path_design import design as search
+
+    clock = time.perf_counter()
+    with study.at_fault():
+        designed = search(study.settings, *(() if progress is None else (progress,)))
+    timing = {"solve": time.perf_counter() - clock}
+    result = without_coefficients(
+        "design selfcal", designed.message, designed.result, study, designed.findings, timing, REFERENCES
+    )
+
+    def page() -> str:
+        from inercal.selfcal.figures.design import page as of_design
+
+        return of_design(designed, study.settings, result)
+
+    def picture() -> Picture:
+        from inercal.selfcal.figures.design import main
+
+        return main(designed)
+
+    view = View(result, designed.plan.words(), lambda: [designed.table()], page, picture)
+    return Result(result, view, designed)
+
+
+def loaded(estimate: Estimate) -> Result:
+    """A result that was saved, in the units of the command line."""
+    from inercal.face.imu import loaded as plain
+
+    whole = plain(estimate)
+    shown = displayed(estimate)
+    return replace(whole, view=of_coefficients(shown, plain(shown).view.page))

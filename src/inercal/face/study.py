@@ -1,0 +1,213 @@
+"""Studies: of a TOML file, or of the same keys as keywords."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from inercal.errors import InputError, StudyError
+from inercal.records.places import counted_names
+from inercal.units import shown
+
+KINDS = ("imu", "turntable", "selfcal", "aoa")
+"""The kinds of study, one for each system, as the commands name them."""
+
+_LOAD = {
+    "imu": "load_imu_study",
+    "turntable": "load_turntable_study",
+    "selfcal": "load_selfcal_study",
+    "aoa": "load_aoa_study",
+}
+"""What reads the file of each kind, in `inercal.studies.load`."""
+
+_SITE = ("latitude", "height", "gravity")
+"""Keys of the table [site] that may stand alone."""
+
+_UNREAD = {"aoa": "motion"}
+"""Table of a study whose files are for its simulation alone."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Study:
+    """What a task is told: its ``kind``, and its ``settings`` in SI, frozen.
+
+    ``path`` is the file that it was read from, None of a study by keywords; ``keys`` are the keys that were given, as
+    they were typed; ``files`` are the study and the files that it names.
+    """
+
+    kind: str
+    settings: Any
+    path: Path | None = None
+
+    @property
+    def keys(self) -> Mapping[str, Any]:
+        """The keys that were given, table by table, ready for JSON."""
+        given: Mapping[str, Any] = self.settings.given
+        return given
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The study, and the files that it names; none of a study by keywords."""
+        return self.files_without(_UNREAD.get(self.kind, ""))
+
+    def files_without(self, table: str) -> tuple[Path, ...]:
+        """The study, and the files that it names outside that ``table``."""
+        from inercal.studies.load import files_of
+
+        if self.path is None:
+            return files_of(Path("study"), self.keys, unread=table)[1:]
+        return files_of(self.path, self.keys, unread=table)
+
+    @contextmanager
+    def at_fault(self) -> Iterator[None]:
+        """Name the study where a task finds fault with a key of it; what is wrong with a recording stays as it is."""
+        try:
+            yield
+        except InputError as error:
+            if type(error) not in (InputError, StudyError) or self.path is None:
+                raise
+            raise StudyError(self.path, str(error)) from error
+
+    def __repr__(self) -> str:
+        """Ten lines at most: the kind, where it is from, and the keys by table."""
+        lines = [f"Study of kind {self.kind}, {self.path or 'by keywords'}"]
+        for table, keys in self.keys.items():
+            if isinstance(keys, Mapping):
+                text = ", ".join(f"{key} = {_toml(value)}" for key, value in keys.items())
+                lines.append(f"  [{table}] {text}")
+        if len(lines) > 10:
+            rest = counted_names([line.split("]")[0].strip(" [") for line in lines[9:]], 6)
+            lines = [*lines[:9], f"  and the tables {rest}"]
+        return "\n".join(line if len(line) <= 110 else f"{line[:106]} ..." for line in lines)
+
+
+def study(path_or_kind: str | Path, /, **keys: Any) -> Study:
+    """Read a study, or make one of keywords.
+
+    Parameters
+    ----------
+    path_or_kind : str or Path
+        A TOML file; or the kind ``"imu"``, ``"turntable"``, ``"selfcal"`` or ``"aoa"`` of a study by keywords.
+    **keys
+        Tables of the study with the keys of its file, quantities as texts with a unit: ``site={"latitude": "45 deg"}``.
+        ``latitude``, ``height`` and ``gravity`` may stand without their table ``site``, and of an IMU all keys of the
+        table ``imu``: ``method="ferraris"``. Beside a file, they are set over its keys.
+
+    Returns
+    -------
+    Study
+        Checked, in SI.
+
+    Raises
+    ------
+    StudyError
+        One sentence: the key, what was found, and what was expected, with the nearest key for one that is unknown.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> ic.study("imu", site={"latitude": "45 deg"}, method="multiposition")
+    Study of kind imu, by keywords
+      [site] latitude = "45 deg"
+      [imu] method = "multiposition"
+    """
+    if str(path_or_kind) in KINDS:
+        kind = str(path_or_kind)
+        return Study(kind, _of_keys(kind, _in_tables(kind, keys)))
+    path = Path(path_or_kind)
+    kind = kind_of(path)
+    return read_study(kind, path, [*_overrides(_in_tables(kind, keys))])
+
+
+def read_study(kind: str, path: Path, overrides: Iterable[str] = ()) -> Study:
+    """Read a study of that kind; ``overrides`` as of ``--set``: ``imu.static_start=50 s``. Raises `StudyError`."""
+    load = getattr(import_module("inercal.studies.load"), _LOAD[kind])
+    return Study(kind, load(path, overrides), path)
+
+
+def study_of(given: Study | str | Path) -> Study:
+    """A study, or the one of a file."""
+    if isinstance(given, Study):
+        return given
+    if isinstance(given, str | Path):
+        return study(given)
+    raise StudyError("study", f"found {type(given).__name__}, expected a study or the path of one")
+
+
+def kind_of(path: Path) -> str:
+    """The kind of study that a file is, told by ``rig.kind``; raises `StudyError` where it cannot be read."""
+    from inercal._toml import read_toml
+
+    if not path.suffix and not path.is_file():
+        raise StudyError(path, f"found no such file, expected one, or a kind of study: {', '.join(KINDS)}")
+    rig = read_toml(path, StudyError).get("rig")
+    kind = rig.get("kind") if isinstance(rig, Mapping) else None
+    if rig is None:
+        return "imu"
+    return {"three_axis_gimbals": "selfcal", "sting": "aoa"}.get(str(kind), "turntable")
+
+
+def _of_keys(kind: str, keys: Mapping[str, Any]) -> Any:
+    """The settings of a study by keywords; files that it names lie in the working folder."""
+    made = getattr(import_module(f"inercal.studies.{kind}"), f"{kind}_study")
+    return made(tomllib.loads(_document(keys)), "study")
+
+
+def _in_tables(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """The keywords with those in their tables that stand alone."""
+    tables: dict[str, Any] = {}
+    for key, value in keys.items():
+        table = "site" if key in _SITE else kind if kind == "imu" and not isinstance(value, Mapping) else ""
+        if not table or key == "schema":
+            tables[key] = {**tables.get(key, {}), **value} if isinstance(value, Mapping) else value
+            continue
+        beside = tables.setdefault(table, {})
+        if key in beside or key in keys.get(table, {}):
+            raise StudyError("study", f"{key}: found it alone and in the table {table}, expected it once")
+        beside[key] = value
+    return tables
+
+
+def _overrides(tables: Mapping[str, Any], above: str = "") -> Iterator[str]:
+    """Keywords as ``--set`` takes them."""
+    for key, value in tables.items():
+        if isinstance(value, Mapping):
+            yield from _overrides(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}={_toml(value)}"
+
+
+def _document(keys: Mapping[str, Any]) -> str:
+    """Keywords as a TOML document."""
+    return "\n".join(f"{json.dumps(key)} = {_toml(value)}" for key, value in keys.items())
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML; refused where it has none."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case str() | int():
+            return json.dumps(value, ensure_ascii=False)
+        case float():
+            return repr(value)
+        case Path():
+            return json.dumps(str(value), ensure_ascii=False)
+        case Mapping():
+            inner = (
+                f"{key if str(key).isidentifier() else json.dumps(key)} = {_toml(v)}"
+                for key, v in value.items()
+            )
+            return "{ " + ", ".join(inner) + " }"
+        case list() | tuple():
+            return "[" + ", ".join(map(_toml, value)) + "]"
+        case _ if hasattr(value, "tolist"):  # of NumPy
+            return _toml(value.tolist())
+        case _:
+            raise StudyError("study", f"found {shown(value)}, expected a text, a number, a list or a table")

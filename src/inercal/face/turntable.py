@@ -1,0 +1,113 @@
+"""A turntable in Python: calibration of what stands on it, sensitivity to its errors, positions, simulation."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inercal.face.imu import of_coefficients
+from inercal.face.result import Result, View
+from inercal.face.runs import Progress, calibrations, one_run, without_coefficients
+from inercal.face.study import Study
+from inercal.records.record import Record
+from inercal.turntable import task
+
+if TYPE_CHECKING:
+    from inercal.report.html import Picture
+
+
+def calibrate(
+    records: Sequence[Record], study: Study, compare: bool = False, progress: Progress = lambda _: None
+) -> Result:
+    """Calibrate an instrument that was taken through positions, or gyros by a rate test.
+
+    Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
+    """
+    record = one_run(records, "calibrate each by itself")
+    found: Any = calibrations([record], study, progress, task.calibrate)[0]
+
+    def page() -> str:
+        from inercal.turntable import figures
+
+        return figures.page(found)
+
+    def more() -> list[str]:
+        from inercal.turntable.display import tolerances
+
+        return [tolerances(found.estimate)]
+
+    return Result(found.estimate, of_coefficients(found.shown, page, more), found)
+
+
+def simulate(study: Study, rng: np.random.Generator) -> Record:
+    """A simulated record of the positions or the rate test of the study."""
+    with study.at_fault():
+        return task.simulate(study.settings, rng)
+
+
+def design(study: Study, progress: Progress = lambda _: None) -> Result:
+    """Find the positions that calibrate best; ``evidence`` is the `inercal.turntable.positions.planning.Designed`."""
+    from inercal.turntable.positions.planning import REFERENCES
+
+    clock = time.perf_counter()
+    with study.at_fault():
+        designed = task.design(study.settings, progress)
+    timing = {"solve": time.perf_counter() - clock}
+    result = without_coefficients(
+        "design positions", designed.message, designed.result, study, designed.findings, timing, REFERENCES
+    )
+
+    def page() -> str:
+        from inercal.turntable.figures.design import page as of_design
+
+        return of_design(designed, study.settings, result)
+
+    def picture() -> Picture:
+        from inercal.turntable.figures.design import main
+
+        return main(designed, study.settings)
+
+    words = f"{len(designed.plan)} positions, by direction of gravity on the instrument"
+    return Result(result, View(result, words, lambda: [designed.table()], page, picture), designed)
+
+
+def sensitivity(
+    study: Study,
+    maps: bool = True,
+    say: Progress = lambda _: None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Result:
+    """Which error of the table matters; ``evidence`` is the `inercal.turntable.sensitivity.analysis.Analysed`.
+
+    Without ``maps`` indices of each position may be left out; ``say`` is told of what takes long.
+    """
+    from inercal.turntable.sensitivity.analysis import analyse, result, table
+
+    with study.at_fault():
+        analysed = analyse(study.settings, maps, say, progress)
+    estimate = without_coefficients(
+        "sensitivity",
+        analysed.message,
+        result(analysed),
+        study,
+        timing={"solve": analysed.solve},
+        references=analysed.references,
+    )
+
+    def page() -> str:
+        from inercal.turntable.figures.sensitivity import page as of_sensitivity
+
+        return of_sensitivity(analysed, study.settings, estimate)
+
+    def picture() -> Picture:
+        from inercal.turntable.figures.sensitivity import ranking
+
+        return ranking(analysed.indices, analysed.aggregate)
+
+    largest = int(np.nanargmax(np.nan_to_num(analysed.aggregate.total)))
+    words = f"largest: {analysed.indices.factors[largest]}, {analysed.what[largest]}"
+    view = View(estimate, words, lambda: [table(analysed)], page, picture)
+    return Result(estimate, view, analysed)

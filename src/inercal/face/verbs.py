@@ -1,0 +1,258 @@
+"""The verbs that compute: one for each task, whatever the system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inercal.errors import InputError, StudyError
+from inercal.estimate.result import Estimate
+from inercal.face.calibrations import estimate_of
+from inercal.face.result import Result
+from inercal.face.study import Study, study, study_of
+from inercal.records.record import Record
+
+
+def calibrate(
+    records: Record | Sequence[Record],
+    study: Study | str | Path | None = None,
+    *,
+    latitude: str | None = None,
+    height: str | None = None,
+    gravity: str | None = None,
+    method: str | None = None,
+    compare: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Result:
+    """Calibrate an instrument from a recording, or measure an angle of attack: whatever the kind of the study is.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        One run; several are repeat runs of an IMU or a platform, which are combined.
+    study : Study or path, optional
+        Needed for a turntable, a platform and an angle of attack; of an IMU, ``latitude`` (and ``height``) or
+        ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.
+    method : str, optional
+        Of an IMU without a study: ``"multiposition"``, ``"ferraris"`` or ``"aided"``; absent, ``"ferraris"`` of a
+        record with labelled sections, else ``"multiposition"``.
+    compare : bool
+        Also run the other estimators of a platform, or the other methods of an angle of attack.
+    progress : callable
+        Told, in words, what is being done.
+
+    Returns
+    -------
+    Result
+        Its status says whether the values can be used; nothing is raised for a poor fit.
+
+    Raises
+    ------
+    InputError
+        The record does not hold what the method needs, or the study does not fit it.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> from inercal.examples import FOLDER
+    >>> log = ic.read(FOLDER / "ferraris.csv.gz", map=FOLDER / "ferraris-map.toml")
+    >>> found = ic.calibrate(log, gravity="9.81 m/s^2")
+    >>> round(found["K1_x"].value), found["K1_x"].unit
+    (208, '1/(m/s^2)')
+    """
+    runs = [records] if isinstance(records, Record) else list(records)
+    if not runs or not all(isinstance(each, Record) for each in runs):
+        kind = (
+            type(records).__name__ if not runs or isinstance(records, str | Path) else type(runs[0]).__name__
+        )
+        raise InputError("records", f"found {kind}, expected a record: ic.read(path) or ic.record(...)")
+    keys = {"latitude": latitude, "height": height, "gravity": gravity, "method": method}
+    given = {key: value for key, value in keys.items() if value is not None}
+    if study is None:
+        told = _imu_study(runs[0], given)
+    elif given:
+        raise StudyError(
+            next(iter(given)), "found beside a study, expected it there, as by ic.study(path, ...)"
+        )
+    else:
+        told = study_of(study)
+    system = import_module(f"inercal.face.{told.kind}")
+    if hasattr(system, "prepare"):
+        system.prepare(told, compare)
+    elif compare:
+        raise InputError("compare", f"found with a study of kind {told.kind}, expected one of selfcal or aoa")
+    found: Result = system.calibrate(runs, told, compare, progress)
+    return found
+
+
+def _imu_study(record: Record, given: dict[str, str]) -> Study:
+    """The study of an IMU without one: as `inercal new imu` begins it, at the site that is given."""
+    if not given.keys() & {"latitude", "gravity"}:
+        raise StudyError(
+            "study",
+            'missing, expected one, or of an IMU the site: latitude="48 deg" or gravity="9.81744(2) m/s^2"',
+        )
+    return study("imu", **(({"method": "ferraris"} if record.labels else {}) | given))
+
+
+def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
+    """Simulate a recording of the test that a study plans: of a turntable, a platform, or a model on a sting.
+
+    Parameters
+    ----------
+    study : Study or path
+    rng : numpy.random.Generator
+        The same one gives the same record: ``numpy.random.default_rng(1)``, as ``--seed 1``.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    StudyError
+        The study plans no test, or states no truth to simulate.
+
+    Examples
+    --------
+    >>> import inercal as ic, numpy as np
+    >>> from inercal.examples import FOLDER
+    >>> record = ic.simulate(FOLDER / "selfcal.toml", np.random.default_rng(1))
+    >>> list(record.columns)[:3]
+    ['wc_x', 'wc_y', 'wc_z']
+    """
+    told = study_of(study)
+    if not isinstance(rng, np.random.Generator):
+        raise InputError("rng", f"found {type(rng).__name__}, expected numpy.random.default_rng(seed)")
+    made: Record = _of_system(told, "simulate", "turntable, selfcal or aoa")(told, rng)
+    return made
+
+
+def design(study: Study | str | Path, what: str | None = None) -> Result:
+    """Find the positions of a turntable, or the path of a platform, that calibrate best.
+
+    Parameters
+    ----------
+    study : Study or path
+    what : str, optional
+        ``"positions"`` of a turntable, ``"selfcal"`` of a platform, as the commands name it; by the kind if absent.
+
+    Returns
+    -------
+    Result
+        Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is what was found.
+
+    Raises
+    ------
+    InputError
+        There is no such design, or not of this kind of study.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> table = ic.study("turntable", latitude="45 deg", rig={"kind": "two_axis_turntable"},
+    ...     instrument={"kind": "accelerometer", "unit": "g", "noise": "10 ug"}, design={"positions": 12})
+    >>> len(ic.design(table, "positions").evidence.plan)
+    12
+    """
+    told = study_of(study)
+    kinds = {"positions": "turntable", "selfcal": "selfcal"}
+    if what is not None and kinds.get(what) != told.kind:
+        raise InputError(
+            "design", f"found {what!r} of a study of kind {told.kind}, expected {_designs(told.kind)}"
+        )
+    if told.kind not in kinds.values():
+        raise InputError("design", f"found a study of kind {told.kind}, expected one of turntable or selfcal")
+    system = import_module(f"inercal.face.{told.kind}")
+    if told.kind == "selfcal":
+        system.prepare_design(told)
+    found: Result = system.design(told)
+    return found
+
+
+def _designs(kind: str) -> str:
+    """What can be designed of a kind."""
+    return {"turntable": "'positions'", "selfcal": "'selfcal'"}.get(
+        kind, "a study of kind turntable or selfcal"
+    )
+
+
+def sensitivity(study: Study | str | Path) -> Result:
+    """Say which error of a turntable matters for what the instrument should read.
+
+    Returns
+    -------
+    Result
+        Without coefficients: ``table()`` has Sobol indices by error, ``evidence.indices`` those of each position.
+
+    Raises
+    ------
+    InputError
+        The study is not of a turntable.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> table = ic.study("turntable", latitude="45 deg", rig={"kind": "two_axis_turntable",
+    ...     "errors": {"default": {"uniform": "2 arcmin"}}}, positions={"plan": "24-position"})
+    >>> print(ic.sensitivity(table).table().splitlines()[0].split())
+    ['S', 'ST', 'S', 'ax', 'S', 'ay', 'S', 'az', 'S', 'wx', 'S', 'wy']
+    """
+    told = study_of(study)
+    found: Result = _of_system(told, "sensitivity", "turntable")(told)
+    return found
+
+
+def _of_system(told: Study, verb: str, expected: str) -> Callable[..., Any]:
+    """What does it for the kind of a study; raises `InputError` where nothing does."""
+    found: Callable[..., Any] | None = getattr(import_module(f"inercal.face.{told.kind}"), verb, None)
+    if found is None:
+        raise InputError(verb, f"found a study of kind {told.kind}, expected one of {expected}")
+    return found
+
+
+def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 25.0) -> Result:
+    """Fit what a sensor's output, or its calibration, does with temperature.
+
+    Parameters
+    ----------
+    given : Record or sequence of Result
+        A recording at rest over a sweep of temperature, or calibrations made at several, in the order of time.
+    at : str or float
+        Temperature about which the polynomial is written: ``"25 degC"``, or degrees Celsius.
+
+    Returns
+    -------
+    Result
+        A cubic of each coefficient or channel, and its hysteresis.
+
+    Raises
+    ------
+    InputError
+        No temperature, or too little of it.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> from inercal.examples import FOLDER
+    >>> sweep = ic.read(FOLDER / "thermal.csv.gz", map=FOLDER / "thermal-map.toml")
+    >>> ic.temperature(sweep, at="30 degC").status.value
+    'ok'
+    """
+    from inercal.face.imu import of_temperature
+    from inercal.units import parse_quantity
+
+    about = parse_quantity(at, "temperature", "at").value if isinstance(at, str) else float(at)
+    if isinstance(given, Record):
+        from inercal.imu.temperature.sweep import fit_recording
+
+        return of_temperature(fit_recording(given, about))
+    from inercal.imu.temperature.calibrations import fit_calibrations
+
+    estimates = [estimate_of(each)[0] for each in given]
+    sources = [source for each in estimates for source in each.inputs[:1]]
+    return of_temperature(fit_calibrations(estimates, sources, about))
