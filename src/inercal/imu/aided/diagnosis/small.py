@@ -33,7 +33,7 @@ Patterns = dict[int, Array]
 
 def constant_errors(fit: Fit, motion: Motion, gravity: float, judge: Whitening) -> Iterator[Hypothesis[Fit]]:
     """All that is looked for, but for what no output would show."""
-    for name, code, patterns, words in _faults(fit, motion, gravity):
+    for name, code, patterns, words in _entries(fit, motion, gravity):
         width = next(iter(patterns.values())).shape[1]
         columns = [
             patterns.get(k, np.zeros((len(each.residual), width))) for k, each in enumerate(fit.sensors)
@@ -57,11 +57,11 @@ def _error(
     return Hypothesis(name, code, says, without, tuple(f"{name} {j + 1}" for j in range(told.shape[1])))
 
 
-Fault = tuple[str, str, Patterns, Callable[[Array], str]]
+Entry = tuple[str, str, Patterns, Callable[[Array], str]]
 """Name, code of the finding, patterns, and the sentence from the amplitudes (q,)."""
 
 
-def _faults(fit: Fit, motion: Motion, gravity: float) -> Iterator[Fault]:
+def _entries(fit: Fit, motion: Motion, gravity: float) -> Iterator[Entry]:
     """Faults of the angles, the clock, the earth rate and the outputs."""
     told = {triad: _at_fit(fit, motion, triad) for triad in fit.known}
     yield from _of_angles(fit, motion, gravity, told)
@@ -96,7 +96,7 @@ def gain(fit: Fit, triad: str) -> Array:
     return fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
 
 
-def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Iterator[Fault]:
+def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Iterator[Entry]:
     """Angles of a wrong scale, and with errors that come back in each turn; axes that are not where they should be."""
     for k, joint in enumerate(motion.chain.joints):
         angle = motion.angles[:, k]
@@ -152,12 +152,12 @@ def _scale(joint: str, a: Array) -> str:
 
 def _round(joint: str, a: Array) -> str:
     return (
-        f"the angles {joint} are wrong by up to {np.degrees(abs(a[0]) + np.hypot(a[1], a[2])):.2g} deg, in a way that "
+        f"the angles {joint} are wrong by up to {np.degrees(np.hypot(*a)):.2g} deg, in a way that "
         "goes with the angle: check the levelling, or an encoder off its centre"
     )
 
 
-def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Fault:
+def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Entry:
     """A clock of the angles that runs at another rate."""
     middle, span = float(np.mean(motion.t)), float(np.ptp(motion.t))
     moved = replace(motion, t=middle + (motion.t - middle) * (1.0 + STEP))
@@ -173,7 +173,7 @@ def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) 
     )
 
 
-def _of_gyro(fit: Fit, gravity: float) -> Iterator[Fault]:
+def _of_gyro(fit: Fit, gravity: float) -> Iterator[Entry]:
     """Another earth rate than stated, and a gyro that feels the specific force."""
     C_bn = fit.references["gyro"].C_bn
     h = fit.x[fit.unknowns.places["earth rate"]]
@@ -208,7 +208,7 @@ def _of_gyro(fit: Fit, gravity: float) -> Iterator[Fault]:
     )
 
 
-def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Fault:
+def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Entry:
     """Outputs that go through a slow filter: beside the delay there is a second derivative."""
     step = LIMITS.smoothing_step
     early, now, late = (_at_fit(fit, replace(motion, t=motion.t + by), triad) for by in (-step, 0.0, step))
@@ -224,7 +224,7 @@ def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Fault:
     )
 
 
-def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Fault]:
+def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Entry]:
     """Outputs that go with the square or the cube of the input."""
     ref = fit.references[triad]
     x = gravity * ref.C_bn[:, :, 2] if triad == "acc" else ref.rate
@@ -239,7 +239,7 @@ def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Fault]:
             )
 
 
-def _curved(patterns: Patterns, sensor: Sensor, name: str, size: float, power: int) -> Fault:
+def _curved(patterns: Patterns, sensor: Sensor, name: str, size: float, power: int) -> Entry:
     """An output with a term of a power of its input."""
     unit = sensor.side.blocks.triad.unit.symbol
 
