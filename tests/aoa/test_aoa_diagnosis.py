@@ -25,6 +25,7 @@ def recorded(settings, seed=0):
 def said(recording, settings):
     """Code and message of the one finding; there is none where plausibility has any."""
     (finding,) = diagnose(recording, settings)
+    assert finding.harm == ("theta",)
     return finding.code, finding.message
 
 

@@ -180,6 +180,14 @@ def test_a_wrong_zero_of_the_outer_axis_is_inconsistent_and_named(sound):
     assert "the angles phi1 are wrong by -0.2 deg throughout" in estimate.message
 
 
+def test_an_encoder_off_its_centre_is_named_with_its_amplitude(sound):
+    record, true = sound
+    estimate = calibrated(changed(record, ["phi1"], lambda v: v + 2e-3 * np.sin(v)))
+    # 2e-3 rad are 0.115 deg
+    assert "the angles phi1 are wrong by up to 0.11 deg" in said(estimate, "contradiction")
+    assert estimate.status is not Status.OK or largest(estimate, true) < 5.0
+
+
 def test_clocks_that_run_apart_are_told_with_the_factor(sound):
     record, true = sound
     t = record["phi1"].t * (1.0 + 1e-3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, TRUTH, study
 
-from inercal.findings import Finding
+from inercal.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.geometry.rotations import exp, rotate
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
@@ -35,6 +35,8 @@ def only(found, code, *words):
     assert [finding.code for finding in found] == [code]
     for word in words:
         assert word in found[0].message
+    # but for what is left out without harm, and noise that is too small, any value may be off
+    assert found[0].harm == (() if CODES[code].harm is Harm.NEVER else EVERYTHING)
     return found[0]
 
 

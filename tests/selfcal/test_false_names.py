@@ -104,6 +104,7 @@ def test_a_prior_that_the_values_contradict(part, factor, expected):
     found = named(recorded(), replace(STUDY, prior=prior))
     assert [each.code for each in found] == ["prior_suspect"] * len(expected)
     assert {each.message.split(":")[0] for each in found} == expected
+    assert {each.harm for each in found} == {(name,) for name in expected}
     assert {NAMES[i] for i in np.flatnonzero(beyond)} == expected
 
 

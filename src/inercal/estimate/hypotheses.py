@@ -25,7 +25,7 @@ from inercal.arrays import Array
 from inercal.findings import Finding
 
 Case = TypeVar("Case")
-Judged = TypeVar("Judged", contravariant=True)
+AnyCase = TypeVar("AnyCase", contravariant=True)
 
 CLEAR = 4.0
 """Standard uncertainties by which one parameter of an error must still differ from 0 beside errors found later."""
@@ -126,13 +126,13 @@ class Fitted(Generic[Case]):
         return Finding(of.code, self.sentence + also, of.where, of.harm)
 
 
-class Judge(Protocol[Judged]):
+class Judge(Protocol[AnyCase]):
     """How well a case fits."""
 
-    def residuals(self, case: Judged) -> Array:
+    def residuals(self, case: AnyCase) -> Array:
         """Normalised residuals of any shape, always the same; NaN where one does not count."""
 
-    def misfit(self, case: Judged) -> float:
+    def misfit(self, case: AnyCase) -> float:
         """Sum of squares, or what stands for it; infinite where nothing can be made of a case."""
 
 

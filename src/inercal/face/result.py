@@ -30,8 +30,8 @@ class View:
     """How a result is shown, to everyone who looks: at a prompt, in a notebook, in a terminal, on a page.
 
     ``shown`` is the estimate in the units of the command line; ``answer`` says the main number in a line; ``tables``
-    are those that the command prints; ``page`` is its report; ``picture`` is the one that answers the question; ``rows``
-    are what was found from row to row of the recording.
+    are those that the command prints; ``page`` is its report; ``picture`` is the one that answers the question;
+    ``rows`` are what was found from row to row of the recording.
     """
 
     shown: Estimate

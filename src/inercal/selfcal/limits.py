@@ -43,6 +43,18 @@ class Limits:
     noise_sigmas: float = 10.0
     """Standard deviations of a difference of encoder readings beyond which it is motion."""
 
+    jump_share: float = 0.5
+    """Share of a commanded turn by which the encoders must turn otherwise to jump."""
+
+    still_share: float = 0.1
+    """Share of a commanded turn up to which an encoder stands still."""
+
+    leap_share: float = 0.1
+    """Share of a leap by which it may differ from a multiple of the commanded turn."""
+
+    widened_prior: float = 10.0
+    """Times a coefficient, or its prior, to which a prior that is in its way is widened."""
+
     harmonic_orders: int = 64
     """Largest number of periods a turn at which an error of an encoder is looked for."""
 

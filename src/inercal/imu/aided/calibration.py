@@ -14,11 +14,11 @@ from inercal.estimate.result import Estimate, timed
 from inercal.findings import Finding, Status
 from inercal.imu.aided.blocks import Blocks, cut
 from inercal.imu.aided.coefficients import gain_names
+from inercal.imu.aided.diagnosis.fit_quality import knocks
+from inercal.imu.aided.diagnosis.gross import agreement, cures, expected, lag, tells, travel
 from inercal.imu.aided.fit import Fit, fit
-from inercal.imu.aided.misfit import knocks
 from inercal.imu.aided.model import side_of, unknowns
 from inercal.imu.aided.outcome import assemble, without_fit
-from inercal.imu.aided.suspects import MISFIT, agreement, cures, expected, lag, tells, travel
 from inercal.imu.aided.table import Motion, motion_of, shifted, times
 from inercal.imu.aided.walk import whiten
 from inercal.imu.aided_settings import AidedSettings
@@ -93,7 +93,7 @@ def calibrate_aided(
         scales[sensor] = 1.0 / each.triad.unit.factor
         if tells(sensor, x):
             match = agreement(each.y, x)
-            if match.miss > MISFIT:
+            if match.miss > LIMITS.agreement_miss:
                 wrong.append(f"{sensor} leaves {100.0 * match.miss:.0f} %")
             scales[sensor] = match.scale / (settings.site.gravity if sensor == "acc" else 1.0)
     bad = None

@@ -20,9 +20,8 @@ from inercal.imu.aided.coefficients import (
     type_a,
     type_b,
 )
-from inercal.imu.aided.faults import faults
+from inercal.imu.aided.diagnosis.examination import misfits
 from inercal.imu.aided.fit import Fit
-from inercal.imu.aided.misfit import misfits
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
 from inercal.imu.settings import COMMAND, MASKED, ImuSettings
@@ -64,7 +63,7 @@ def assemble(
     values, rows, own = coefficients(fit, names)
     sources_a = type_a(fit, rows, own, names)
     sources_b = type_b(fit, rows, names, values, settings.site, settings.time_base_u)
-    faulty = misfits(fit, names, rows, list(faults(fit, motion, settings.site.gravity)))
+    faulty = misfits(fit, names, rows, motion, settings.site.gravity)
     tilt = scatter(fit, settings.site.gravity)
     if tilt > 0.0 and not faulty:
         crossed = np.array([name.startswith(("M_", "T_")) for name in names])

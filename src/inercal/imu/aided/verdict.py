@@ -9,8 +9,9 @@ import numpy as np
 from inercal.estimate.result import rounded
 from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
+from inercal.imu.aided.diagnosis.examination import Misfit
+from inercal.imu.aided.diagnosis.fit_quality import variation
 from inercal.imu.aided.fit import Fit, Sensor
-from inercal.imu.aided.misfit import Misfit, variation
 from inercal.imu.limits import LIMITS
 from inercal.records.places import counted, counted_names
 

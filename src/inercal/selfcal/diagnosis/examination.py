@@ -77,7 +77,10 @@ def _fair(problem: FilterProblem, moved: FilterProblem, found: FilterResult) -> 
     far = (u < UNOBSERVABLE * prior) & ~(
         np.abs(found.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread
     )
-    return replace(moved, prior=np.where(far, 10.0 * np.maximum(np.abs(found.coefficients), prior), prior))
+    return replace(
+        moved,
+        prior=np.where(far, LIMITS.widened_prior * np.maximum(np.abs(found.coefficients), prior), prior),
+    )
 
 
 def _remaining(case: Case, meant: FilterProblem, stated: Stated) -> list[Finding]:

@@ -2,16 +2,18 @@
 
 Before anything is filtered they are seen roughly, to some per cent: enough to tell wrong units, exchanged or reversed
 axes and another path from the coefficients that are to be found, which are a hundred times smaller. What the whole
-recording is about is compared, so that single bad stretches stay with the tests of the filters' innovations. Of these
-the axes of the accelerometers are one hypothesis (`reordered_accelerometers`).
+recording is about is compared, so that single bad stretches stay with the tests of the filters' innovations. Each other
+sign or order is a hypothesis, and the first with which two sensors agree is named. Accelerometers are also held to the
+innovations (`reordered_accelerometers`).
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import get_args
 
 import numpy as np
@@ -19,7 +21,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.errors import RecordError
-from inercal.estimate.hypotheses import Hypothesis
+from inercal.estimate.hypotheses import Hypothesis, tried
 from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
 from inercal.selfcal.diagnosis.fit_quality import Case
@@ -130,48 +132,103 @@ def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
 
 def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
     """Rates against angles: gimbals of another order or with other signs, exchanged or reversed rates."""
-    world, noise = settings.world, 2.0 * settings.noise.encoder
-    turned = motion.turned(world)
-    misfit = _misfit(turned, commanded, noise)
-    if misfit < LIMITS.rough_misfit:
+    noise = 2.0 * settings.noise.encoder
+    turned = motion.turned(settings.world)
+    by_angles = _Pair(turned, commanded, noise)
+    if by_angles.misfit < LIMITS.rough_misfit:
         return []
-    for other in _other_gimbals(settings.gimbals):
-        tried = world._replace(axes=other.index, signs=other.sign)
-        if _misfit(motion.turned(tried), commanded, noise) < LIMITS.rough_fit:
-            code = "sign_suspect" if other.axes == settings.gimbals.axes else "channel_swap"
-            text = f"th: the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
-            return [Finding(code, f"{text} of the rig, not with those of the study", harm=EVERYTHING)]
-    for order in itertools.permutations(range(3)):
-        exchanged = replace(motion, th=motion.th[:, order])
-        if _misfit(exchanged.turned(world), commanded, noise) < LIMITS.rough_fit:
-            names = ", ".join(
-                f"th_{axis} looks like th_{'xyz'[order.index(k)]}"
-                for k, axis in enumerate("xyz")
-                if order[k] != k
-            )
-            return [Finding("channel_swap", f"th: {names}, as the rates have it", harm=EVERYTHING)]
-    return _exchanged(sensor, commanded, turned, noise) or [
+    found = _fitting(by_angles, _other_angles(motion, settings)) or _fitting(
+        _Pair(commanded, turned, noise), _other_axes(sensor)
+    )
+    if found is not None:
+        return [found]
+    off = f"off by {100.0 * by_angles.misfit:.3g} % of the motion"
+    return [
         Finding(
-            "contradiction",
-            f"th: the angles do not follow the rates {sensor}_x..z, off by {100.0 * misfit:.3g} % of the motion",
-            harm=EVERYTHING,
+            "contradiction", f"th: the angles do not follow the rates {sensor}_x..z, {off}", harm=EVERYTHING
         )
     ]
 
 
-def _other_gimbals(stated: Gimbals) -> list[Gimbals]:
-    """All other orders and signs, the fewest changes first."""
-    found = [
-        Gimbals(axes, (outer, inner, platform))
-        for axes in itertools.permutations(get_args(Axis))
-        for outer, inner, platform in itertools.product((1, -1), repeat=3)
-    ]
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Stretches (s, 3) as one sensor has ``seen`` them and as they are ``expected``, with the ``noise`` of an axis."""
+
+    seen: Array
+    expected: Array
+    noise: float
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of the difference, less that of the noise, over that of what is expected; inf of nothing."""
+        squares = float(np.sum((self.seen - self.expected) ** 2))
+        left = max(squares - 3.0 * len(self.seen) * self.noise**2, 0.0)
+        whole = float(np.sum(self.expected**2))
+        return math.sqrt(left / whole) if whole > 0.0 else math.inf if left > 0.0 else 0.0
+
+
+def _fitting(pair: _Pair, hypotheses: Iterable[Hypothesis[_Pair]]) -> Finding | None:
+    """The first hypothesis with which a pair fits."""
+    fits = (tried(each, pair) for each in hypotheses)
+    return next((fit.finding for fit in fits if fit.case.misfit < LIMITS.rough_fit), None)
+
+
+def _other_angles(motion: _Motion, settings: SelfcalSettings) -> Iterator[Hypothesis[_Pair]]:
+    """Gimbals of another order or with other signs, the fewest changes first; exchanged angles."""
+    stated, world = settings.gimbals, settings.world
     now = (*stated.axes, *stated.signs)
+
+    def hypothesis(code: str, text: str, moved: _Motion, rig: World) -> Hypothesis[_Pair]:
+        text = f"th: {text}"
+        return Hypothesis(
+            text, code, text, lambda pair, _: replace(pair, seen=moved.turned(rig)), harm=EVERYTHING
+        )
 
     def changes(other: Gimbals) -> int:
         return sum(a != b for a, b in zip((*other.axes, *other.signs), now, strict=True))
 
-    return sorted(found, key=changes)[1:]
+    others = [
+        Gimbals(axes, (outer, inner, platform))
+        for axes in itertools.permutations(get_args(Axis))
+        for outer, inner, platform in itertools.product((1, -1), repeat=3)
+    ]
+    for other in sorted(others, key=changes)[1:]:
+        code = "sign_suspect" if other.axes == stated.axes else "channel_swap"
+        text = f"the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
+        rig = world._replace(axes=other.index, signs=other.sign)
+        yield hypothesis(code, f"{text} of the rig, not with those of the study", motion, rig)
+    for order in itertools.permutations(range(3)):
+        pairs = ((axis, "xyz"[order.index(k)]) for k, axis in enumerate("xyz"))
+        names = ", ".join(f"th_{axis} looks like th_{other}" for axis, other in pairs if axis != other)
+        moved = replace(motion, th=motion.th[:, order])
+        yield hypothesis("channel_swap", f"{names}, as the rates have it", moved, world)
+
+
+def _other_axes(sensor: str) -> Iterator[Hypothesis[_Pair]]:
+    """Axes of a sensor in another order or with other signs, the fewest changes first."""
+
+    def changes(way: tuple[tuple[int, ...], tuple[float, ...]]) -> float:
+        return sum(k != j for k, j in enumerate(way[0])) + way[1].count(-1.0)
+
+    for order, signs in sorted(_signed_orders(), key=changes)[1:]:
+        words = ", ".join(
+            f"{sensor}_{axis} should be {'-' if sign < 0.0 else ''}{sensor}_{'xyz'[k]}"
+            for axis, k, sign in zip("xyz", order, signs, strict=True)
+            if "xyz"[k] != axis or sign < 0.0
+        )
+        code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
+        text = f"{sensor}: {words}, as the angles have it"
+        yield Hypothesis(text, code, text, partial(_reordered, order, signs), harm=EVERYTHING)
+
+
+def _reordered(order: tuple[int, ...], signs: tuple[float, ...], pair: _Pair, _: Array) -> _Pair:
+    """A pair with the axes that are seen in another order and with other signs."""
+    return replace(pair, seen=pair.seen[:, list(order)] * signs)
+
+
+def _signed_orders() -> list[tuple[tuple[int, ...], tuple[float, ...]]]:
+    """All orders of three axes with all signs."""
+    return list(itertools.product(itertools.permutations(range(3)), itertools.product((1.0, -1.0), repeat=3)))
 
 
 def _accelerometers(
@@ -193,45 +250,16 @@ def _accelerometers(
         text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
         return [Finding("unit_suspect", text, harm=EVERYTHING)]
     force = rotate(conjugate(gimbals(recording.th[whole], world)[0]), world.up)
-    noise = 2.0 * settings.noise.accelerometer
-    misfit = _misfit(acc, force, noise)
-    if misfit < LIMITS.rough_misfit:
+    pair = _Pair(acc, force, 2.0 * settings.noise.accelerometer)
+    if pair.misfit < LIMITS.rough_misfit:
         return []
-    return _exchanged("acc", acc, force, noise) or [
-        Finding(
-            "contradiction",
-            f"acc: specific force does not follow the angles, off by {100.0 * misfit:.3g} % of gravity",
-            harm=EVERYTHING,
-        )
+    found = _fitting(pair, _other_axes("acc"))
+    if found is not None:
+        return [found]
+    off = f"off by {100.0 * pair.misfit:.3g} % of gravity"
+    return [
+        Finding("contradiction", f"acc: specific force does not follow the angles, {off}", harm=EVERYTHING)
     ]
-
-
-def _misfit(a: Array, b: Array, noise: float) -> float:
-    """Root mean square of a - b (s, 3), less that of the ``noise`` of an axis, over that of b; inf where b is 0."""
-    left = max(float(np.sum((a - b) ** 2)) - 3.0 * len(a) * noise**2, 0.0)
-    whole = float(np.sum(b**2))
-    return math.sqrt(left / whole) if whole > 0.0 else math.inf if left > 0.0 else 0.0
-
-
-def _exchanged(sensor: str, found: Array, expected: Array, noise: float) -> list[Finding]:
-    """``channel_swap`` or ``sign_suspect`` where axes (s, 3) of a sensor fit in another order or with other signs."""
-    fits = []
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            changed = found[:, list(order)] * signs
-            changes = sum(k != j for k, j in enumerate(order)) + signs.count(-1.0)
-            if (misfit := _misfit(changed, expected, noise)) < LIMITS.rough_fit:
-                fits.append((changes, misfit, order, signs))
-    if not fits:
-        return []
-    _, _, order, signs = min(fits)
-    words = ", ".join(
-        f"{sensor}_{axis} should be {'-' if sign < 0.0 else ''}{sensor}_{'xyz'[k]}"
-        for axis, k, sign in zip("xyz", order, signs, strict=True)
-        if "xyz"[k] != axis or sign < 0.0
-    )
-    code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
-    return [Finding(code, f"{sensor}: {words}, as the angles have it", harm=EVERYTHING)]
 
 
 def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
@@ -246,7 +274,7 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
     def fit(order: tuple[int, ...], signs: tuple[float, ...]) -> float:
         return float(sum(signs[i] * match[i, order[i]] for i in sensors))
 
-    ways = list(itertools.product(itertools.permutations(sensors), itertools.product((1.0, -1.0), repeat=3)))
+    ways = _signed_orders()
     order, signs = max(ways, key=lambda way: fit(*way))
     said = []
     for i in sensors:

@@ -80,7 +80,9 @@ class Turning:
     def jumps(self) -> NDArray[np.bool_]:
         """(n - 1,) where the encoders turn otherwise than told by more than noise and half of what was told."""
         off = np.linalg.norm(self.seen - self.told, axis=1)
-        return np.asarray(off > LIMITS.noise_sigmas * self.noise + 0.5 * np.linalg.norm(self.told, axis=1))
+        return np.asarray(
+            off > LIMITS.noise_sigmas * self.noise + LIMITS.jump_share * np.linalg.norm(self.told, axis=1)
+        )
 
 
 def turning(recording: Recording, problem: FilterProblem) -> Turning:
@@ -204,7 +206,7 @@ def _stuck(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
     n = len(recording.th)
     for joint, name in enumerate(JOINTS):
         sent, moved = np.abs(turn.sent[:, joint]), np.abs(turn.moved[:, joint])
-        still = (sent > LIMITS.noise_sigmas * turn.noise) & (moved < 0.1 * sent)
+        still = (sent > LIMITS.noise_sigmas * turn.noise) & (moved < LIMITS.still_share * sent)
         for start, end in _runs(still):
             rows = np.arange(start + 1, end + 1)
             degrees = math.degrees(float(turn.sent[start:end, joint].sum()))
@@ -246,7 +248,7 @@ def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Ca
     along = np.divide((turn.seen * turn.told).sum(axis=1), size, out=np.ones_like(size), where=fast)
     more = np.rint(along - 1.0)
     miss = np.linalg.norm(turn.seen - (1.0 + more[:, None]) * turn.told, axis=1)
-    lost = fast & (more >= 1.0) & (miss < 0.1 * np.sqrt(size) * (1.0 + more))
+    lost = fast & (more >= 1.0) & (miss < LIMITS.leap_share * np.sqrt(size) * (1.0 + more))
     if not lost.any():
         return
     rows = np.flatnonzero(lost)

@@ -1,4 +1,4 @@
-"""Whether the sensors and the table's angles agree at all, and what would make them: units, signs, axes, clocks."""
+"""Gross faults of a test on a table: units, signs, axes and clocks with which sensors and angles do not agree."""
 
 from __future__ import annotations
 
@@ -12,18 +12,7 @@ from inercal.arrays import Array
 from inercal.imu.aided.blocks import Blocks, small_turn
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided_settings import mountings
-
-MISFIT = 0.35
-"""Part of the output's variation that a sound table leaves unexplained at most; misalignments leave some 0.05."""
-
-SLOWEST = np.radians(0.5)
-"""Fastest turn [rad/s] below which the gyro says nothing about the angles."""
-
-LEAST_FORCE = 0.3
-"""Change of the specific force, over gravity, below which the accelerometers say nothing about the angles."""
-
-LONGEST_LAG = 60.0
-"""Time [s] by which the clocks of table and instrument are searched for a shift."""
+from inercal.imu.limits import LIMITS
 
 _FACTORS = ((1.0, ""), (180.0 / np.pi, "57.3 times as large"), (np.pi / 180.0, "57.3 times as small"))
 
@@ -61,8 +50,10 @@ def travel(motion: Motion) -> float:
 
 
 def tells(sensor: str, x: Array) -> bool:
-    """Whether what the table says of a triad, as from `expected`, varies enough for its output to be compared."""
-    return bool(np.max(np.ptp(x, axis=0)) > (LEAST_FORCE if sensor == "acc" else SLOWEST))
+    """True where what the table says of a triad, as from `expected`, varies enough for its output to be compared."""
+    return bool(
+        np.max(np.ptp(x, axis=0)) > (LIMITS.least_force_change if sensor == "acc" else LIMITS.slowest_turn)
+    )
 
 
 def lag(blocks: Blocks, motion: Motion) -> float:
@@ -75,24 +66,24 @@ def lag(blocks: Blocks, motion: Motion) -> float:
         return 0.0
     both = np.correlate(told, seen, mode="full") / size
     middle, length = len(seen) - 1, float(np.median(blocks.length))
-    reach = min(int(LONGEST_LAG / length), len(seen) // 2)
+    reach = min(int(LIMITS.longest_lag / length), len(seen) // 2)
     near = both[middle - reach : middle + reach + 1]
     best = int(np.argmax(near)) - reach
-    return best * length if near[best + reach] > both[middle] + 0.1 else 0.0
+    return best * length if near[best + reach] > both[middle] + LIMITS.lag_correlation else 0.0
 
 
 def cures(sides: list[Blocks], motion: Motion) -> Iterator[str]:
-    """What, in words, would make sense of outputs that do not follow the table."""
+    """Sentences that would make sense of outputs that do not follow the table."""
     found = []
     for words, other in _angles(motion):
         misses = [agreement(each.y, expected(each, other)).miss for each in sides]
-        if max(misses) < MISFIT:
+        if max(misses) < LIMITS.agreement_miss:
             found.append((sum(misses), words))
     identity = ("+x", "+y", "+z")
     told = [expected(each, motion) for each in sides]
     for axes, turn in mountings().items():
         misses = [agreement(each.y, x @ turn).miss for each, x in zip(sides, told, strict=True)]
-        if axes != identity and max(misses) < MISFIT:
+        if axes != identity and max(misses) < LIMITS.agreement_miss:
             found.append((sum(misses), _mounted(motion, turn)))
     if found:
         yield from (words for _, words in sorted(found)[:3])
@@ -136,14 +127,14 @@ def _mounted(motion: Motion, turn: Array) -> str:
 def _channels(blocks: Blocks, x: Array) -> Iterator[str]:
     """Other signs or another order of a triad's own axes."""
     sensor = blocks.triad.sensor
-    if agreement(blocks.y, x).miss < MISFIT:
+    if agreement(blocks.y, x).miss < LIMITS.agreement_miss:
         return
     miss, order, signs = min(
         (agreement(blocks.y, x[:, order] * np.array(signs)).miss, order, signs)
         for order in itertools.permutations(range(3))
         for signs in itertools.product((1.0, -1.0), repeat=3)
     )
-    if miss < MISFIT:
+    if miss < LIMITS.agreement_miss:
         measured = ", ".join(
             f"{sensor}_{name} measures {'+' if sign > 0 else '-'}{'xyz'[axis]}"
             for name, axis, sign in zip("xyz", order, signs, strict=True)

@@ -1,4 +1,4 @@
-"""What may be wrong with a test on a table: the pattern that each fault would leave in the outputs.
+"""Constant errors of a test on a table: hypotheses, each with the pattern that it would leave in the outputs.
 
 A bias that wanders, and noise that is larger in turns, can imitate nearly any of them, so that residuals alone do not
 tell. Patterns do: an angle recorded half a percent too large leaves errors that go with the angle, a gyro at the end
@@ -7,49 +7,62 @@ of its range errors that go with the cube of the rate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.estimate.hypotheses import Fitted, Hypothesis
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import Axis, elementary
+from inercal.imu.aided.diagnosis.fit_quality import Whitening, without_patterns
+from inercal.imu.aided.diagnosis.gross import expected
 from inercal.imu.aided.fit import Fit, Sensor
-from inercal.imu.aided.suspects import expected
 from inercal.imu.aided.table import Motion
+from inercal.imu.limits import LIMITS
 from inercal.rigs.chain import Chain, Fixed, Joint
 
 STEP = 1e-6
 """Step of the derivatives by an angle or the clock."""
 
-MEMORY = 0.05
-"""Step [s] of the second derivatives with time."""
-
-FALLS_SHORT = 0.01
-"""Part of the largest input by which an output has to fall short to be called saturated."""
+Patterns = dict[int, Array]
+"""Columns (n, q) by the number of each sensor in the fit that sees them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Fault:
-    """A pattern: of each sensor in the fit the columns (n, q), or None where it leaves none.
-
-    ``code`` of the finding; ``words`` from the amplitudes (q,).
-    """
-
-    code: str
-    columns: tuple[Array | None, ...]
-    words: Callable[[Array], str]
-
-    @property
-    def width(self) -> int:
-        """Number q of amplitudes."""
-        return next(int(each.shape[1]) for each in self.columns if each is not None)
+def constant_errors(fit: Fit, motion: Motion, gravity: float, judge: Whitening) -> Iterator[Hypothesis[Fit]]:
+    """All that is looked for, but for what no output would show."""
+    for name, code, patterns, words in _entries(fit, motion, gravity):
+        width = next(iter(patterns.values())).shape[1]
+        columns = [
+            patterns.get(k, np.zeros((len(each.residual), width))) for k, each in enumerate(fit.sensors)
+        ]
+        told = judge.told(columns)
+        if told.size:
+            yield _error(name, code, columns, told, words)
 
 
-def faults(fit: Fit, motion: Motion, gravity: float) -> Iterator[Fault]:
-    """All that is looked for."""
+def _error(
+    name: str, code: str, columns: Sequence[Array], told: Array, words: Callable[[Array], str]
+) -> Hypothesis[Fit]:
+    """A fault of columns (n, q) in the output of each sensor; its parameters are those combinations that are told."""
+
+    def without(fit: Fit, values: Array) -> Fit:
+        return without_patterns(fit, [each @ (told @ values) for each in columns])
+
+    def says(fitted: Fitted[Fit]) -> str:
+        return words(told @ fitted.values)
+
+    return Hypothesis(name, code, says, without, tuple(f"{name} {j + 1}" for j in range(told.shape[1])))
+
+
+Entry = tuple[str, str, Patterns, Callable[[Array], str]]
+"""Name, code of the finding, patterns, and the sentence from the amplitudes (q,)."""
+
+
+def _entries(fit: Fit, motion: Motion, gravity: float) -> Iterator[Entry]:
+    """Faults of the angles, the clock, the earth rate and the outputs."""
     told = {triad: _at_fit(fit, motion, triad) for triad in fit.identified}
     yield from _of_angles(fit, motion, gravity, told)
     yield _of_clock(fit, motion, gravity, told)
@@ -67,17 +80,15 @@ def _at_fit(fit: Fit, motion: Motion, triad: str) -> Array:
     return expected(sensor.side.blocks, replace(motion, t=motion.t - late))
 
 
-def _seen(fit: Fit, changes: dict[str, Array], gravity: float) -> tuple[Array | None, ...]:
-    """What sensors make of changes (n, 3, q) of the force over gravity, or of the rate, by triad."""
-    found: list[Array | None] = []
+def _seen(fit: Fit, changes: dict[str, Array], gravity: float) -> Patterns:
+    """Outputs by changes (n, 3, q) of the force over gravity, or of the rate, by triad."""
+    patterns: Patterns = {}
     for k, sensor in enumerate(fit.sensors):
         triad = sensor.side.sensor
-        if triad not in changes:
-            found.append(None)
-            continue
-        B = gain(fit, triad)[k % 3] * (gravity if triad == "acc" else 1.0)
-        found.append(np.einsum("j,njq->nq", B, changes[triad]))
-    return tuple(found)
+        if triad in changes:
+            B = gain(fit, triad)[k % 3] * (gravity if triad == "acc" else 1.0)
+            patterns[k] = np.einsum("j,njq->nq", B, changes[triad])
+    return patterns
 
 
 def gain(fit: Fit, triad: str) -> Array:
@@ -85,7 +96,7 @@ def gain(fit: Fit, triad: str) -> Array:
     return fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
 
 
-def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Iterator[Fault]:
+def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Iterator[Entry]:
     """Angles of a wrong scale, and with errors that come back in each turn; axes that are not where they should be."""
     for k, joint in enumerate(motion.chain.joints):
         angle = motion.angles[:, k]
@@ -95,9 +106,9 @@ def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array])
             angles[:, k] += STEP * wrong
             moved = replace(motion, angles=angles)
             patterns.append({triad: (_at_fit(fit, moved, triad) - x) / STEP for triad, x in told.items()})
-        for kind, words in ((0,), _zero), ((0, 1), _scale), ((2, 3), _round):
+        for name, kind, words in ("zero", (0,), _zero), ("scale", (0, 1), _scale), ("round", (2, 3), _round):
             changes = {triad: np.stack([patterns[each][triad] for each in kind], axis=-1) for triad in told}
-            yield Fault("contradiction", _seen(fit, changes, gravity), partial(words, joint))
+            yield f"{name} of {joint}", "contradiction", _seen(fit, changes, gravity), partial(words, joint)
     elements = motion.chain.elements
     before = ""
     for k, element in enumerate(elements):
@@ -110,7 +121,8 @@ def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array])
                 moved = replace(motion, chain=turned)
                 for triad, x in told.items():
                     changes[triad][:, :, j] = (_at_fit(fit, moved, triad) - x) / STEP
-            yield Fault("contradiction", _seen(fit, changes, gravity), partial(_tilted, before, element.name))
+            words = partial(_tilted, before, element.name)
+            yield f"tilt of {element.name}", "contradiction", _seen(fit, changes, gravity), words
             before = element.name
 
 
@@ -140,17 +152,18 @@ def _scale(joint: str, a: Array) -> str:
 
 def _round(joint: str, a: Array) -> str:
     return (
-        f"the angles {joint} are wrong by up to {np.degrees(abs(a[0]) + np.hypot(a[1], a[2])):.2g} deg, in a way that "
+        f"the angles {joint} are wrong by up to {np.degrees(np.hypot(*a)):.2g} deg, in a way that "
         "goes with the angle: check the levelling, or an encoder off its centre"
     )
 
 
-def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Fault:
+def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Entry:
     """A clock of the angles that runs at another rate."""
     middle, span = float(np.mean(motion.t)), float(np.ptp(motion.t))
     moved = replace(motion, t=middle + (motion.t - middle) * (1.0 + STEP))
     changes = {triad: ((_at_fit(fit, moved, triad) - x) / STEP)[:, :, None] for triad, x in told.items()}
-    return Fault(
+    return (
+        "clock",
         "command_shift",
         _seen(fit, changes, gravity),
         lambda a: (
@@ -160,7 +173,7 @@ def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) 
     )
 
 
-def _of_gyro(fit: Fit, gravity: float) -> Iterator[Fault]:
+def _of_gyro(fit: Fit, gravity: float) -> Iterator[Entry]:
     """Another earth rate than stated, and a gyro that feels the specific force."""
     C_bn = fit.references["gyro"].C_bn
     h = fit.x[fit.unknowns.places["earth rate"]]
@@ -174,20 +187,20 @@ def _of_gyro(fit: Fit, gravity: float) -> Iterator[Fault]:
             f"latitude, and the azimuth of the table (off by {turned:.0f} deg)"
         )
 
-    yield Fault("contradiction", _seen(fit, {"gyro": EARTH_RATE * C_bn}, gravity), rate)
+    yield "earth rate", "contradiction", _seen(fit, {"gyro": EARTH_RATE * C_bn}, gravity), rate
     if "gain G" in fit.unknowns.places:
         return
     up = C_bn[:, :, 2]
-    columns: list[Array | None] = []
+    patterns: Patterns = {}
     for k, sensor in enumerate(fit.sensors):
-        wide = np.zeros((len(up), 9))
         if sensor.side.sensor == "gyro":
-            wide[:, 3 * (k % 3) : 3 * (k % 3) + 3] = up
-        columns.append(wide if sensor.side.sensor == "gyro" else None)
+            patterns[k] = np.zeros((len(up), 9))
+            patterns[k][:, 3 * (k % 3) : 3 * (k % 3) + 3] = up
     unit = next(each for each in fit.sensors if each.side.sensor == "gyro").side.blocks.triad.unit.symbol
-    yield Fault(
+    yield (
+        "g-sensitivity",
         "g_sensitivity",
-        tuple(columns),
+        patterns,
         lambda a: (
             f"the gyro output changes with the specific force by up to {np.max(np.abs(a)):.2g} {unit} per g: set "
             "imu.g_sensitivity = true to estimate it"
@@ -195,15 +208,15 @@ def _of_gyro(fit: Fit, gravity: float) -> Iterator[Fault]:
     )
 
 
-def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Fault:
+def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Entry:
     """Outputs that go through a slow filter: beside the delay there is a second derivative."""
-    early, now, late = (
-        _at_fit(fit, replace(motion, t=motion.t + by), triad) for by in (-MEMORY, 0.0, MEMORY)
-    )
+    step = LIMITS.smoothing_step
+    early, now, late = (_at_fit(fit, replace(motion, t=motion.t + by), triad) for by in (-step, 0.0, step))
     words = "accelerometers" if triad == "acc" else "gyro"
-    return Fault(
+    return (
+        f"smoothing of {triad}",
         "contradiction",
-        _seen(fit, {triad: ((early - 2.0 * now + late) / MEMORY**2)[:, :, None]}, gravity),
+        _seen(fit, {triad: ((early - 2.0 * now + late) / step**2)[:, :, None]}, gravity),
         lambda a: (
             f"the outputs of the {words} are smoothed over some {1e3 * np.sqrt(2.0 * abs(a[0])):.0f} ms against the "
             "angles: use a faster filter, or start and stop the turns more gently"
@@ -211,7 +224,7 @@ def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Fault:
     )
 
 
-def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Fault]:
+def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Entry]:
     """Outputs that go with the square or the cube of the input."""
     ref = fit.references[triad]
     x = gravity * ref.C_bn[:, :, 2] if triad == "acc" else ref.rate
@@ -221,18 +234,18 @@ def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Fault]:
         output = x @ gain(fit, triad)[k % 3]
         size = float(np.max(np.abs(output)))
         for power in (2, 3) if size > 0.0 else ():
-            columns: list[Array | None] = [None] * len(fit.sensors)
-            columns[k] = (output / size)[:, None] ** power
-            yield _curved(columns, sensor, f"{triad}_{'xyz'[k % 3]}", size, power)
+            yield _curved(
+                {k: (output / size)[:, None] ** power}, sensor, f"{triad}_{'xyz'[k % 3]}", size, power
+            )
 
 
-def _curved(columns: list[Array | None], sensor: Sensor, name: str, size: float, power: int) -> Fault:
+def _curved(patterns: Patterns, sensor: Sensor, name: str, size: float, power: int) -> Entry:
     """An output with a term of a power of its input."""
     unit = sensor.side.blocks.triad.unit.symbol
 
     def words(a: Array) -> str:
         part = float(a[0]) / size
-        if power == 3 and part < -FALLS_SHORT:
+        if power == 3 and part < -LIMITS.short_share:
             return (
                 f"{name} falls short at the largest input, by some {100.0 * abs(part):.2g} % at {size:.3g} {unit}: it "
                 "saturates or is not linear; turn slower, or set a wider range"
@@ -241,4 +254,4 @@ def _curved(columns: list[Array | None], sensor: Sensor, name: str, size: float,
         term = f"{float(a[0]):.2g} {unit} at {size:.3g} {unit}"
         return f"{name} is not linear: a term with the {order} of the input, of {term}"
 
-    return Fault("saturation" if power == 3 else "contradiction", tuple(columns), words)
+    return f"power {power} of {name}", "saturation" if power == 3 else "contradiction", patterns, words

@@ -1,0 +1,1 @@
+"""What is wrong with a test on a table, named."""

@@ -1,0 +1,96 @@
+"""What is wrong with a test on a table: all patterns of faults looked for in its residuals, and what each does.
+
+Signs, units and axes that are wrong altogether were told before the fit (`inercal.imu.aided.diagnosis.gross`). Each
+pattern (`inercal.imu.aided.diagnosis.small`) is tested as an added variable, the score test of
+`inercal.estimate.hypotheses`: by how much the weighted sum of squares falls if its amplitudes are estimated with all
+the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.hypotheses import search
+from inercal.imu.aided.diagnosis.fit_quality import mean_bias, variation, whitening
+from inercal.imu.aided.diagnosis.small import constant_errors
+from inercal.imu.aided.fit import Fit, noise_of
+from inercal.imu.aided.table import Motion
+from inercal.imu.limits import LIMITS
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """A fault that is in the data: the ``code`` and ``message`` of its finding.
+
+    ``shift`` (p,) of the coefficients if it is fitted with them; ``part`` the rms of what it does to the outputs over
+    the variation of these.
+    """
+
+    code: str
+    message: str
+    shift: Array
+    part: float
+
+
+def misfits(fit: Fit, names: tuple[str, ...], rows: Array, motion: Motion, gravity: float) -> list[Misfit]:
+    """Faults that are in the residuals, the most certain first.
+
+    Parameters
+    ----------
+    fit : Fit
+    names : (p,)
+        Of the coefficients.
+    rows : (p, P)
+        Their derivatives by the unknowns, as from `coefficients`.
+    motion : Motion
+        Of the table.
+    gravity : float
+        Of the site [m/s^2].
+    """
+    judge = whitening(fit)
+    errors = list(constant_errors(fit, motion, gravity, judge))
+    found, _ = search(fit, lambda _: errors, judge, LIMITS.misfit_risk, LIMITS.misfits)
+    named = []
+    for each in found:
+        without = each.hypothesis.without(fit, each.values)
+        pairs = zip(fit.sensors, without.sensors, strict=True)
+        patterns = [before.equation.residual - after.equation.residual for before, after in pairs]
+        part, change = _part(fit, patterns), judge.change(patterns)
+        if part >= LIMITS.faint_share and _explains(fit, without, change):
+            shift = rows @ change - _biases(fit, names, patterns)
+            named.append(Misfit(each.hypothesis.code, each.sentence, shift, part))
+    return named
+
+
+def _biases(fit: Fit, names: tuple[str, ...], patterns: Sequence[Array]) -> Array:
+    """Means (p,) of patterns in the biases of the sensors."""
+    means = np.zeros(len(names))
+    for k, (sensor, pattern) in enumerate(zip(fit.sensors, patterns, strict=True)):
+        bias = f"{'K0' if sensor.side.sensor == 'acc' else 'D_F'}_{'xyz'[k % 3]}"
+        means[names.index(bias)] = mean_bias(sensor, pattern)
+    return means
+
+
+def _explains(fit: Fit, without: Fit, change: Array) -> bool:
+    """True where outputs that shift in turns no longer do, or hardly, once a fault is taken out."""
+    before = after = 0.0
+    for sensor, other in zip(fit.sensors, without.sensors, strict=True):
+        left = other.equation.residual
+        if sensor.noise.excess > 0.0 and np.any(left != sensor.equation.residual):
+            equation = replace(
+                sensor.equation, residual=left - sensor.equation.columns @ change[sensor.equation.index]
+            )
+            before += sensor.noise.excess
+            _, apart = noise_of(sensor.side, equation, fit.unknowns, fit.x + change)
+            after += apart.excess
+    return after <= LIMITS.excess_left * before
+
+
+def _part(fit: Fit, patterns: Sequence[Array]) -> float:
+    """Largest rms of a pattern in an output, over the variation of its triad."""
+    pairs = zip(fit.sensors, patterns, strict=True)
+    return max(float(np.std(pattern) / variation(sensor.side.blocks.y)) for sensor, pattern in pairs)
