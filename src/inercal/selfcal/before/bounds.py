@@ -202,16 +202,17 @@ def observe(P: Array, row: Row, r: float, source: int, work: Array) -> None:
     ``row`` is its derivative by the state, ``r`` its variance, which belongs to the part ``source``; ``work`` (2, m) is
     used up.
     """
+    places, values, size = row
     m = P.shape[1]
     gain, own = work[0], work[1]
     for s in range(len(P)):
         inner = r if s == 0 or s == source else 0.0
         for i in range(m):
             own[i] = 0.0
-            for k in range(row.size):
-                own[i] += P[s, i, row.places[k]] * row.values[k]
-        for k in range(row.size):
-            inner += row.values[k] * own[row.places[k]]
+            for k in range(size):
+                own[i] += P[s, i, places[k]] * values[k]
+        for k in range(size):
+            inner += values[k] * own[places[k]]
         if s == 0:
             for i in range(m):
                 gain[i] = own[i] / inner

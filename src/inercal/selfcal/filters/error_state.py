@@ -80,6 +80,7 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
     n, p = len(P), len(c)
     top, x, work = np.empty((6, n)), np.empty(n), np.empty(n)
     room = empty_row(WIDEST)
+    places, values, _ = room
     variance = noise.accelerometer * noise.accelerometer
     history = len(out.u) > 0
     cosine = 1.0
@@ -113,9 +114,9 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
             for i in range(3):
                 root = roots[i]
                 for j in range(i + 1):
-                    room.places[j], room.values[j] = j, root[j]
+                    places[j], values[j] = j, root[j]
                 z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-                total += scalar_update(P, x, Row(room.places, room.values, i + 1), z, 1.0, work)
+                total += scalar_update(P, x, Row(places, values, i + 1), z, 1.0, work)
                 count += 1
             q = _corrected(q, c, x)
         if take:
