@@ -43,17 +43,18 @@ def state(of, seed):
 
 def read(of, x, i, p=0.0, y=0.0):
     """Value, dense row and variance of accelerometer ``i``, of the gyro for i = N."""
-    room = empty_row(model.WIDEST)
+    row = empty_row(model.WIDEST)
     if i < of.count:
         at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), p, y)
-        value, row, noise = model.accelerometer(i, at, of.model, room)
+        value, noise = model.accelerometer(i, at, of.model, row)
     else:
-        value, row, noise = model.gyro(x, of.model, room)
-    assert row.size <= model.WIDEST
-    places = row.places[: row.size]
-    assert len(set(places)) == row.size
+        value, noise = model.gyro(x, of.model, row)
+    size = row.size[0]
+    assert size <= model.WIDEST
+    places = row.places[:size]
+    assert len(set(places)) == size
     dense = np.zeros(of.size)
-    dense[places] = row.values[: row.size]
+    dense[places] = row.values[:size]
     return value, dense, noise
 
 

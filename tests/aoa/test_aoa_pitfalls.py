@@ -32,7 +32,7 @@ def hard_gated(of, recording):
     x, P = (each.copy() for each in trace.starts[0][1:3])
     n, d = of.size, len(of.places.moving)
     F, Q, work, line = np.empty((d, d)), np.empty((d, d)), np.empty((d, n)), np.empty(n)
-    room, belief = empty_row(model.WIDEST), loop.Belief(x, P, np.zeros(of.count + 3))
+    row, belief = empty_row(model.WIDEST), loop.Belief(x, P, np.zeros(of.count + 3))
     step = recording.t[1] - recording.t[0]
     model.transition(step, of.model, F, Q)
     theta = []
@@ -41,9 +41,9 @@ def hard_gated(of, recording):
             loop.go_on(belief, model.Step(step, 0.0, 0.0, 0.0), of.model, F, Q, work)
         at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), 0.0, 0.0)
         for i in range(of.count + 1):
-            expected, row, noise = loop.reading(i, at, z, of.model, room)
+            expected, noise = loop.reading(i, at, math.nan, of.model, row)
             v, h = z[i] - expected, np.zeros(n)
-            h[row.places[: row.size]] = row.values[: row.size]
+            h[row.places[: row.size[0]]] = row.values[: row.size[0]]
             if v * v <= 25.0 * (h @ P @ h + noise):
                 loop.update(P, x, row, v, noise, math.inf, line)
         theta.append(x[0])

@@ -15,23 +15,24 @@ Indices: TypeAlias = NDArray[np.int64]
 
 
 class Row(NamedTuple):
-    """The derivative h of a scalar measurement by the state, zero but for ``values[:size]`` at ``places[:size]``."""
+    """The derivative h of a scalar measurement by the state, zero but for ``values`` at ``places``, the first
+    ``size`` (1,) of each."""
 
     places: Indices
     values: Array
-    size: int
+    size: Indices
 
 
 @kernel
 def empty_row(size: int) -> Row:
-    """Room for a row of at most ``size`` entries."""
-    return Row(np.empty(size, dtype=np.int64), np.empty(size), 0)
+    """Room for a row of at most ``size`` entries, none yet."""
+    return Row(np.empty(size, dtype=np.int64), np.empty(size), np.zeros(1, dtype=np.int64))
 
 
 @kernel
 def innovation_variance(P: Array, row: Row, noise: float) -> float:
     """Variance ``h P h^T + r`` of one measurement; arguments as in `scalar_update`."""
-    places, values, size = row
+    places, values, size = row.places, row.values, row.size[0]
     total = noise
     for a in range(size):
         for b in range(size):
@@ -49,7 +50,7 @@ def scalar_update(P: Array, x: Array, row: Row, z: float, noise: float, work: Ar
     Returns the square of the innovation over its variance; summed over the measurements of one time it is their
     normalised innovation squared. ``work`` (n,) is used up.
     """
-    places, values, size = row
+    places, values, size = row.places, row.values, row.size[0]
     n = len(x)
     for i in range(n):
         total = 0.0

@@ -24,7 +24,6 @@ from inercal.aoa.fusion.model import (
     Model,
     Places,
     Prediction,
-    Reading,
     Step,
     accelerometer,
     gyro,
@@ -177,7 +176,7 @@ def update(
     ``work`` (n,) receives P h^T. Returns v over the root of S, and the S
     that was used, enlarged to v^2 / ``gate`` where v^2 is larger than ``gate`` S; 0 where S is not above zero.
     """
-    places, values, size = row
+    places, values, size = row.places, row.values, row.size[0]
     n = len(x)
     for i in range(n):
         work[i] = 0.0
@@ -205,15 +204,18 @@ def update(
 
 
 @kernel
-def reading(i: int, at: Prediction, z: Array, model: Model, room: Row) -> Reading:
-    """Reading of scalar ``i`` of a row of measurements ``z`` (N + 5,), at a prediction."""
+def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> tuple[float, float]:
+    """Reading of scalar ``i`` of a row of measurements at a prediction, and its variance.
+
+    ``angle_u`` [rad] is the standard uncertainty of a stated angle; ``out`` receives the derivatives by the state.
+    """
     n = model.places.accelerometers
     if i < n:
-        return accelerometer(i, at, model, room)
+        return accelerometer(i, at, model, out)
     if i == n:
-        return gyro(at.x, model, room)
-    room.places[0], room.values[0] = 0, 1.0
-    return Reading(at.x[0], Row(room.places, room.values, 1), z[n + 2] * z[n + 2])
+        return gyro(at.x, model, out)
+    out.places[0], out.values[0], out.size[0] = 0, 1.0, 1
+    return at.x[0], angle_u * angle_u
 
 
 @kernel
@@ -237,7 +239,7 @@ def believed(row: Row, places: Places, of_rate: float, of_acceleration: float) -
     They multiply rate and acceleration. Of a model at rest the filter would learn them from the noise of these, and be
     sure of what is not so.
     """
-    at, values, size = row
+    at, values, size = row.places, row.values, row.size[0]
     count, moved = places.accelerometers, max(of_rate, of_acceleration)
     for a in range(size):
         for b in (places.levers, places.heights):
@@ -286,8 +288,8 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
     n, d, m, count = places.states, len(places.moving), len(intervals), places.accelerometers
     work, line = np.empty((d, n)), np.empty(n)
     F, Q = np.empty((d, d)), np.empty((d, d))
-    room, ahead = empty_row(WIDEST), np.empty(n)
-    of, entry, _ = room
+    row, ahead = empty_row(WIDEST), np.empty(n)
+    of, entry = row.places, row.values
     last, snap, spatial, remember = -1.0, 0.0, places.roll >= 0, len(steps) > 0
     surprised = False
     for i in range(count + 1):
@@ -313,9 +315,9 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:
-                expected, row, noise = reading(i, at, z[k], model, room)
+                expected, noise = reading(i, at, z[k, count + 2], model, row)
                 believed(row, places, of_rate, of_acceleration)
-                entries = row.size
+                entries = row.size[0]
                 v = z[k, i] - expected
                 for a in range(entries):
                     v -= entry[a] * (x[of[a]] - ahead[of[a]])

@@ -107,14 +107,6 @@ class Prediction(NamedTuple):
     y: float
 
 
-class Reading(NamedTuple):
-    """Reading of a sensor at a state: its ``value``, the ``row`` of its derivatives, the ``variance`` of its noise."""
-
-    value: float
-    row: Row
-    variance: float
-
-
 class Step(NamedTuple):
     """A step: ``dt`` [s], mean indications ``p``, ``y`` [rad/s] of the roll and yaw gyros, and ``snap`` [rad^2], the
     variance that theta gains from snap alone."""
@@ -143,13 +135,13 @@ _NEAR_VERTICAL = 1e-4
 
 
 @kernel
-def accelerometer(i: int, at: Prediction, model: Model, room: Row) -> Reading:
-    """Reading of accelerometer ``i`` [m/s^2], its row in the arrays of ``room``.
+def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float, float]:
+    """Reading of accelerometer ``i`` [m/s^2] and its variance; ``out`` receives its derivatives by the state.
 
     The noise of the roll and yaw gyros adds to its variance.
     """
     geometry, of, constants = model
-    places, row, x, s, c, p, y = room.places, room.values, at.x, at.sine, at.cosine, at.p, at.y
+    places, row, x, s, c, p, y = out.places, out.values, at.x, at.sine, at.cosine, at.p, at.y
     g, w, al = constants.gravity, x[1], x[2]
     ca, sa, r, z = geometry[i, 0], geometry[i, 1], geometry[i, 2], geometry[i, 3]
     levers, res, heights, roll = of.levers, of.resonators, of.heights, of.roll
@@ -199,14 +191,15 @@ def accelerometer(i: int, at: Prediction, model: Model, room: Row) -> Reading:
     if heights >= 0:
         places[count], row[count] = heights + i, ca * by_zx - sa * by_zz
         count += 1
-    return Reading(ca * fx - sa * fz + x[BIASES + i], Row(places, row, count), noise)
+    out.size[0] = count
+    return ca * fx - sa * fz + x[BIASES + i], noise
 
 
 @kernel
-def gyro(x: Array, model: Model, room: Row) -> Reading:
-    """Reading of the gyro [rad/s] at a state, its row in the arrays of ``room``."""
+def gyro(x: Array, model: Model, out: Row) -> tuple[float, float]:
+    """Reading of the gyro [rad/s] at a state, as of `accelerometer`."""
     _, of, constants = model
-    places, row = room.places, room.values
+    places, row = out.places, out.values
     scale, delay = of.scale, of.delay
     tau = x[delay] if delay >= 0 else constants.gyro_delay
     c = 1.0 if of.roll >= 0 else constants.roll_cosine
@@ -221,7 +214,8 @@ def gyro(x: Array, model: Model, room: Row) -> Reading:
     if delay >= 0:
         places[count], row[count] = delay, k * (tau * x[3] - x[2])
         count += 1
-    return Reading(k * then + x[GYRO_BIAS], Row(places, row, count), constants.gyro_noise)
+    out.size[0] = count
+    return k * then + x[GYRO_BIAS], constants.gyro_noise
 
 
 @kernel
