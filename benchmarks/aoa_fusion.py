@@ -33,9 +33,9 @@ PROMISED = {8: (1.0 / 1.2, 4.0 / 0.6), 19: (2.0, 10.0 / 0.6)}
 
 def plain(of, settings, recording):
     """The model of `plain_fusion` for a problem, and where our filter starts."""
-    dt, d = 1e-3, int(of.places[model.MOVING])
+    dt, d = 1e-3, len(of.places.moving)
     F, Q = np.empty((d, d)), np.empty((d, d))
-    model.transition(dt, of.places, of.constants, F, Q)
+    model.transition(dt, of.model, F, Q)
     _, trace = fusion.advance(fusion.initial(of), of, recording.t[:20], recording.rows[:20], last=True)
     return plain_fusion.Model(of, G, settings.noise, dt, F, Q), trace.starts[0].x, trace.starts[0].P
 

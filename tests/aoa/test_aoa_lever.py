@@ -17,6 +17,7 @@ from inercal.aoa.paper.lever import centrifugal, differentiated, dual, peak_rate
 from inercal.aoa.paper.static import angle as angle_of
 from inercal.aoa.settings import Attitude
 from inercal.errors import StudyError
+from inercal.estimate.kalman import empty_row
 from inercal.units import parse_quantity
 
 DA, DW, L = 1e-4 * G, 0.2 * DEG, 0.5
@@ -51,13 +52,9 @@ def test_arms_are_those_of_the_model_of_the_fusion(of, level, theta, rate, al):
     fusion = problem(study(8, layout=of, attitude=of_roll))
     x = np.zeros(fusion.size)
     x[:3] = theta, rate, al
-    at, row = np.empty(model.WIDEST, dtype=np.int64), np.empty(model.WIDEST)
-    s, c = math.sin(theta), math.cos(theta)
-    read = [
-        model.accelerometer(x, s, c, i, of.geometry, fusion.places, fusion.constants, 0.0, 0.0, at, row)[0]
-        for i in range(5)
-    ]
-    level = fusion.constants[model.ROLL_COSINE]
+    at, row = model.Prediction(x, math.sin(theta), math.cos(theta), 0.0, 0.0), empty_row(model.WIDEST)
+    read = [model.accelerometer(i, at, fusion.model, row)[0] for i in range(5)]
+    level = fusion.constants.roll_cosine
     static = G * axes(of, level) @ [math.sin(theta), math.cos(theta)]
     q, p = centrifugal_arms(of, level), tangential_arms(of, level)
     np.testing.assert_allclose(static - q * rate**2 + p * al, read, atol=1e-10)

@@ -11,7 +11,7 @@ from sting_study import BASE, DEG, G, study
 
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.live import Live, LiveState, Told
+from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.clock import PATIENCE
 from inercal.aoa.reading.recording import Recording
@@ -59,7 +59,7 @@ def flawed(seed=1, spatial=False):
 
 def joined(parts):
     """All that was said, in one."""
-    return Told(np.concatenate([part.t for part in parts]), np.concatenate([part.out for part in parts]))
+    return Answers(np.concatenate([part.t for part in parts]), np.concatenate([part.out for part in parts]))
 
 
 def same(told, found, t):

@@ -13,6 +13,7 @@ from sting_study import DEG, G, study
 from inercal.aoa.fusion import model
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.settings import Attitude, Timing
+from inercal.estimate.kalman import empty_row
 from inercal.units import Quantity, parse_unit
 
 pytestmark = pytest.mark.kernels
@@ -42,17 +43,18 @@ def state(of, seed):
 
 def read(of, x, i, p=0.0, y=0.0):
     """Value, dense row and variance of accelerometer ``i``, of the gyro for i = N."""
-    at, row = np.empty(model.WIDEST, np.int64), np.empty(model.WIDEST)
+    row = empty_row(model.WIDEST)
     if i < of.count:
-        s, c = math.sin(x[0]), math.cos(x[0])
-        told = model.accelerometer(x, s, c, i, of.geometry, of.places, of.constants, p, y, at, row)
+        at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), p, y)
+        value, noise = model.accelerometer(i, at, of.model, row)
     else:
-        told = model.gyro(x, of.places, of.constants, at, row)
-    value, entries, noise = told
-    assert entries <= model.WIDEST
-    assert len(set(at[:entries])) == entries
+        value, noise = model.gyro(x, of.model, row)
+    size = row.size[0]
+    assert size <= model.WIDEST
+    places = row.places[:size]
+    assert len(set(places)) == size
     dense = np.zeros(of.size)
-    dense[at[:entries]] = row[:entries]
+    dense[places] = row.values[:size]
     return value, dense, noise
 
 
@@ -96,9 +98,9 @@ def test_noise_of_the_roll_and_yaw_gyros_goes_through_the_lever_arms(seed, p, y)
     x = state(of, seed)
     for i in range(of.count):
         by = differences(lambda at, i=i: read(of, x, i, *at)[0], np.array([p, y]))
-        expected = of.constants[model.NOISE] + (by @ by) * of.constants[model.TURN_NOISE]
+        expected = of.constants.accelerometer_noise + (by @ by) * of.constants.turn_noise
         assert read(of, x, i, p, y)[2] == pytest.approx(expected, rel=1e-6)
-    assert read(of, x, of.count)[2] == of.constants[model.GYRO_NOISE]
+    assert read(of, x, of.count)[2] == of.constants.gyro_noise
 
 
 def attitude(psi, theta, phi):
@@ -145,7 +147,7 @@ def test_an_accelerometer_reads_the_specific_force_of_its_point(spatial):
         (-omega[1], -turning[1]) if spatial else (-omega[1] / math.cos(phi), -turning[1] / math.cos(phi))
     )
     if spatial:
-        x[of.places[model.ROLL]] = phi
+        x[of.places.roll] = phi
     for i, (along, down, r, z) in enumerate(of.geometry):
 
         def at(t, r=r, z=z):
@@ -182,12 +184,12 @@ def test_a_late_gyro_reads_the_rate_of_before(tau, seed):
 
 def continuous(of):
     """A (d, d) and the density of its noise (d, d), of motion and flexure."""
-    d = int(of.places[model.MOVING])
+    d = len(of.places.moving)
     A, N = np.zeros((d, d)), np.zeros((d, d))
     A[0, 1] = A[1, 2] = A[2, 3] = 1.0
-    N[3, 3] = of.constants[model.SNAP]
+    N[3, 3] = of.constants.snap
     for b in range(2 if d > 4 else 0):
-        w0, zeta, level = of.constants[model.Z_RATE + 3 * b : model.Z_RATE + 3 * b + 3]
+        w0, zeta, level = of.constants[-6:][3 * b : 3 * b + 3]
         s = 4 + 2 * b
         A[s : s + 2, s : s + 2] = [[0.0, 1.0], [-(w0**2), -2.0 * zeta * w0]]
         N[s + 1, s + 1] = 4.0 * zeta * w0 * level**2
@@ -195,9 +197,9 @@ def continuous(of):
 
 
 def transition(of, dt):
-    d = int(of.places[model.MOVING])
+    d = len(of.places.moving)
     F, Q = np.full((d, d), np.nan), np.full((d, d), np.nan)
-    model.transition(dt, of.places, of.constants, F, Q)
+    model.transition(dt, of.model, F, Q)
     return F, Q
 
 
@@ -229,7 +231,7 @@ def test_resonators_start_as_they_stay():
     """Their prior covariance is that of the stationary process: F P F^T + Q = P."""
     of = made(19)
     F, Q = transition(of, 1e-3)
-    s = of.places[model.RESONATORS]
+    s = of.places.resonators
     P = of.covariance[s : s + 4, s : s + 4]
     np.testing.assert_allclose(F[4:, 4:] @ P @ F[4:, 4:].T + Q[4:, 4:], P, rtol=1e-12, atol=1e-18)
     assert np.sqrt(np.diag(P)[[1, 3]]) == pytest.approx(0.01 * G, rel=1e-12)
@@ -240,12 +242,17 @@ def test_the_sting_does_not_bear_a_constant_force():
     of = made(19)
     dt = 1e-3
     F, _ = transition(of, dt)
-    for b, w0 in enumerate((of.constants[model.Z_RATE], of.constants[model.X_RATE])):
+    constants = of.constants
+    directions = (
+        (constants.heave_frequency, constants.heave_damping),
+        (constants.axial_frequency, constants.axial_damping),
+    )
+    for b, (w0, damping) in enumerate(directions):
         block = F[4 + 2 * b : 6 + 2 * b, 4 + 2 * b : 6 + 2 * b]
         fixed = np.array(
             [1.0 / w0**2, 0.0]
         )  # of u = 1: it must stay where it is, and all else must come to it
-        A = np.array([[0.0, 1.0], [-(w0**2), -2.0 * of.constants[model.Z_DAMPING + 3 * b] * w0]])
+        A = np.array([[0.0, 1.0], [-(w0**2), -2.0 * damping * w0]])
         forced = np.linalg.solve(A, (block - np.eye(2)) @ np.array([0.0, 1.0]))
         np.testing.assert_allclose(block @ fixed + forced, fixed, rtol=1e-10, atol=1e-15)
         assert abs(np.linalg.eigvals(block)).max() < 1.0
@@ -258,14 +265,13 @@ def test_the_turning_of_a_rolled_model_and_its_derivatives(seed, p, y):
     of = made(19, spatial=True)
     x, dt = state(of, seed), 1e-3
     x[0] *= 0.7  # away from the vertical, where roll has no meaning
-    d = int(of.places[model.MOVING])
-    rows = of.places[model.ROWS : model.ROWS + d]
-    roll = int(of.places[model.ROLL])
+    rows, roll = of.places.moving, of.places.roll
+    d = len(rows)
 
     def after(x):
         F, Q = transition(of, dt)
-        told = model.turning(x, dt, p, y, of.places, of.constants, F, Q, Q[0, 0])
-        return np.array(told), F, Q
+        angles = model.turning(x, model.Step(dt, p, y, Q[0, 0]), of.model, F, Q)
+        return np.array(angles), F, Q
 
     (theta, phi), F, Q = after(x)
     jacobian = differences(lambda at: after(at)[0], x)[rows].T
@@ -293,9 +299,9 @@ def test_the_rates_of_the_angles_are_those_of_the_attitude():
     omega, _, _ = moved(course, t)
     x = np.zeros(of.size)
     x[0], x[1] = course(t)[1], -omega[1]
-    x[of.places[model.ROLL]] = course(t)[2]
+    x[of.places.roll] = course(t)[2]
     F, Q = transition(of, dt)
-    theta, phi = model.turning(x, dt, omega[0], omega[2], of.places, of.constants, F, Q, 0.0)
+    theta, phi = model.turning(x, model.Step(dt, omega[0], omega[2], 0.0), of.model, F, Q)
     _, ahead, rolled = course(t + dt)
     assert theta - x[0] == pytest.approx(ahead - x[0], abs=30 * DEG * dt**2 * 50)
     # over cos^2 theta + 1e-4 in place of cos^2 theta

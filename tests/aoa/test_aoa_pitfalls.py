@@ -15,6 +15,7 @@ from inercal.aoa.reading.clock import HELD
 from inercal.aoa.settings import Disturbances, Estimator, MotionPlan, Noise, Prior, Resonance
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError
+from inercal.estimate.kalman import empty_row
 
 
 def told(found, simulated, after):
@@ -29,24 +30,22 @@ def hard_gated(of, recording):
     """Angles (n,) of the same filter with a gate that shuts: what is off by five standard deviations is left out."""
     _, trace = advance(initial(of), of, recording.t[:HELD], recording.rows[:HELD], last=True)
     x, P = (each.copy() for each in trace.starts[0][1:3])
-    n, d = of.size, int(of.places[model.MOVING])
+    n, d = of.size, len(of.places.moving)
     F, Q, work, line = np.empty((d, d)), np.empty((d, d)), np.empty((d, n)), np.empty(n)
-    at, row = np.empty(model.WIDEST, np.int64), np.empty(model.WIDEST)
+    row, belief = empty_row(model.WIDEST), loop.Belief(x, P, np.zeros(of.count + 3))
     step = recording.t[1] - recording.t[0]
-    model.transition(step, of.places, of.constants, F, Q)
+    model.transition(step, of.model, F, Q)
     theta = []
     for k, z in enumerate(recording.rows):
         if k:
-            loop.go_on(x, P, step, 0.0, 0.0, of.places, of.constants, F, Q, 0.0, work)
-        s, c = math.sin(x[0]), math.cos(x[0])
+            loop.go_on(belief, model.Step(step, 0.0, 0.0, 0.0), of.model, F, Q, work)
+        at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), 0.0, 0.0)
         for i in range(of.count + 1):
-            expected, entries, noise = loop.row_of(
-                i, x, s, c, recording.rows, k, of.geometry, of.places, of.constants, 0.0, 0.0, at, row
-            )
+            expected, noise = loop.reading(i, at, math.nan, of.model, row)
             v, h = z[i] - expected, np.zeros(n)
-            h[at[:entries]] = row[:entries]
+            h[row.places[: row.size[0]]] = row.values[: row.size[0]]
             if v * v <= 25.0 * (h @ P @ h + noise):
-                loop.update(P, x, v, entries, at, row, noise, math.inf, line)
+                loop.update(P, x, row, v, noise, math.inf, line)
         theta.append(x[0])
     return np.array(theta)
 

@@ -200,9 +200,10 @@ def test_accelerometer_rows_are_derivatives(seed):
     up_e = model.on_the_base(up, c)
     f = model.specific_force(tuple(q), up_e)
     for i in range(3):
-        row = linearised.accelerometer_row(i, f, c, up_e, tuple(q), empty_row(linearised.WIDEST))
+        row = empty_row(linearised.WIDEST)
+        linearised.accelerometer_row(i, f, c, up_e, tuple(q), row)
         whole = np.zeros(27)
-        whole[row.places[: row.size]] = row.values[: row.size]
+        whole[row.places[: row.size[0]]] = row.values[: row.size[0]]
         assert whole == pytest.approx(differences[i], abs=1e-8)
 
 

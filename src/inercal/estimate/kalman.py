@@ -15,26 +15,28 @@ Indices: TypeAlias = NDArray[np.int64]
 
 
 class Row(NamedTuple):
-    """The derivative h of a scalar measurement by the state, zero but for ``values[:size]`` at ``places[:size]``."""
+    """The derivative h of a scalar measurement by the state, zero but for ``values`` at ``places``, the first
+    ``size`` (1,) of each."""
 
     places: Indices
     values: Array
-    size: int
+    size: Indices
 
 
 @kernel
 def empty_row(size: int) -> Row:
-    """Room for a row of at most ``size`` entries."""
-    return Row(np.empty(size, dtype=np.int64), np.empty(size), 0)
+    """Room for a row of at most ``size`` entries, none yet."""
+    return Row(np.empty(size, dtype=np.int64), np.empty(size), np.zeros(1, dtype=np.int64))
 
 
 @kernel
 def innovation_variance(P: Array, row: Row, noise: float) -> float:
     """Variance ``h P h^T + r`` of one measurement; arguments as in `scalar_update`."""
+    places, values, size = row.places, row.values, row.size[0]
     total = noise
-    for a in range(row.size):
-        for b in range(row.size):
-            total += row.values[a] * row.values[b] * P[row.places[a], row.places[b]]
+    for a in range(size):
+        for b in range(size):
+            total += values[a] * values[b] * P[places[a], places[b]]
     return total
 
 
@@ -48,16 +50,17 @@ def scalar_update(P: Array, x: Array, row: Row, z: float, noise: float, work: Ar
     Returns the square of the innovation over its variance; summed over the measurements of one time it is their
     normalised innovation squared. ``work`` (n,) is used up.
     """
+    places, values, size = row.places, row.values, row.size[0]
     n = len(x)
     for i in range(n):
         total = 0.0
-        for a in range(row.size):
-            total += P[i, row.places[a]] * row.values[a]
+        for a in range(size):
+            total += P[i, places[a]] * values[a]
         work[i] = total
     variance, innovation = noise, z
-    for a in range(row.size):
-        variance += row.values[a] * work[row.places[a]]
-        innovation -= row.values[a] * x[row.places[a]]
+    for a in range(size):
+        variance += values[a] * work[places[a]]
+        innovation -= values[a] * x[places[a]]
     gain, root = innovation / variance, 1.0 / math.sqrt(variance)
     for i in range(n):
         x[i] += gain * work[i]

@@ -98,9 +98,10 @@ def draw(P: Array, factor: int, spread: float, points: Points) -> None:
         points.health[1] += 1.0
     if not lowest >= points.health[0] and not math.isnan(lowest):
         points.health[0] = lowest
+    A, columns = points.root, points.columns
     for i in range(len(P)):
         for j in range(len(P)):
-            points.columns[j, i] = spread * points.root[i, j]
+            columns[j, i] = spread * A[i, j]
 
 
 class Moments(NamedTuple):
@@ -130,15 +131,16 @@ def moments(z: Array, columns: Array, other: float, out: Moments) -> None:
     other : weight
     out : receives the moments
     """
-    n, m = out.odd.shape
-    mean(z, 0.0, other, out.mean)
+    middle, Pzz, Pxz, odd = out
+    n, m = odd.shape
+    mean(z, 0.0, other, middle)
     for k in range(n):
         for i in range(m):
-            out.odd[k, i] = z[1 + k, i] - z[1 + n + k, i]
-            z[1 + k, i] -= out.mean[i]
-            z[1 + n + k, i] -= out.mean[i]
-    covariance(z, 0.0, other, out.covariance)
-    cross(columns, out.odd, other, other, out.cross)
+            odd[k, i] = z[1 + k, i] - z[1 + n + k, i]
+            z[1 + k, i] -= middle[i]
+            z[1 + n + k, i] -= middle[i]
+    covariance(z, 0.0, other, Pzz)
+    cross(columns, odd, other, other, Pxz)
 
 
 @kernel

@@ -18,8 +18,7 @@ import numpy as np
 from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
 from inercal.aoa.fusion.filter_result import SETTLED
-from inercal.aoa.fusion.live import Live, LiveState, Told
-from inercal.aoa.fusion.model import GATE
+from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
 from inercal.aoa.reading.from_record import of_sensors
@@ -249,12 +248,12 @@ class Aoa:
             return self._alarm(state, _SILENCE, "gyro_missing", text, t)
         return state
 
-    def _judged(self, state: AoaState, told: Told) -> AoaState:
+    def _judged(self, state: AoaState, told: Answers) -> AoaState:
         """The state with innovations counted, and an alarm where a window of them contradicts the model.
 
         Each counts as far as the gate lets it through, so that a single spike is no alarm.
         """
-        gate = self._problem.constants[GATE]
+        gate = self._problem.constants.gate
         for t, innovations in zip(told.t.tolist(), told.innovations, strict=True):
             squared = np.minimum(np.square(innovations[np.isfinite(innovations)]), gate)
             if not squared.size or t - state.begun < SETTLED:
@@ -282,7 +281,7 @@ class Aoa:
         return state._replace(said=state.said | 1 << bit)
 
     def _lines(
-        self, state: AoaState, told: Told, others: Sequence[Live], turned: Sequence[Array]
+        self, state: AoaState, told: Answers, others: Sequence[Live], turned: Sequence[Array]
     ) -> tuple[AoaState, list[Output]]:
         """The state with the slots of lines, and the lines that are due; ``turned`` is theta under changes."""
         outputs: list[Output] = []

@@ -9,7 +9,6 @@ import numpy as np
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.fusion.loop import OUTPUTS
-from inercal.aoa.fusion.model import ROLL
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, State, Trace, advance, initial
 from inercal.aoa.fusion.smoother import smooth
@@ -30,7 +29,7 @@ _BLOCK = 10_000
 
 @dataclass(frozen=True, eq=False)
 class FilterResult:
-    """What the fusion found.
+    """Result of the fusion.
 
     Attributes
     ----------
@@ -101,8 +100,8 @@ def estimate(
         kept[:] = np.nan
         angles = smooth(problem, t, rows, trace.starts, kept, every)
     n = len(recording.t)
-    told, innovations = np.full((n, OUTPUTS), np.nan), np.full((n, problem.count + 1), np.nan)
-    told[taken], innovations[taken] = angles, trace.out[:, OUTPUTS:]
+    motion, innovations = np.full((n, OUTPUTS), np.nan), np.full((n, problem.count + 1), np.nan)
+    motion[taken], innovations[taken] = angles, trace.out[:, OUTPUTS:]
     roll = np.full((n, 2), np.nan)
     if rolls is not None:
         roll[taken] = rolls
@@ -111,11 +110,11 @@ def estimate(
     squared = np.square(judged[np.isfinite(judged)])
     m = problem.size
     return FilterResult(
-        theta=told[:, 0],
-        u=told[:, 1],
-        rate=told[:, 2],
-        rate_u=told[:, 3],
-        acceleration=told[:, 4],
+        theta=motion[:, 0],
+        u=motion[:, 1],
+        rate=motion[:, 2],
+        rate_u=motion[:, 3],
+        acceleration=motion[:, 4],
         innovations=innovations,
         kept_t=t[::every],
         states=kept[:, :m],
@@ -133,7 +132,7 @@ def estimate(
 
 def roll_of(problem: FilterProblem, kept: Array) -> Array:
     """Roll, in (-pi, pi], and its standard uncertainty (k, 2) [rad] from kept states (k, 2 m)."""
-    k = int(problem.places[ROLL])
+    k = problem.places.roll
     return np.column_stack([principal(kept[:, k]), kept[:, problem.size + k]])
 
 
@@ -151,10 +150,12 @@ def _with_roll(
         b, held = min(a + _BLOCK, len(t)), len(state.held)
         states = np.full((held + b - a, 2 * problem.size), np.nan)
         state, trace = advance(state, problem, t[a:b], rows[a:b], states, last=b == len(t))
-        told = len(trace.out)
+        answered = len(trace.out)
         starts += [each._replace(row=each.row + done) for each in trace.starts]
-        parts.append((trace.out, states[-done % every : told : every], roll_of(problem, states[:told])))
-        done += told
+        parts.append(
+            (trace.out, states[-done % every : answered : every], roll_of(problem, states[:answered]))
+        )
+        done += answered
     out, kept, rolls = (np.concatenate(each) for each in zip(*parts, strict=True))
     return state, Trace(out, tuple(starts)), kept, rolls
 

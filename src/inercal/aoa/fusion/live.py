@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal._jit import compiled
 from inercal.aoa.fusion import fading, loop
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import roll_of
-from inercal.aoa.fusion.loop import BESIDE, OUTPUTS
+from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.clock import PATIENCE, later
 from inercal.aoa.reading.recording import Recording
@@ -25,7 +26,7 @@ from inercal.errors import RecordError
 
 
 class LiveState(NamedTuple):
-    """What is known after a row: a state in the sense of `inercal.estimate.checkpoint`.
+    """State after a row, in the sense of `inercal.estimate.checkpoint`.
 
     ``fusion`` is the state of the filter, ``waiting`` (j,) [s] the stamps of the rows that are not answered yet, and
     ``late`` how many of the last rows in a row were not later than those before.
@@ -36,8 +37,8 @@ class LiveState(NamedTuple):
     late: int
 
 
-class Told(NamedTuple):
-    """What is said of k rows: their stamps ``t`` (k,) [s], and ``out`` (k, `OUTPUTS` + N + 1) as of
+class Answers(NamedTuple):
+    """Angles of k rows: their stamps ``t`` (k,) [s], and ``out`` (k, `OUTPUTS` + N + 1) as of
     `inercal.aoa.fusion.loop.advance`, NaN where nothing is known; ``turned`` (k, 2) roll and its standard uncertainty
     [rad] where it is estimated."""
 
@@ -97,20 +98,24 @@ class Live:
     --------
     >>> live = Live(problem(settings))
     >>> for t, acceleration, gyro in samples:
-    ...     told = live.feed(t, acceleration, gyro)
+    ...     answers = live.feed(t, acceleration, gyro)
     """
 
     def __init__(self, problem: FilterProblem, state: LiveState | None = None, where: object = "t") -> None:
         self._problem, self._where = problem, where
-        known = LiveState(fusion.initial(problem), np.empty(0), 0) if state is None else state
-        self._fusion, self._waiting, self._late = _apart(known.fusion), known.waiting, known.late
+        state = LiveState(fusion.initial(problem), np.empty(0), 0) if state is None else state
+        self._fusion, self._waiting, self._late = _apart(state.fusion), state.waiting, state.late
         self._dt, self._row = np.empty(1), np.empty((1, problem.count + BESIDE))
         self._out = np.empty((1, OUTPUTS + problem.count + 1))
         self._kept = np.empty((int(problem.spatial), 2 * problem.size))
+        rows, kept = Rows(self._dt, self._row), Kept(self._kept, 1, 0)
+        self._arguments = rows, problem.model, self._out, kept, loop.NONE
+        belief = Belief(self._fusion.x, self._fusion.P, self._fusion.turns)
+        self._advance = compiled(loop._advance, belief, *self._arguments)
 
     @property
     def state(self) -> LiveState:
-        """What is known now, apart from what comes."""
+        """The state now, in arrays of its own."""
         return LiveState(_apart(self._fusion), self._waiting, self._late)
 
     def feed(
@@ -122,7 +127,7 @@ class Live:
         yaw: float = math.nan,
         stated: float = math.nan,
         stated_u: float = math.nan,
-    ) -> Told:
+    ) -> Answers:
         """Go on by one sample; what is said of it, of none while rows are held, and of all that were held after that.
 
         Parameters
@@ -151,28 +156,25 @@ class Live:
         self._dt[0] = t - state.t
         if steps := fading.due(state.t, t, state.since):
             fading.fade(state.x, state.P, problem, steps)
-        done = loop.advance(
-            state.x, state.P, state.turns, self._dt, row, problem.geometry, problem.places, problem.constants,
-            self._out, self._kept, 1, 0,
-        )  # fmt: skip
+        done = self._advance(Belief(state.x, state.P, state.turns), *self._arguments)
         stamp = np.array([t])
         self._late = 0
         if not done:  # theta is lost
             self._fusion = state._replace(started=False, held=np.column_stack([stamp, row]))
             self._waiting = stamp
-            return Told(stamp[:0], self._out[:0], self._turned(self._kept[:0]))
+            return Answers(stamp[:0], self._out[:0], self._turned(self._kept[:0]))
         self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held, state.since)
-        return Told(stamp, self._out.copy(), self._turned(self._kept))
+        return Answers(stamp, self._out.copy(), self._turned(self._kept))
 
-    def feed_block(self, recording: Recording) -> Told:
+    def feed_block(self, recording: Recording) -> Answers:
         """Go on by the rows of a recording, any number of them, as `feed` does."""
         return self._block(recording.t, recording.rows)
 
-    def finish(self) -> Told:
+    def finish(self) -> Answers:
         """What is said of the rows that are still held: the record ends here."""
         return self._block(np.empty(0), np.empty((0, self._problem.count + BESIDE)), last=True)
 
-    def _block(self, t: Array, rows: Array, last: bool = False) -> Told:
+    def _block(self, t: Array, rows: Array, last: bool = False) -> Answers:
         """Go on by the rows of ``t`` (m,) [s] and ``rows`` (m, N + 5)."""
         before = self._fusion
         waiting = np.append(self._waiting, t)
@@ -190,7 +192,7 @@ class Live:
         if spatial:
             states[taken[:done]] = kept[:done]
         self._waiting = waiting[answered:]
-        return Told(waiting[:answered], out, self._turned(states))
+        return Answers(waiting[:answered], out, self._turned(states))
 
     def _turned(self, states: Array) -> Array | None:
         """Roll and its standard uncertainty (k, 2) of states (k, 2 n); None where it is not estimated."""
@@ -214,13 +216,9 @@ class Live:
 
 def load_kernels(problem: FilterProblem) -> None:
     """Load, or compile, the kernels of the causal fusion."""
-    none = np.empty(0)
-    rows = np.empty((0, problem.count + BESIDE))
-    loop.advance(
-        problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3), none, rows,
-        problem.geometry, problem.places, problem.constants, np.empty((0, OUTPUTS + problem.count + 1)),
-        np.empty((0, 2 * problem.size)), 1, 0,
-    )  # fmt: skip
+    belief = Belief(problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3))
+    rows = Rows(np.empty(0), np.empty((0, problem.count + BESIDE)))
+    loop.advance(belief, rows, problem.model, np.empty((0, OUTPUTS + problem.count + 1)))
 
 
 def _apart(state: fusion.State) -> fusion.State:

@@ -19,23 +19,18 @@ from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.aoa.fusion.model import (
-    COMMON_DELAY,
-    COMMON_DELAY_U,
-    COUNT,
-    GATE,
-    HEIGHTS,
-    LEVERS,
-    MOVING,
-    ROLL,
-    ROWS,
-    SCALE,
-    STATES,
     WIDEST,
+    Constants,
+    Model,
+    Places,
+    Prediction,
+    Step,
     accelerometer,
     gyro,
     transition,
     turning,
 )
+from inercal.estimate.kalman import Row, empty_row
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
@@ -62,16 +57,46 @@ _READING = 1e100
 _EVEN = 1e-9
 
 
-class Memory(NamedTuple):
-    """What a filter remembers of the rows of a block (b,) for a smoother; of none for b = 0.
+class Belief(NamedTuple):
+    """State of the filter between two rows, changed in place: ``x`` (n,) and its covariance ``P`` (n, n); ``turns``
+    (N + 3,) the last indications of the roll and yaw gyros, and the rows in a row in which each accelerometer and the
+    gyro surprised."""
 
-    ``steps`` (b, d, d) the transposed transition of the states that move to each row; ``known`` (b, n + 1, n) the state
+    x: Array
+    P: Array
+    turns: Array
+
+
+class Rows(NamedTuple):
+    """Rows of measurements: ``dt`` (m,) [s] since the row before; ``z`` (m, N + 5) the accelerometers [m/s^2], the gyro
+    [rad/s], a stated angle and its standard uncertainty [rad], roll and yaw gyros [rad/s]; NaN where not measured."""
+
+    dt: Array
+    z: Array
+
+
+class Kept(NamedTuple):
+    """States kept for pictures: ``states`` (k, 2 n) receives x and its standard deviations at each ``every``-th row,
+    counted from ``first``; none with 0 rows."""
+
+    states: Array
+    every: int
+    first: int
+
+
+NOT_KEPT = Kept(np.empty((0, 0)), 1, 0)
+
+
+class Memory(NamedTuple):
+    """Memory of the rows of a block (b,) for a smoother; of none for b = 0.
+
+    ``steps`` (b, d, d) the transposed transition of the states that move to each row; ``after`` (b, n + 1, n) the state
     after the row, and its covariance; ``scalars`` (b, N + 2, 2 n + 2) of each scalar its row h, P h^T, the innovation v
     and the variance S used, 0 where it was left out.
     """
 
     steps: Array
-    known: Array
+    after: Array
     scalars: Array
 
 
@@ -94,23 +119,23 @@ def step_of(dt: float) -> float:
 
 
 @kernel
-def congruent(P: Array, places: Indices, F: Array, Q: Array, work: Array) -> None:
+def congruent(P: Array, moving: Indices, F: Array, Q: Array, work: Array) -> None:
     """F P F^T + Q in the place of P (n, n), symmetric to the last digit; ``work`` (d, n) is used up.
 
-    ``F`` and ``Q`` (d, d) are of the states that move alone; the others stay as they are.
+    ``F`` and ``Q`` (d, d) are of the states at ``moving`` (d,) alone; the others stay as they are.
     """
     n, d = len(P), len(F)
     for i in range(d):
-        f, a = F[i, i], places[ROWS + i]
+        f, a = F[i, i], moving[i]
         for k in range(n):
             work[i, k] = f * P[a, k]
         for j in range(d):
-            f, a = F[i, j], places[ROWS + j]
+            f, a = F[i, j], moving[j]
             if f != 0.0 and j != i:
                 for k in range(n):
                     work[i, k] += f * P[a, k]
     for i in range(d):
-        a = places[ROWS + i]
+        a = moving[i]
         for k in range(n):
             P[a, k] = work[i, k]
             P[k, a] = work[i, k]
@@ -119,50 +144,49 @@ def congruent(P: Array, places: Indices, F: Array, Q: Array, work: Array) -> Non
         for j in range(i + 1):
             total = Q[i, j]
             for k in range(d):
-                total += work[i, places[ROWS + k]] * F[j, k]
-            a, b = places[ROWS + i], places[ROWS + j]
+                total += work[i, moving[k]] * F[j, k]
+            a, b = moving[i], moving[j]
             P[a, b], P[b, a] = total, total
 
 
 @kernel
-def go_on(
-    x: Array, P: Array, dt: float, p: float, y: float, places: Indices, constants: Array, F: Array, Q: Array,
-    base: float, work: Array,
-) -> None:  # fmt: skip
-    """The state and its covariance after ``dt``."""
+def go_on(belief: Belief, step: Step, model: Model, F: Array, Q: Array, work: Array) -> None:
+    """The state and its covariance after a step."""
+    x, P, moving, roll = belief.x, belief.P, model.places.moving, model.places.roll
     d, theta, phi = len(F), 0.0, 0.0
-    if places[ROLL] >= 0:
-        theta, phi = turning(x, dt, p, y, places, constants, F, Q, base)
-    congruent(P, places, F, Q, work)
+    if roll >= 0:
+        theta, phi = turning(x, step, model, F, Q)
+    congruent(P, moving, F, Q, work)
     for i in range(d):
         work[0, i] = 0.0
         for j in range(d):
-            work[0, i] += F[i, j] * x[places[ROWS + j]]
+            work[0, i] += F[i, j] * x[moving[j]]
     for i in range(d):
-        x[places[ROWS + i]] = work[0, i]
-    if places[ROLL] >= 0:
-        x[0], x[places[ROLL]] = theta, phi
+        x[moving[i]] = work[0, i]
+    if roll >= 0:
+        x[0], x[roll] = theta, phi
 
 
 @kernel
 def update(
-    P: Array, x: Array, v: float, count: int, at: Indices, row: Array, noise: float, gate: float, work: Array
+    P: Array, x: Array, row: Row, v: float, noise: float, gate: float, work: Array
 ) -> tuple[float, float]:
-    """Update by one scalar, in place: innovation ``v``, of variance h P h^T + ``noise`` = S.
+    """Update by one scalar, in place: innovation ``v``, of variance h P h^T + ``noise`` = S, with h the ``row``.
 
-    ``at[:count]`` and ``row[:count]`` hold h. ``work`` (n,) receives P h^T. Returns v over the root of S, and the S
+    ``work`` (n,) receives P h^T. Returns v over the root of S, and the S
     that was used, enlarged to v^2 / ``gate`` where v^2 is larger than ``gate`` S; 0 where S is not above zero.
     """
+    places, values, size = row.places, row.values, row.size[0]
     n = len(x)
     for i in range(n):
         work[i] = 0.0
-    for a in range(count):
-        h, k = row[a], at[a]
+    for a in range(size):
+        h, k = values[a], places[a]
         for i in range(n):
             work[i] += h * P[k, i]
     variance = noise
-    for a in range(count):
-        variance += row[a] * work[at[a]]
+    for a in range(size):
+        variance += values[a] * work[places[a]]
     if not variance > 0.0:
         return math.nan, 0.0
     surprise = v / math.sqrt(variance)
@@ -180,21 +204,18 @@ def update(
 
 
 @kernel
-def row_of(
-    i: int, x: Array, s: float, c: float, z: Array, k: int, geometry: Array, places: Indices, constants: Array,
-    p: float, y: float, at: Indices, row: Array,
-) -> tuple[float, int, float]:  # fmt: skip
-    """Scalar ``i`` of row ``k`` of measurements: what it should read, entries of its row, its variance.
+def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> tuple[float, float]:
+    """Reading of scalar ``i`` of a row of measurements at a prediction, and its variance.
 
-    ``s``, ``c`` are sine and cosine of theta in ``x``.
+    ``angle_u`` [rad] is the standard uncertainty of a stated angle; ``out`` receives the derivatives by the state.
     """
-    n = places[COUNT]
+    n = model.places.accelerometers
     if i < n:
-        return accelerometer(x, s, c, i, geometry, places, constants, p, y, at, row)
+        return accelerometer(i, at, model, out)
     if i == n:
-        return gyro(x, places, constants, at, row)
-    at[0], row[0] = 0, 1.0
-    return x[0], 1, z[k, n + 2] * z[k, n + 2]
+        return gyro(at.x, model, out)
+    out.places[0], out.values[0], out.size[0] = 0, 1.0, 1
+    return at.x[0], angle_u * angle_u
 
 
 @kernel
@@ -204,34 +225,34 @@ def root(variance: float) -> float:
 
 
 @kernel
-def told(value: float, variance: float) -> float:
-    """How much of a rate or an acceleration is more than noise, 0 to 1: 1 - 9 P / x^2, none below three deviations."""
+def significant(value: float, variance: float) -> float:
+    """Share of a rate or an acceleration that is more than noise, 0 to 1: 1 - 9 P / x^2, none below three
+    deviations."""
     squared = value * value  # which may be zero where the value is not
     return max(0.0, 1.0 - 9.0 * variance / squared) if squared > 0.0 else 0.0
 
 
 @kernel
-def believed(
-    at: Indices, row: Array, entries: int, places: Indices, of_rate: float, of_acceleration: float
-) -> None:
+def believed(row: Row, places: Places, of_rate: float, of_acceleration: float) -> None:
     """Take from a row what it says of positions and of the gyro's scale by a motion that is but noise.
 
     They multiply rate and acceleration. Of a model at rest the filter would learn them from the noise of these, and be
     sure of what is not so.
     """
-    count, moved = places[COUNT], max(of_rate, of_acceleration)
-    for a in range(entries):
-        for b in (LEVERS, HEIGHTS):
-            if places[b] >= 0 and places[b] <= at[a] < places[b] + count:
-                row[a] *= moved
-        if places[SCALE] >= 0 and at[a] == places[SCALE]:
-            row[a] *= of_rate
+    at, values, size = row.places, row.values, row.size[0]
+    count, moved = places.accelerometers, max(of_rate, of_acceleration)
+    for a in range(size):
+        for b in (places.levers, places.heights):
+            if b >= 0 and b <= at[a] < b + count:
+                values[a] *= moved
+        if places.scale >= 0 and at[a] == places.scale:
+            values[a] *= of_rate
 
 
 @kernel
-def write(x: Array, P: Array, constants: Array, out: Array, k: int) -> None:
+def write(x: Array, P: Array, constants: Constants, out: Array, k: int) -> None:
     """Put theta, u, rate, u, acceleration at the stamp into row ``k``: later by a common delay than the sensors."""
-    tau, u = constants[COMMON_DELAY], constants[COMMON_DELAY_U]
+    tau, u = constants.common_delay, constants.common_delay_u
     out[k, 0] = x[0] + tau * x[1] + 0.5 * tau * tau * x[2]
     out[k, 2] = x[1] + tau * x[2]
     out[k, 4] = x[2]
@@ -242,73 +263,67 @@ def write(x: Array, P: Array, constants: Array, out: Array, k: int) -> None:
 
 
 def advance(
-    x: Array, P: Array, turns: Array, dt: Array, z: Array, geometry: Array, places: Indices, constants: Array,
-    out: Array, kept: Array, every: int, first: int, remembered: Memory = NONE,
-) -> int:  # fmt: skip
-    """Go on by the rows of ``dt`` (m,) [s] and ``z`` (m, N + 5); the number of rows done.
+    belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept = NOT_KEPT, memory: Memory = NONE
+) -> int:
+    """Go on by m rows; the number of rows done.
 
-    ``x`` (n,), ``P`` (n, n) and ``turns`` (N + 3,) are changed in place; ``turns`` are the last indications of the roll
-    and yaw gyros, and the rows in a row in which each accelerometer and the gyro surprised. A row of ``z`` holds the
-    accelerometers [m/s^2], the gyro [rad/s], an angle stated and its standard uncertainty [rad], roll and yaw gyros
-    [rad/s]; NaN where not measured. ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over
-    their standard deviations. ``kept`` (k, 2 n) receives x and its standard deviations at each ``every``-th row,
-    counted from ``first``; none for 0 rows. ``remembered`` is filled if it has room for m rows.
+    ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over their standard deviations;
+    ``memory`` is filled if it has room for m rows.
 
     Ends before a row in which theta is lost: its variance is over `LOST`, it is no angle any more, or a sensor has
     surprised `PATIENCE` times.
     """
-    steps, known, scalars = remembered
-    done: int = _advance(
-        x, P, turns, dt, z, geometry, places, constants, out, kept, every, first, steps, known, scalars
-    )
+    done: int = _advance(belief, rows, model, out, kept, memory)
     return done
 
 
 @kernel
-def _advance(
-    x: Array, P: Array, turns: Array, dt: Array, z: Array, geometry: Array, places: Indices, constants: Array,
-    out: Array, kept: Array, every: int, first: int, steps: Array, known: Array, scalars: Array,
-) -> int:  # fmt: skip
+def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory) -> int:
     """The loop of `advance`."""
-    n, d, m, count = places[STATES], places[MOVING], len(dt), places[COUNT]
+    x, P, turns = belief
+    intervals, z = rows
+    steps, after, scalars = memory
+    states, every, first = kept
+    places, constants = model.places, model.constants
+    n, d, m, count = places.states, len(places.moving), len(intervals), places.accelerometers
     work, line = np.empty((d, n)), np.empty(n)
     F, Q = np.empty((d, d)), np.empty((d, d))
-    at, row, ahead = np.empty(WIDEST, np.int64), np.empty(WIDEST), np.empty(n)
-    last, base, spatial, remember = -1.0, 0.0, places[ROLL] >= 0, len(steps) > 0
+    row, ahead = empty_row(WIDEST), np.empty(n)
+    of, entry = row.places, row.values
+    last, snap, spatial, remember = -1.0, 0.0, places.roll >= 0, len(steps) > 0
     surprised = False
     for i in range(count + 1):
         surprised = surprised or turns[2 + i] >= PATIENCE
     for k in range(m):
-        step = step_of(dt[k])
+        dt = step_of(intervals[k])
         p, y = 0.0, 0.0
         if spatial:
             p, y = turned(turns, z, k, count)
-        if step != last:
-            transition(step, places, constants, F, Q)
-            last, base = step, Q[0, 0]
-        if step > 0.0:
-            go_on(x, P, step, p, y, places, constants, F, Q, base, work)
+        if dt != last:
+            transition(dt, model, F, Q)
+            last, snap = dt, Q[0, 0]
+        if dt > 0.0:
+            go_on(belief, Step(dt, p, y, snap), model, F, Q, work)
         if surprised or not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
             return k
         if spatial:
             p, y = turns[0], turns[1]
         for i in range(n):
             ahead[i] = x[i]
-        sine, cosine = math.sin(x[0]), math.cos(x[0])
-        of_rate, of_acceleration = told(x[1], P[1, 1]), told(x[2], P[2, 2])
+        at = Prediction(ahead, math.sin(x[0]), math.cos(x[0]), p, y)
+        of_rate, of_acceleration = significant(x[1], P[1, 1]), significant(x[2], P[2, 2])
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:
-                expected, entries, noise = row_of(
-                    i, ahead, sine, cosine, z, k, geometry, places, constants, p, y, at, row
-                )
-                believed(at, row, entries, places, of_rate, of_acceleration)
+                expected, noise = reading(i, at, z[k, count + 2], model, row)
+                believed(row, places, of_rate, of_acceleration)
+                entries = row.size[0]
                 v = z[k, i] - expected
                 for a in range(entries):
-                    v -= row[a] * (x[at[a]] - ahead[at[a]])
-                surprise, variance = update(P, x, v, entries, at, row, noise, constants[GATE], line)
+                    v -= entry[a] * (x[of[a]] - ahead[of[a]])
+                surprise, variance = update(P, x, row, v, noise, constants.gate, line)
                 if i <= count:
-                    turns[2 + i] = turns[2 + i] + 1.0 if surprise * surprise > 4.0 * constants[GATE] else 0.0
+                    turns[2 + i] = turns[2 + i] + 1.0 if surprise * surprise > 4.0 * constants.gate else 0.0
                     surprised = surprised or turns[2 + i] >= PATIENCE
             if i <= count:
                 out[k, OUTPUTS + i] = surprise
@@ -316,7 +331,7 @@ def _advance(
                 for j in range(n):
                     scalars[k, i, j], scalars[k, i, n + j] = 0.0, line[j]
                 for j in range(entries):
-                    scalars[k, i, at[j]] = row[j]
+                    scalars[k, i, of[j]] = entry[j]
                 scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
         write(x, P, constants, out, k)
         if remember:
@@ -324,13 +339,13 @@ def _advance(
                 for j in range(d):
                     steps[k, i, j] = F[j, i]
             for i in range(n):
-                known[k, 0, i] = x[i]
+                after[k, 0, i] = x[i]
                 for j in range(n):
-                    known[k, i + 1, j] = P[i, j]
-        if len(kept) > 0 and (first + k) % every == 0:
+                    after[k, i + 1, j] = P[i, j]
+        if len(states) > 0 and (first + k) % every == 0:
             for i in range(n):
-                kept[(first + k) // every, i] = x[i]
-                kept[(first + k) // every, n + i] = root(P[i, i])
+                states[(first + k) // every, i] = x[i]
+                states[(first + k) // every, n + i] = root(P[i, i])
     return m
 
 

@@ -25,31 +25,105 @@ zo_1.., k_g | tau | phi, b_roll, b_yaw; b_.. are biases, dr_.., zo_.. errors of 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.estimate.kalman import Row
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
-
-#: what `places` holds: number of accelerometers, of states, of those that move, d; where a part of the state begins, -1
-#: where it is not estimated; and from `ROWS` on the places (d,) of the states that move, in their order
-COUNT, STATES, MOVING, LEVERS, RESONATORS, HEIGHTS, SCALE, DELAY, ROLL, ROWS = range(10)
-
-#: what `constants` (16,) holds
-(
-    GRAVITY, SNAP, NOISE, GYRO_NOISE, TURN_NOISE, GYRO_DELAY, COMMON_DELAY, COMMON_DELAY_U, ROLL_COSINE, GATE,
-    Z_RATE, Z_DAMPING, Z_LEVEL, X_RATE, X_DAMPING, X_LEVEL,
-) = range(16)  # fmt: skip
 
 GYRO_BIAS = 4
 BIASES = 5
 
 WIDEST = 11
-"""Most entries that a row of the model has."""
+"""Most entries of a row of the model."""
+
+
+class Places(NamedTuple):
+    """Places in the state.
+
+    Numbers of ``accelerometers`` and of ``states``; where each part of the state begins, -1 where it is not estimated;
+    and the places of the states that move, ``moving`` (d,), in their order.
+    """
+
+    accelerometers: int
+    states: int
+    levers: int
+    resonators: int
+    heights: int
+    scale: int
+    delay: int
+    roll: int
+    moving: Indices
+
+
+class Constants(NamedTuple):
+    """Constants of the model, in SI.
+
+    ``snap`` is a spectral density; ``accelerometer_noise``, ``gyro_noise`` and ``turn_noise`` (of the gyros for roll
+    and yaw) are variances; ``gate`` is the largest square of an innovation over its variance. The resonators of the
+    sting, for heave and axial motion, have an angular frequency, a damping, and a level of the output.
+    """
+
+    gravity: float
+    snap: float
+    accelerometer_noise: float
+    gyro_noise: float
+    turn_noise: float
+    gyro_delay: float
+    common_delay: float
+    common_delay_u: float
+    roll_cosine: float
+    gate: float
+    heave_frequency: float
+    heave_damping: float
+    heave_level: float
+    axial_frequency: float
+    axial_damping: float
+    axial_level: float
+
+
+class Model(NamedTuple):
+    """The model as kernels take it: ``geometry`` (N, 4) of the accelerometers, cos lambda, sin lambda, r, z [m]; places
+    and constants."""
+
+    geometry: Array
+    places: Places
+    constants: Constants
+
+
+class Prediction(NamedTuple):
+    """A state ``x`` (n,), sine and cosine of its theta, and the indications ``p``, ``y`` [rad/s] of the roll and yaw
+    gyros, which are not used without a state of roll."""
+
+    x: Array
+    sine: float
+    cosine: float
+    p: float
+    y: float
+
+
+class Step(NamedTuple):
+    """A step: ``dt`` [s], mean indications ``p``, ``y`` [rad/s] of the roll and yaw gyros, and ``snap`` [rad^2], the
+    variance that theta gains from snap alone."""
+
+    dt: float
+    p: float
+    y: float
+    snap: float
+
+
+class Resonator(NamedTuple):
+    """Angular ``frequency`` [rad/s], ``damping`` and ``level`` [m/s^2] of one direction of the sting."""
+
+    frequency: float
+    damping: float
+    level: float
+
 
 _USUAL = 1e-3
 """Interval [s] for which a snap is stated."""
@@ -61,34 +135,22 @@ _NEAR_VERTICAL = 1e-4
 
 
 @kernel
-def accelerometer(
-    x: Array,
-    s: float,
-    c: float,
-    i: int,
-    geometry: Array,
-    places: Indices,
-    constants: Array,
-    p: float,
-    y: float,
-    at: Indices,
-    row: Array,
-) -> tuple[float, int, float]:
-    """What accelerometer ``i`` reads [m/s^2]: its value, the number of entries of its ``row``, and its variance.
+def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float, float]:
+    """Reading of accelerometer ``i`` [m/s^2] and its variance; ``out`` receives its derivatives by the state.
 
-    ``s``, ``c`` are sine and cosine of theta, which all of them share. ``geometry`` (N, 4): cos lambda, sin lambda,
-    r, z [m]. ``p``, ``y`` [rad/s] the indications of the roll and yaw gyros, not used without a state of roll; their
-    noise adds to the variance. ``at`` and ``row`` receive the places and values of the derivatives.
+    The noise of the roll and yaw gyros adds to its variance.
     """
-    g, w, al = constants[GRAVITY], x[1], x[2]
+    geometry, of, constants = model
+    places, row, x, s, c, p, y = out.places, out.values, at.x, at.sine, at.cosine, at.p, at.y
+    g, w, al = constants.gravity, x[1], x[2]
     ca, sa, r, z = geometry[i, 0], geometry[i, 1], geometry[i, 2], geometry[i, 3]
-    levers, res, heights, roll = places[LEVERS], places[RESONATORS], places[HEIGHTS], places[ROLL]
+    levers, res, heights, roll = of.levers, of.resonators, of.heights, of.roll
     if levers >= 0:
         r += x[levers + i]
     if heights >= 0:
         z += x[heights + i]
-    noise = constants[NOISE]
-    at[0], at[1], at[2], at[3] = 0, 1, 2, BIASES + i
+    noise = constants.accelerometer_noise
+    places[0], places[1], places[2], places[3] = 0, 1, 2, BIASES + i
     row[3] = 1.0
     count = 4
     if roll >= 0:
@@ -101,15 +163,15 @@ def accelerometer(
         row[0] = ca * g * c + sa * g * s * cp
         row[1] = -2.0 * w * (ca * r - sa * z)
         row[2] = -ca * z - sa * r
-        at[4], row[4] = roll, sa * g * c * sp
+        places[4], row[4] = roll, sa * g * c * sp
         by_p = ca * z * y - sa * (r * y - 2.0 * z * p)
         by_y = ca * (z * p - 2.0 * r * y) - sa * r * p
-        at[5], row[5] = roll + 1, -by_p
-        at[6], row[6] = roll + 2, -by_y
-        noise += (by_p * by_p + by_y * by_y) * constants[TURN_NOISE]
+        places[5], row[5] = roll + 1, -by_p
+        places[6], row[6] = roll + 2, -by_y
+        noise += (by_p * by_p + by_y * by_y) * constants.turn_noise
         count = 7
     else:
-        cp = constants[ROLL_COSINE]
+        cp = constants.roll_cosine
         by_rx, by_zx = -w * w, -cp * al
         by_rz, by_zz = cp * al, -cp * cp * w * w
         fx = g * s + r * by_rx + z * by_zx
@@ -120,53 +182,58 @@ def accelerometer(
     if res >= 0:
         fz += x[res + 1]
         fx += x[res + 3]
-        at[count], row[count] = res + 1, -sa
-        at[count + 1], row[count + 1] = res + 3, ca
+        places[count], row[count] = res + 1, -sa
+        places[count + 1], row[count + 1] = res + 3, ca
         count += 2
     if levers >= 0:
-        at[count], row[count] = levers + i, ca * by_rx - sa * by_rz
+        places[count], row[count] = levers + i, ca * by_rx - sa * by_rz
         count += 1
     if heights >= 0:
-        at[count], row[count] = heights + i, ca * by_zx - sa * by_zz
+        places[count], row[count] = heights + i, ca * by_zx - sa * by_zz
         count += 1
-    return ca * fx - sa * fz + x[BIASES + i], count, noise
+    out.size[0] = count
+    return ca * fx - sa * fz + x[BIASES + i], noise
 
 
 @kernel
-def gyro(x: Array, places: Indices, constants: Array, at: Indices, row: Array) -> tuple[float, int, float]:
-    """What the gyro reads [rad/s], as `accelerometer` gives it."""
-    scale, delay = places[SCALE], places[DELAY]
-    tau = x[delay] if delay >= 0 else constants[GYRO_DELAY]
-    c = 1.0 if places[ROLL] >= 0 else constants[ROLL_COSINE]
+def gyro(x: Array, model: Model, out: Row) -> tuple[float, float]:
+    """Reading of the gyro [rad/s] at a state, as of `accelerometer`."""
+    _, of, constants = model
+    places, row = out.places, out.values
+    scale, delay = of.scale, of.delay
+    tau = x[delay] if delay >= 0 else constants.gyro_delay
+    c = 1.0 if of.roll >= 0 else constants.roll_cosine
     k = c * (1.0 + (x[scale] if scale >= 0 else 0.0))
     then = x[1] - tau * x[2] + 0.5 * tau * tau * x[3]
-    at[0], at[1], at[2], at[3] = 1, 2, 3, GYRO_BIAS
+    places[0], places[1], places[2], places[3] = 1, 2, 3, GYRO_BIAS
     row[0], row[1], row[2], row[3] = k, -k * tau, 0.5 * k * tau * tau, 1.0
     count = 4
     if scale >= 0:
-        at[count], row[count] = scale, c * then
+        places[count], row[count] = scale, c * then
         count += 1
     if delay >= 0:
-        at[count], row[count] = delay, k * (tau * x[3] - x[2])
+        places[count], row[count] = delay, k * (tau * x[3] - x[2])
         count += 1
-    return k * then + x[GYRO_BIAS], count, constants[GYRO_NOISE]
+    out.size[0] = count
+    return k * then + x[GYRO_BIAS], constants.gyro_noise
 
 
 @kernel
-def transition(dt: float, places: Indices, constants: Array, F: Array, Q: Array) -> None:
-    """How the states that move go on in ``dt`` [s]: theta to jerk under white snap, resonators under white noise.
+def transition(dt: float, model: Model, F: Array, Q: Array) -> None:
+    """Transition of the states that move in ``dt`` [s]: theta to jerk under white snap, resonators under white noise.
 
-    ``F`` (d, d) receives their transition, ``Q`` (d, d) its noise. Exact (Van Loan's integrals in closed form). Those
-    of a state of roll depend on the motion: `turning`. Above 1 kHz the snap grows with the square of the rate: each row
+    ``F`` (d, d) receives it, ``Q`` (d, d) its noise. Exact (Van Loan's integrals in closed form). Those of a state of
+    roll depend on the motion: `turning`. Above 1 kHz the snap grows with the square of the rate: each row
     is linearised anew, and the more rows there are the more certain linearisation alone would make the filter.
     """
-    d = places[MOVING]
+    places, constants = model.places, model.constants
+    d = len(places.moving)
     for i in range(d):
         for j in range(d):
             F[i, j], Q[i, j] = 0.0, 0.0
         F[i, i] = 1.0
     lively = max(1.0, _USUAL / dt) if dt > 0.0 else 1.0
-    noise = constants[SNAP] * lively * lively * dt
+    noise = constants.snap * lively * lively * dt
     for i in range(4):
         power = noise
         for j in range(4):
@@ -177,44 +244,36 @@ def transition(dt: float, places: Indices, constants: Array, F: Array, Q: Array)
         for j in range(i, 4):
             F[i, j] = power / _FACTORIAL[j - i]
             power *= dt
-    if places[RESONATORS] >= 0:
-        for b in range(2):
-            w0, zeta, level = (
-                constants[Z_RATE + 3 * b],
-                constants[Z_DAMPING + 3 * b],
-                constants[Z_LEVEL + 3 * b],
-            )
-            i, k = 4 + 2 * b, 5 + 2 * b
-            wd = w0 * math.sqrt(1.0 - zeta * zeta)
-            e, s, c = math.exp(-zeta * w0 * dt), math.sin(wd * dt), math.cos(wd * dt)
-            F[i, i], F[i, k] = e * (c + zeta * w0 / wd * s), e * s / wd
-            F[k, i], F[k, k] = -e * w0 * w0 / wd * s, e * (c - zeta * w0 / wd * s)
-            # stationary: the variances s: level^2 / w0^2, s': level^2 stay as they are
-            vi, vk = level * level / (w0 * w0), level * level
-            Q[i, i] = vi - F[i, i] * F[i, i] * vi - F[i, k] * F[i, k] * vk
-            Q[k, k] = vk - F[k, i] * F[k, i] * vi - F[k, k] * F[k, k] * vk
-            Q[i, k] = -F[i, i] * F[k, i] * vi - F[i, k] * F[k, k] * vk
-            Q[k, i] = Q[i, k]
+    if places.resonators >= 0:
+        heave = Resonator(constants.heave_frequency, constants.heave_damping, constants.heave_level)
+        axial = Resonator(constants.axial_frequency, constants.axial_damping, constants.axial_level)
+        _resonate(dt, heave, 4, F, Q)
+        _resonate(dt, axial, 6, F, Q)
 
 
 @kernel
-def turning(
-    x: Array,
-    dt: float,
-    p: float,
-    y: float,
-    places: Indices,
-    constants: Array,
-    F: Array,
-    Q: Array,
-    base: float,
-) -> tuple[float, float]:
-    """Put the rows of theta and roll into ``F`` and ``Q``; theta and roll [rad] after ``dt``.
+def _resonate(dt: float, of: Resonator, i: int, F: Array, Q: Array) -> None:
+    """Put transition and noise of a resonator into the rows ``i`` and ``i + 1`` of ``F`` and ``Q``."""
+    w0, zeta, level = of
+    k = i + 1
+    wd = w0 * math.sqrt(1.0 - zeta * zeta)
+    e, s, c = math.exp(-zeta * w0 * dt), math.sin(wd * dt), math.cos(wd * dt)
+    F[i, i], F[i, k] = e * (c + zeta * w0 / wd * s), e * s / wd
+    F[k, i], F[k, k] = -e * w0 * w0 / wd * s, e * (c - zeta * w0 / wd * s)
+    # stationary: the variances s: level^2 / w0^2, s': level^2 stay as they are
+    vi, vk = level * level / (w0 * w0), level * level
+    Q[i, i] = vi - F[i, i] * F[i, i] * vi - F[i, k] * F[i, k] * vk
+    Q[k, k] = vk - F[k, i] * F[k, i] * vi - F[k, k] * F[k, k] * vk
+    Q[i, k] = -F[i, i] * F[k, i] * vi - F[i, k] * F[k, k] * vk
+    Q[k, i] = Q[i, k]
 
-    ``p``, ``y`` [rad/s] what the roll and yaw gyros say of the step; ``base`` is the noise of theta from snap alone.
-    """
-    a, roll = places[MOVING] - 3, places[ROLL]
-    p, y = p - x[roll + 1], y - x[roll + 2]
+
+@kernel
+def turning(x: Array, step: Step, model: Model, F: Array, Q: Array) -> tuple[float, float]:
+    """Put the rows of theta and roll into ``F`` and ``Q``; theta and roll [rad] after the step."""
+    dt = step.dt
+    a, roll = len(model.places.moving) - 3, model.places.roll
+    p, y = step.p - x[roll + 1], step.y - x[roll + 2]
     s, c = math.sin(x[roll]), math.cos(x[roll])
     st, ct = math.sin(x[0]), math.cos(x[0])
     steep = ct * ct + _NEAR_VERTICAL
@@ -226,8 +285,8 @@ def turning(
     F[a, 0], F[a, 1] = across * dt / steep, s * tangent * dt
     F[a, a] = 1.0 + (x[1] * c + y * s) * tangent * dt
     F[a, a + 1], F[a, a + 2] = -dt, c * tangent * dt
-    noise = constants[TURN_NOISE] * dt * dt
-    Q[0, 0] = base + s * s * noise
+    noise = model.constants.turn_noise * dt * dt
+    Q[0, 0] = step.snap + s * s * noise
     Q[a, a] = (1.0 + c * c * tangent * tangent) * noise
     Q[0, a] = -s * c * tangent * noise
     Q[a, 0] = Q[0, a]

@@ -1,4 +1,4 @@
-"""The fusion's problem as numbers for kernels: which states there are, their prior, and what is taken as known."""
+"""The problem of the fusion: its states, their prior, and the constants of its model."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inercal.aoa.fusion import model
+from inercal.aoa.fusion.model import Constants, Model, Places
 from inercal.aoa.layout import Layout
 from inercal.aoa.settings import AoaSettings, Resonance
 from inercal.arrays import Array
-
-Indices = NDArray[np.int64]
 
 START = np.array([0.1, 0.5, 20.0, 200.0])
 """Standard deviations of angle [rad], rate, acceleration and jerk where the filter starts."""
@@ -26,19 +23,24 @@ _ROLL_U = math.radians(0.1)
 
 @dataclass(frozen=True, eq=False)
 class FilterProblem:
-    """All that the fusion is told beside the recording.
+    """The problem of the fusion, without the recording.
 
     ``names`` (n,) of the states; ``mean`` (n,) and ``covariance`` (n, n) of all but the four of motion, which have none
-    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.aoa.fusion.model`.
+    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.aoa.fusion.model.Model`.
     """
 
     layout: Layout
     names: tuple[str, ...]
     mean: Array
     covariance: Array
-    places: Indices
-    constants: Array
+    places: Places
+    constants: Constants
     geometry: Array
+
+    @cached_property
+    def model(self) -> Model:
+        """Geometry, places and constants, for kernels."""
+        return Model(self.geometry, self.places, self.constants)
 
     @property
     def count(self) -> int:
@@ -59,7 +61,7 @@ class FilterProblem:
     @property
     def spatial(self) -> bool:
         """True where roll is estimated."""
-        return bool(self.places[model.ROLL] >= 0)
+        return self.places.roll >= 0
 
 
 _MOTION = ("theta", "rate", "acceleration", "jerk")
@@ -73,7 +75,7 @@ def problem(
     spatial: bool = False,
     posterior: tuple[Mapping[str, float], Mapping[tuple[str, str], float]] | None = None,
 ) -> FilterProblem:
-    """The problem that a study states.
+    """The problem of a study.
 
     ``spatial``: the recording has gyros for roll and yaw. ``posterior``: values of coefficients by name, and their
     covariances by pairs of names, of an earlier run, in the place of the study's prior.
@@ -84,28 +86,28 @@ def problem(
     names: list[str] = [*_MOTION, "b_g", *(f"b_{k}" for k in each)]
     half = 0.5 * noise.accelerometer_bias**2
     blocks = [np.zeros((4, 4)), np.array([[noise.gyro_bias**2]]), half + half * np.eye(n)]
-    places = np.full(model.ROWS + 11, -1, dtype=np.int64)
+    parts = dict.fromkeys(("levers", "resonators", "heights", "scale", "delay", "roll"), -1)
 
-    def add(place: int, block: Array, *of: str) -> None:
-        places[place] = len(names)
+    def add(part: str, block: Array, *of: str) -> None:
+        parts[part] = len(names)
         names.extend(of)
         blocks.append(block)
 
     if states >= 11:
         common, own = prior.lever_common**2, prior.lever**2
-        add(model.LEVERS, common + own * np.eye(n), *(f"dr_{k}" for k in each))
+        add("levers", common + own * np.eye(n), *(f"dr_{k}" for k in each))
     if states >= 15:
-        add(model.RESONATORS, np.diag([*_stationary(prior.heave), *_stationary(prior.axial)]), *_FLEXURE)
+        add("resonators", np.diag([*_stationary(prior.heave), *_stationary(prior.axial)]), *_FLEXURE)
     if states >= 19:
-        add(model.HEIGHTS, prior.height**2 * np.eye(n), *(f"zo_{k}" for k in each))
-        add(model.SCALE, np.array([[prior.gyro_scale**2]]), "k_g")
+        add("heights", prior.height**2 * np.eye(n), *(f"zo_{k}" for k in each))
+        add("scale", np.array([[prior.gyro_scale**2]]), "k_g")
     if settings.timing.gyro_delay is None:
-        add(model.DELAY, np.array([[prior.gyro_delay**2]]), "tau_g")
+        add("delay", np.array([[prior.gyro_delay**2]]), "tau_g")
     roll = settings.attitude.roll
     if spatial:
         of_roll = _ROLL_U if roll is None or roll.u == 0.0 else roll.u
         variances = [of_roll**2, noise.gyro_bias**2, noise.gyro_bias**2]
-        add(model.ROLL, np.diag(variances), *_TURNING)
+        add("roll", np.diag(variances), *_TURNING)
     size = len(names)
     mean, covariance = np.zeros(size), np.zeros((size, size))
     a = 0
@@ -113,11 +115,9 @@ def problem(
         covariance[a : a + len(block), a : a + len(block)] = block
         a += len(block)
     if spatial and roll is not None:
-        mean[places[model.ROLL]] = roll.value
-    places[model.COUNT], places[model.STATES] = n, size
-    moving = [k for k, name in enumerate(names) if name in _MOVING]
-    places[model.MOVING] = len(moving)
-    places[model.ROWS : model.ROWS + len(moving)] = moving
+        mean[parts["roll"]] = roll.value
+    moving = np.array([k for k, name in enumerate(names) if name in _MOVING], dtype=np.int64)
+    places = Places(n, size, **parts, moving=moving)
     if posterior is not None:
         _known_before(names, mean, covariance, posterior)
     return FilterProblem(
@@ -130,26 +130,29 @@ def _stationary(of: Resonance) -> tuple[float, float]:
     return (of.level / of.frequency) ** 2, of.level**2
 
 
-def _constants(settings: AoaSettings) -> Array:
-    """As in `inercal.aoa.fusion.model`."""
+def _constants(settings: AoaSettings) -> Constants:
+    """The constants of a study."""
     noise, timing, roll = settings.noise, settings.timing, settings.attitude.roll
-    known = {
-        model.GRAVITY: settings.site.gravity,
-        model.SNAP: settings.estimator.density,
-        model.NOISE: noise.accelerometer**2,
-        model.GYRO_NOISE: noise.gyro**2,
-        model.TURN_NOISE: noise.gyro**2,
-        model.GYRO_DELAY: timing.gyro_delay or 0.0,
-        model.COMMON_DELAY: timing.common_delay,
-        model.COMMON_DELAY_U: timing.common_delay_u,
-        model.ROLL_COSINE: 1.0 if roll is None else math.cos(roll.value),
-        model.GATE: settings.estimator.gate,
-    }
-    made = np.zeros(16)
-    made[list(known)] = list(known.values())
-    for first, of in ((model.Z_RATE, settings.prior.heave), (model.X_RATE, settings.prior.axial)):
-        made[first : first + 3] = of.frequency, of.damping, of.level
-    return made
+    heave, axial = settings.prior.heave, settings.prior.axial
+    constants = Constants(
+        gravity=settings.site.gravity,
+        snap=settings.estimator.density,
+        accelerometer_noise=noise.accelerometer**2,
+        gyro_noise=noise.gyro**2,
+        turn_noise=noise.gyro**2,
+        gyro_delay=timing.gyro_delay or 0.0,
+        common_delay=timing.common_delay,
+        common_delay_u=timing.common_delay_u,
+        roll_cosine=1.0 if roll is None else math.cos(roll.value),
+        gate=settings.estimator.gate,
+        heave_frequency=heave.frequency,
+        heave_damping=heave.damping,
+        heave_level=heave.level,
+        axial_frequency=axial.frequency,
+        axial_damping=axial.damping,
+        axial_level=axial.level,
+    )
+    return Constants(*map(float, constants))
 
 
 def _known_before(

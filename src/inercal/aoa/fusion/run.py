@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.aoa.fusion import fading, loop
-from inercal.aoa.fusion.loop import BESIDE, OUTPUTS
-from inercal.aoa.fusion.model import GRAVITY, GYRO_BIAS, RESONATORS, ROLL, ROLL_COSINE
+from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
+from inercal.aoa.fusion.model import GYRO_BIAS
 from inercal.aoa.fusion.problem import START, FilterProblem
 from inercal.aoa.reading.clock import HELD
 from inercal.arrays import Array
@@ -29,7 +29,7 @@ _NO_ARM = 1e-3
 
 
 class State(NamedTuple):
-    """What the filter knows between two rows.
+    """State of the filter between two rows.
 
     ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (N + 3,) as of
     `inercal.aoa.fusion.loop.advance`; ``t`` [s] of the last row, -inf before the first; ``started``: the filter runs.
@@ -59,8 +59,8 @@ class Start(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """What the filter says of m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.fusion.loop.advance`, and where
-    it ``starts`` in them."""
+    """Estimates of the filter at m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.fusion.loop.advance`, and its
+    ``starts`` in them."""
 
     out: Array
     starts: tuple[Start, ...]
@@ -123,20 +123,8 @@ def advance(
         elif steps := fading.due(float(t[at - 1]) if at else before, float(t[at]), since):
             fading.fade(x, P, problem, steps)
         stop = fading.next_due(t, at, since)
-        done = loop.advance(
-            x,
-            P,
-            turns,
-            dt[at:stop],
-            rows[at:stop],
-            problem.geometry,
-            problem.places,
-            problem.constants,
-            out[at:stop],
-            kept,
-            every,
-            at,
-        )
+        part = Rows(dt[at:stop], rows[at:stop])
+        done = loop.advance(Belief(x, P, turns), part, problem.model, out[at:stop], Kept(kept, every, at))
         # what is lost in the row in which it started is no angle
         at, running = (at + done, at + done == stop) if done or running else (end, False)
     before = float(t[at - 1]) if at else before
@@ -147,9 +135,9 @@ def advance(
 def unknown(problem: FilterProblem) -> list[int]:
     """Places of the states that a start does not know from before: motion, flexure of the sting, and roll, of which a
     gap tells as little."""
-    flexure, roll = problem.places[RESONATORS], problem.places[ROLL]
+    flexure, roll = problem.places.resonators, problem.places.roll
     of_flexure = range(flexure, flexure + 4) if flexure >= 0 else ()
-    return [0, 1, 2, 3, *of_flexure, *((int(roll),) if roll >= 0 else ())]
+    return [0, 1, 2, 3, *of_flexure, *((roll,) if roll >= 0 else ())]
 
 
 def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, rows: Array) -> bool:
@@ -165,7 +153,7 @@ def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, ro
     x[fresh] = problem.mean[fresh]
     together = t - t[0] <= 3.0 * HELD * _medians(np.diff(t, prepend=t[0])[:, None])[0]
     t, rows = t[together], rows[together]
-    level = math.cos(x[problem.places[ROLL]]) if spatial else problem.constants[ROLL_COSINE]
+    level = math.cos(x[problem.places.roll]) if spatial else problem.constants.roll_cosine
     middle = _medians(rows)
     seen = np.flatnonzero(np.isfinite(middle[:n]))
     if not problem.layout.of(*seen).spans:
@@ -212,14 +200,14 @@ def _angle(force: Array, level: float, problem: FilterProblem) -> float:
     forward, up = force.tolist()
     if abs(level) > _ACROSS:
         return math.atan2(forward, up / level)
-    g = problem.constants[GRAVITY]
+    g = problem.constants.gravity
     return math.asin(min(1.0, max(-1.0, forward / g))) if math.isfinite(forward) else math.nan
 
 
 def _slope(t: Array, angles: Array) -> float:
     """Rate [rad/s] of angles, 0 where there are not three."""
-    known = np.isfinite(angles)
-    if known.sum() < 3:
+    finite = np.isfinite(angles)
+    if finite.sum() < 3:
         return 0.0
-    t, angles = t[known] - t[known].mean(), np.unwrap(angles[known])
+    t, angles = t[finite] - t[finite].mean(), np.unwrap(angles[finite])
     return float(t @ angles / (t @ t))

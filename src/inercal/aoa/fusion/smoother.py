@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.aoa.fusion import fading, loop
-from inercal.aoa.fusion.loop import OUTPUTS, congruent, root, write
-from inercal.aoa.fusion.model import COUNT, MOVING, ROWS, STATES
+from inercal.aoa.fusion.loop import NOT_KEPT, OUTPUTS, Belief, Kept, Memory, Rows, congruent, root, write
+from inercal.aoa.fusion.model import Model
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, unknown
 
 Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.int64]
 
 BLOCK = 256
 """Rows from one kept state to the next."""
@@ -58,13 +57,13 @@ def smooth(
     """
     n = problem.size
     out = np.full((len(t), OUTPUTS), np.nan)
-    kept = np.empty((0, 2 * n)) if kept is None else kept
+    states = NOT_KEPT.states if kept is None else kept
     rows = np.ascontiguousarray(rows)
     lam, Lam, new = np.zeros(n), np.zeros((n, n)), unknown(problem)
     end = len(t)
     for begin in reversed(starts):
         part = slice(begin.row, end)
-        _stretch(problem, begin, t[part], rows[part], lam, Lam, out[part], kept, every)
+        _stretch(problem, begin, t[part], rows[part], (lam, Lam), out[part], Kept(states, every, begin.row))
         forgotten = slice(None) if begin.anew else new
         lam[forgotten] = 0.0
         Lam[forgotten, :] = 0.0
@@ -81,66 +80,71 @@ def load_kernels(problem: FilterProblem) -> None:
 
 
 def _stretch(
-    problem: FilterProblem, begin: Start, t: Array, rows: Array, lam: Array, Lam: Array, out: Array, kept: Array,
-    every: int,
+    problem: FilterProblem, begin: Start, t: Array, rows: Array, adjoint: tuple[Array, Array], out: Array, kept: Kept
 ) -> None:  # fmt: skip
-    """Smooth from one start on; ``lam`` and ``Lam`` go from the end of the stretch to its beginning."""
-    given = (problem.geometry, problem.places, problem.constants)
-    n, dt = problem.size, np.diff(t, prepend=t[0])
-    memory = loop.memory(min(BLOCK, len(dt)), n, int(problem.places[MOVING]), problem.count)
-    causal, none = np.empty((BLOCK, OUTPUTS + problem.count + 1)), np.empty((0, 2 * n))
-    x, P, turns = begin.x.copy(), begin.P.copy(), begin.turns.copy()
+    """Smooth from one start on; the ``adjoint`` lam, Lam goes from the end of the stretch to its beginning."""
+    (lam, Lam), model, dt = adjoint, problem.model, np.diff(t, prepend=t[0])
+    memory = loop.memory(min(BLOCK, len(dt)), problem.size, len(model.places.moving), problem.count)
+    causal = np.empty((BLOCK, OUTPUTS + problem.count + 1))
+    belief = _apart(begin.x, begin.P, begin.turns)
     heads = []
     a = 0
     while a < len(dt):
         steps = fading.due(float(t[a - 1]), float(t[a]), begin.since) if a else 0
-        F = fading.fade(x, P, problem, steps) if steps else None
+        F = fading.fade(belief.x, belief.P, problem, steps) if steps else None
         block = slice(a, min(a + BLOCK, fading.next_due(t, a, begin.since)))
-        heads.append((block, x.copy(), P.copy(), turns.copy(), F))
-        done = loop.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0)
+        heads.append((block, _apart(*belief), F))
+        done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal)
         if done < len(dt[block]):
             break
         a = block.stop
-    for block, x, P, turns, F in reversed(heads):
-        done = loop.advance(x, P, turns, dt[block], rows[block], *given, causal, none, 1, 0, memory)
-        _backward(lam, Lam, *memory, done, *given[1:], out[block], kept, every, begin.row + block.start)
+    for block, belief, F in reversed(heads):
+        done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal, memory=memory)
+        _backward(lam, Lam, memory, done, model, out[block], kept._replace(first=kept.first + block.start))
         if F is not None:
             with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
                 lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
 
 
+def _apart(x: Array, P: Array, turns: Array) -> Belief:
+    """A belief in arrays of its own."""
+    return Belief(x.copy(), P.copy(), turns.copy())
+
+
 @kernel
 def _backward(
-    lam: Array, Lam: Array, steps: Array, known: Array, scalars: Array, size: int, places: Indices,
-    constants: Array, out: Array, kept: Array, every: int, first: int,
-) -> None:  # fmt: skip
+    lam: Array, Lam: Array, memory: Memory, size: int, model: Model, out: Array, kept: Kept
+) -> None:
     """Go back over ``size`` rows that the filter remembers: ``lam`` and ``Lam`` from their end to their beginning."""
-    n, d = places[STATES], places[MOVING]
+    steps, after, scalars = memory
+    states, every, first = kept
+    moving = model.places.moving
+    n, d = model.places.states, len(moving)
     work, line, none = np.empty((d, n)), np.empty(n), np.zeros((d, d))
     mean, spread = np.empty(n), np.empty((n, n))
     for k in range(size - 1, -1, -1):
-        whole = len(kept) > 0 and (first + k) % every == 0
+        whole = len(states) > 0 and (first + k) % every == 0
         for i in range(n if whole else 3):
-            mean[i] = _smoothed(known, k, i, lam, Lam, line)
+            mean[i] = _smoothed(after, k, i, lam, Lam, line)
             for j in range(i + 1):
-                spread[i, j] = known[k, i + 1, j]
+                spread[i, j] = after[k, i + 1, j]
                 for m in range(n):
-                    spread[i, j] -= line[m] * known[k, j + 1, m]
+                    spread[i, j] -= line[m] * after[k, j + 1, m]
                 spread[j, i] = spread[i, j]
             if whole:
-                kept[(first + k) // every, i] = mean[i]
-                kept[(first + k) // every, n + i] = root(spread[i, i])
-        write(mean, spread, constants, out, k)
-        for i in range(places[COUNT] + 1, -1, -1):
+                states[(first + k) // every, i] = mean[i]
+                states[(first + k) // every, n + i] = root(spread[i, i])
+        write(mean, spread, model.constants, out, k)
+        for i in range(model.places.accelerometers + 1, -1, -1):
             if scalars[k, i, 2 * n + 1] > 0.0:
                 _back(lam, Lam, scalars, k, i, line)
         for i in range(d):
             line[i] = 0.0
             for j in range(d):
-                line[i] += steps[k, i, j] * lam[places[ROWS + j]]
+                line[i] += steps[k, i, j] * lam[moving[j]]
         for i in range(d):
-            lam[places[ROWS + i]] = line[i]
-        congruent(Lam, places, steps[k], none, work)
+            lam[moving[i]] = line[i]
+        congruent(Lam, moving, steps[k], none, work)
 
 
 @kernel
@@ -172,15 +176,15 @@ def _back(lam: Array, Lam: Array, scalars: Array, k: int, i: int, along: Array) 
 
 
 @kernel
-def _smoothed(known: Array, k: int, i: int, lam: Array, Lam: Array, line: Array) -> float:
+def _smoothed(after: Array, k: int, i: int, lam: Array, Lam: Array, line: Array) -> float:
     """State ``i`` of row ``k``; ``line`` (n,) receives its row of P Lam."""
     n = len(lam)
-    total: float = known[k, 0, i]
+    total: float = after[k, 0, i]
     for j in range(n):
-        total -= known[k, i + 1, j] * lam[j]
+        total -= after[k, i + 1, j] * lam[j]
         line[j] = 0.0
     for m in range(n):
-        p = known[k, i + 1, m]
+        p = after[k, i + 1, m]
         for j in range(n):
             line[j] += p * Lam[m, j]
     return total

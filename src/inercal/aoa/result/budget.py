@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.fusion import model
 from inercal.aoa.fusion.filter_result import SETTLED
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as stated_problem
@@ -55,8 +54,8 @@ class Source:
     type: str
     u: float
     unit: str
-    constants: tuple[int, ...] = ()
-    levels: tuple[int, ...] = ()
+    constants: tuple[str, ...] = ()
+    levels: tuple[str, ...] = ()
     states: tuple[str, ...] = ()
     stated: bool = False
 
@@ -140,7 +139,7 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]
 
     def of_prior(name: str, u: float, unit: str, *begin: str) -> Source:
         states = tuple(each for each in problem.names if each.startswith(begin) and each not in before)
-        levels = (model.Z_LEVEL, model.X_LEVEL) if begin == ("s_", "flexure_") else ()
+        levels = ("heave_level", "axial_level") if begin == ("s_", "flexure_") else ()
         return Source(name, "B", u, unit, levels=levels, states=states)
 
     of_states = (
@@ -154,10 +153,10 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]
         of_prior("flexure of the sting", flexure, "m/s^2", "s_", "flexure_"),
         Source("earlier run", "B", 1.0, "1", states=before),
     )
-    delay, motion = (model.COMMON_DELAY_U,), (model.SNAP,)
+    delay, motion = ("common_delay_u",), ("snap",)
     return (
-        Source("accelerometer noise", "A", noise.accelerometer, "m/s^2", (model.NOISE,)),
-        Source("gyro noise", "A", noise.gyro, "rad/s", (model.GYRO_NOISE, model.TURN_NOISE)),
+        Source("accelerometer noise", "A", noise.accelerometer, "m/s^2", ("accelerometer_noise",)),
+        Source("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
         *(each for each in of_states if each.states),
         *([Source("common delay", "B", timing.common_delay_u, "s", levels=delay)] if timing.common_delay_u else []),
         *([Source("stated zero", "B", zero.u, "rad", stated=True)] if zero is not None else []),
@@ -188,9 +187,9 @@ def _run(
 def _enlarged(problem: FilterProblem, rows: Array, source: Source) -> tuple[FilterProblem, Array]:
     """The problem and its rows with the variance of a source larger by `_STEP`."""
     by = 1.0 + _STEP
-    constants, covariance = problem.constants.copy(), problem.covariance.copy()
-    constants[list(source.constants)] *= by
-    constants[list(source.levels)] *= by**0.5
+    constants, covariance = problem.constants, problem.covariance.copy()
+    for names, factor in ((source.constants, by), (source.levels, by**0.5)):
+        constants = constants._replace(**{name: factor * getattr(constants, name) for name in names})
     at = [problem.names.index(name) for name in source.states]
     covariance[np.ix_(at, at)] *= by
     if source.stated:

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.fusion import model
 from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.roll import tracked
@@ -61,8 +60,8 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
 
 def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> FilterProblem:
     """The problem of the fusion under a change, which moves also what an earlier run found."""
-    constants, mean = problem.constants.copy(), problem.mean.copy()
-    constants[[model.GRAVITY, model.ROLL_COSINE]] = lean.gravity, math.cos(lean.roll)
+    constants = problem.constants._replace(gravity=float(lean.gravity), roll_cosine=math.cos(lean.roll))
+    mean = problem.mean.copy()
     prior = settings.estimator.prior
     if lean.name == "gravity" and prior is not None:
         for name, slope in carried(load_estimate(prior), settings).items():

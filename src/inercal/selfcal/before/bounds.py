@@ -202,16 +202,17 @@ def observe(P: Array, row: Row, r: float, source: int, work: Array) -> None:
     ``row`` is its derivative by the state, ``r`` its variance, which belongs to the part ``source``; ``work`` (2, m) is
     used up.
     """
+    places, values, size = row.places, row.values, row.size[0]
     m = P.shape[1]
     gain, own = work[0], work[1]
     for s in range(len(P)):
         inner = r if s == 0 or s == source else 0.0
         for i in range(m):
             own[i] = 0.0
-            for k in range(row.size):
-                own[i] += P[s, i, row.places[k]] * row.values[k]
-        for k in range(row.size):
-            inner += row.values[k] * own[row.places[k]]
+            for k in range(size):
+                own[i] += P[s, i, places[k]] * values[k]
+        for k in range(size):
+            inner += values[k] * own[places[k]]
         if s == 0:
             for i in range(m):
                 gain[i] = own[i] / inner
@@ -247,7 +248,7 @@ def riccati(P: Array, path: Path, c: Array, model: Model, u: Array) -> None:
     q, th, dt, w, seen = path
     world, noise, gate = model
     m, p = P.shape[1], len(c)
-    top, work, room = np.empty((6, m)), np.empty((2, m)), empty_row(WIDEST)
+    top, work, row = np.empty((6, m)), np.empty((2, m)), empty_row(WIDEST)
     near = np.zeros(3, dtype=np.int64)
     earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
     variance = noise.accelerometer * noise.accelerometer
@@ -266,12 +267,13 @@ def riccati(P: Array, path: Path, c: Array, model: Model, u: Array) -> None:
                     roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
                     for i in range(3):
                         for j in range(i + 1):
-                            room.places[j], room.values[j] = j, roots[i][j]
-                        observe(P, Row(room.places, room.values, i + 1), 1.0, _PARTS[1], work)
+                            row.places[j], row.values[j] = j, roots[i][j]
+                        row.size[0] = i + 1
+                        observe(P, row, 1.0, _PARTS[1], work)
                 f = specific_force(at, up_e)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
-                        row = accelerometer_row(i, f, c, up_e, at, room)
+                        accelerometer_row(i, f, c, up_e, at, row)
                         observe(P, row, variance, _PARTS[0], work)
         if len(u) > 0:
             for i in range(p):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
-from inercal.estimate.kalman import Row, empty_row, innovation_variance, scalar_update
+from inercal.estimate.kalman import empty_row, innovation_variance, scalar_update
 from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
 from inercal.selfcal.filters.gating import admitted, updating, watch
@@ -77,26 +77,26 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
     """The loop; returns the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate = model
+    intervals, rates, acc, th = steps
     n, p = len(P), len(c)
     top, x, work = np.empty((6, n)), np.empty(n), np.empty(n)
-    room = empty_row(WIDEST)
+    row = empty_row(WIDEST)
     variance = noise.accelerometer * noise.accelerometer
     history = len(out.u) > 0
     cosine = 1.0
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
-    for k in range(len(steps.dt)):
-        dt, acc, th = steps.dt[k], steps.acc[k], steps.th[k]
-        w = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2])
+    for k in range(len(intervals)):
+        dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         rate, earth_e, up_e = platform_rate(w, c), on_the_base(world.earth, c), on_the_base(world.up, c)
         q = normalize(propagate(q, rate, earth_e, dt))
         walk = noise.angle_random_walk * noise.angle_random_walk * dt
         propagate_covariance(P, c, Step(w, rate, earth_e, q, dt), walk, top)
         x[:] = 0.0
         total, count = 0.0, 0
-        seen = not (math.isnan(th[0]) or math.isnan(th[1]) or math.isnan(th[2]))
+        seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):
-                angles[i] = nearest_turn(th[i], angles[i])
+                angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             of_encoders = attitude(angles, world.axes, world.signs)
             watch(specific_force(of_encoders, up_e), gate, near)
@@ -113,9 +113,10 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
             for i in range(3):
                 root = roots[i]
                 for j in range(i + 1):
-                    room.places[j], room.values[j] = j, root[j]
+                    row.places[j], row.values[j] = j, root[j]
                 z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-                total += scalar_update(P, x, Row(room.places, room.values, i + 1), z, 1.0, work)
+                row.size[0] = i + 1
+                total += scalar_update(P, x, row, z, 1.0, work)
                 count += 1
             q = _corrected(q, c, x)
         if take:
@@ -123,15 +124,15 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
             f = specific_force(q, up_e)
             read = accelerometers(f, c)
             for i in range(3):
-                if not math.isnan(acc[i]) and admitted(i, gate, near):
-                    row = accelerometer_row(i, f, c, up_e, q, room)
+                if not math.isnan(acc[k, i]) and admitted(i, gate, near):
+                    accelerometer_row(i, f, c, up_e, q, row)
                     if history:
                         own = innovation_variance(P, row, variance)
-                        out.innovations[k, i] = (acc[i] - read[i]) / math.sqrt(own)
+                        out.innovations[k, i] = (acc[k, i] - read[i]) / math.sqrt(own)
             for i in range(3):
-                if not math.isnan(acc[i]) and admitted(i, gate, near):
-                    row = accelerometer_row(i, f, c, up_e, q, room)
-                    total += scalar_update(P, x, row, acc[i] - read[i], variance, work)
+                if not math.isnan(acc[k, i]) and admitted(i, gate, near):
+                    accelerometer_row(i, f, c, up_e, q, row)
+                    total += scalar_update(P, x, row, acc[k, i] - read[i], variance, work)
                     count += 1
             q = _corrected(q, c, x)
         out.nis[k] = total if count > 0 else math.nan

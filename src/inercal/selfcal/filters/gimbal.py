@@ -213,6 +213,7 @@ def _advance(
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
     world, noise, gate = model
+    intervals, rate, acc, th_m = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted = empty_points(n), np.empty(p)
@@ -220,9 +221,8 @@ def _advance(
     z, of_points = np.zeros((2 * n + 1, 6)), empty_moments(n, 6)
     r, f, L, x = np.empty(6), np.empty(3), np.empty((6, 6)), np.empty(n)
     history, cosine = len(out.u) > 0, 1.0
-    for k in range(len(steps.dt)):
-        dt, acc, th_m = steps.dt[k], steps.acc[k], steps.th[k]
-        w = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2])
+    for k in range(len(intervals)):
+        dt, w = intervals[k], (rate[k, 0], rate[k, 1], rate[k, 2])
         draw(P, factor, spread, points)
         _predict(th, c, Turn(w, dt, euler), world, points.columns, shifted, moved)
         moments(moved, points.columns, other, moves)
@@ -238,16 +238,16 @@ def _advance(
             c.fill(math.nan)
             P.fill(math.nan)
         cosine = _lesser(abs(math.cos(th[1])), cosine)
-        seen = not (math.isnan(th_m[0]) or math.isnan(th_m[1]) or math.isnan(th_m[2]))
+        seen = not (math.isnan(th_m[k, 0]) or math.isnan(th_m[k, 1]) or math.isnan(th_m[k, 2]))
         if seen:
             for i in range(3):
-                read[i] = nearest_turn(th_m[i], read[i])
+                read[i] = nearest_turn(th_m[k, i], read[i])
             cosine = _lesser(abs(math.cos(read[1])), cosine)
             of_encoders = attitude(read, world.axes, world.signs)
             watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, level)
         take = updating(gate, level)
         for i in range(3):
-            r[i] = acc[i] if take and admitted(i, gate, level) else math.nan
+            r[i] = acc[k, i] if take and admitted(i, gate, level) else math.nan
             r[3 + i] = read[i] - th[i] if take and seen else math.nan
         draw(P, factor, spread, points)
         _read(th, c, world, points.columns, shifted, f, z)

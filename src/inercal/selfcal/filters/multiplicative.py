@@ -133,17 +133,17 @@ def _advance(
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate = model
+    intervals, rates, acc, th = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted, of_points = empty_points(n), np.empty(p), empty_moments(n, 3)
     z, r, L, x, spare = np.zeros((2 * n + 1, 3)), np.empty(3), np.empty((3, 3)), np.empty(n), np.empty(n)
-    row = Row(np.arange(3), np.empty(3), 3)
+    row = Row(np.arange(3), np.empty(3), np.array([3]))
     history = len(out.u) > 0
     cosine = 1.0
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
-    for k in range(len(steps.dt)):
-        dt, acc, th = steps.dt[k], steps.acc[k], steps.th[k]
-        w = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2])
+    for k in range(len(intervals)):
+        dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         draw(P, factor, spread, points)
         q = _predict(q, c, w, dt, world, points.columns, shifted, z)
         moments(z, points.columns, other, of_points)
@@ -155,10 +155,10 @@ def _advance(
             P[i, i] += noise.angle_random_walk * noise.angle_random_walk * dt
             for j in range(3, n):
                 P[i, j], P[j, i] = of_points.cross[j, i], of_points.cross[j, i]
-        seen = not (math.isnan(th[0]) or math.isnan(th[1]) or math.isnan(th[2]))
+        seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):
-                angles[i] = nearest_turn(th[i], angles[i])
+                angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             of_encoders = attitude(angles, world.axes, world.signs)
             watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
@@ -184,7 +184,7 @@ def _advance(
             # large one it is that of the encoders, which is stated about the measured attitude as it is.
             q = _correct(q, c, x)
         for i in range(3):
-            r[i] = acc[i] if take and admitted(i, gate, near) else math.nan
+            r[i] = acc[k, i] if take and admitted(i, gate, near) else math.nan
         if not (math.isnan(r[0]) and math.isnan(r[1]) and math.isnan(r[2])):
             draw(P, factor, spread, points)
             _read(q, c, world.up, points.columns, shifted, z)

@@ -181,6 +181,7 @@ def _advance(
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate = model
+    intervals, rates, acc, th = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n + 8, 1.0, 0.0, 0.0)
     points, ck = empty_points(n), np.empty(p)
@@ -190,9 +191,8 @@ def _advance(
     history = len(out.u) > 0
     cosine = 1.0
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
-    for k in range(len(steps.dt)):
-        dt, acc, th = steps.dt[k], steps.acc[k], steps.th[k]
-        w = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2])
+    for k in range(len(intervals)):
+        dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         draw(P, factor, spread, points)
         walk = spread * 0.5 * noise.angle_random_walk * math.sqrt(dt)
         _propagate(q, c, points.columns, Turn(w, dt, walk), world, ck, Readings(centre, z, odd))
@@ -215,10 +215,10 @@ def _advance(
 
         # innovations: quaternion (4), accelerometers (3)
         r.fill(math.nan)
-        seen = not (math.isnan(th[0]) or math.isnan(th[1]) or math.isnan(th[2]))
+        seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):
-                angles[i] = nearest_turn(th[i], angles[i])
+                angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             of_encoders = attitude(angles, world.axes, world.signs)
             watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
@@ -234,8 +234,8 @@ def _advance(
             _noise_of_encoders(of_encoders, angles, world, noise.encoder, S)
         if take:
             for i in range(3):
-                if admitted(i, gate, near) and not math.isnan(acc[i]):
-                    r[4 + i] = acc[i] - centre[4 + i] - shift[4 + i]
+                if admitted(i, gate, near) and not math.isnan(acc[k, i]):
+                    r[4 + i] = acc[k, i] - centre[4 + i] - shift[4 + i]
                     count += 1
         for i in range(4, 7):
             S[i, i] += noise.accelerometer * noise.accelerometer

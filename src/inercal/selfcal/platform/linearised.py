@@ -118,8 +118,8 @@ def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Arra
 
 
 @kernel
-def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, room: Row) -> Row:
-    """Derivative of accelerometer ``i`` by the error state, in the arrays of ``room``, at least `WIDEST` long.
+def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, row: Row) -> None:
+    """Derivative of accelerometer ``i`` by the error state, put into a ``row`` with room for `WIDEST` entries.
 
     ``f`` (3,) [m/s^2] in p, ``up`` (3,) [m/s^2] in the frame of the encoders.
     """
@@ -129,7 +129,7 @@ def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, ro
     gz = 1.0 + c[17] if i == 2 else 0.0
     # g . (f x dtheta) = (g x f) . dtheta
     turn = cross((gx, gy, gz), f)
-    places, values = room.places, room.values
+    places, values = row.places, row.values
     for k in range(3):
         places[k], values[k] = k, turn[k]
     places[3], values[3] = 15 + i, 1.0
@@ -148,7 +148,7 @@ def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, ro
             places[count] = 24 + k
             values[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
             count += 1
-    return Row(places, values, count)
+    row.size[0] = count
 
 
 @kernel
