@@ -16,9 +16,17 @@ def words(picture):
 
 
 def test_every_mark_is_drawn():
-    x = np.arange(3.0)
-    marks = [Line(x, x, "line"), Dots(x, x, "dots", up=x), Band(x, x, x + 1.0, "band"), Band(np.arange(4.0), x, x + 1.0,
-             steps=True), Strips((0.0, 1.0)), Level(1.0, "level"), Bars(x, 0.0 * x, x, "bars"), Note((1.0, 1.0), "here")]  # fmt: skip
+    x, edges = np.arange(3.0), np.arange(4.0)
+    marks = [
+        Line(x, x, "line"),
+        Dots(x, x, "dots", up=x),
+        Band(x, x, x + 1.0, "band"),
+        Band(edges, x, x + 1.0, steps=True),
+        Strips((0.0, 1.0)),
+        Level(1.0, "level"),
+        Bars(x, 0.0 * x, x, "bars"),
+        Note((1.0, 1.0), "here"),
+    ]
     drawn = draw("A title", "What it is.", [[Panel(marks, Axis("across"), Axis("up"), "head")]], 2.0)
     assert (drawn.title, drawn.caption) == ("A title", "What it is.")
     assert {"line", "dots", "band", "level", "bars", "here", "across", "up", "head"} <= set(words(drawn))
