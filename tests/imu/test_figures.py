@@ -10,8 +10,9 @@ from scipy.io import loadmat
 from inercal.findings import Status
 from inercal.geometry.rotations import conjugate, exp
 from inercal.geometry.site import GravityInput, Site
+from inercal.imu import figures
+from inercal.imu.figures import main, page, pictures
 from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.multiposition.figures import pictures
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, simulate
 from inercal.inputs import Source
@@ -60,6 +61,15 @@ def test_a_sound_calibration(xsens, g_sensitivity):
     assert all(len(picture.svg) < 300_000 for picture in drawn)
     assert "Stars" not in drawn[1].caption
     assert len(render(calibration.estimate, drawn, "Xsens")) < 1_500_000
+
+
+def test_the_main_picture_comes_first_and_is_a_figure_too(xsens):
+    calibration = calibrate(xsens, SETTINGS)
+    shown = main(calibration)
+    assert shown == figures.pictures(calibration)[0]
+    assert shown.figure.axes
+    text = page(calibration)
+    assert text.index("the estimate is sound") < text.index(shown.title) < text.index("<h2>Findings</h2>")
 
 
 def test_accelerometers_alone(xsens):

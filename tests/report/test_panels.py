@@ -16,12 +16,12 @@ def words(picture):
 
 
 def test_every_mark_is_drawn():
-    x = np.arange(3.0)
+    x, edges = np.arange(3.0), np.arange(4.0)
     marks = [
         Line(x, x, "line"),
         Dots(x, x, "dots", up=x),
         Band(x, x, x + 1.0, "band"),
-        Band(np.arange(4.0), x, x + 1.0, steps=True),
+        Band(edges, x, x + 1.0, steps=True),
         Strips((0.0, 1.0)),
         Level(1.0, "level"),
         Bars(x, 0.0 * x, x, "bars"),

@@ -86,7 +86,7 @@ def _turn(joint: Turn, radius: float, colour: str) -> list[Mark]:
     angle = np.radians(np.linspace(-60.0, 215.0, 60))[:, None]
     arc = _seen((radius + 0.2) * joint.axis + 0.19 * (np.cos(angle) * first + np.sin(angle) * second))
     heading = float(np.degrees(np.arctan2(*(arc[-1] - arc[-3])[::-1])))
-    far = _seen((radius + 0.6) * joint.axis)
+    far = _seen((radius + 0.8) * joint.axis)
     return [
         Line(ends[:, 0], ends[:, 1], "", colour, 0.9, (0, (6, 2))),
         Line(arc[:, 0], arc[:, 1], "", colour, 1.4),
