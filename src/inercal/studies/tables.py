@@ -106,9 +106,9 @@ def _described(key: Key, default: Any) -> Any:
     return Field(
         default=absent,
         description=key.says,
-        ge=key.least,
+        ge=None if key.several else key.least,
         le=key.most,
-        min_length=1 if key.several else None,
+        min_length=int(key.least or 0) or None if key.several else None,
         examples=examples,
         json_schema_extra={"default": key.default} if key.default else None,
     )
