@@ -143,7 +143,7 @@ class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
 class ZeroTable(Strict):
     """A stretch at rest, wind off, at a known angle."""
 
-    start: _Instant = Field(description="of the stretch, in the record's time")
+    start: _Instant = Field(description="of the stretch, in the record's time", examples=["0 s"])
     end: _Instant = Field(description="of the stretch")
     angle: Annotated[
         Quantity,

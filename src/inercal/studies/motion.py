@@ -95,12 +95,35 @@ class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
     """What a simulation adds to the rigid, well-known model; nothing if absent."""
 
     pitch: Stated[AngleShaking] | None = Field(
-        default=None, title="Pitch", description="flexure of the sting in pitch"
+        default=None,
+        title="Pitch",
+        description="flexure of the sting in pitch",
+        examples=[{"rms": "0.1 deg", "low": "8 Hz", "high": "10 Hz"}],
     )
-    heave: Stated[Shaking] | None = Field(default=None, title="Heave", description="flexure along z")
-    axial: Stated[Shaking] | None = Field(default=None, title="Axial", description="flexure along x")
-    roll: Stated[Oscillation] | None = Field(default=None, title="Roll", description="roll coupled in")
-    yaw: Stated[Oscillation] | None = Field(default=None, title="Yaw", description="yaw coupled in")
+    heave: Stated[Shaking] | None = Field(
+        default=None,
+        title="Heave",
+        description="flexure along z",
+        examples=[{"rms": "0.03 g", "low": "8 Hz", "high": "10 Hz"}],
+    )
+    axial: Stated[Shaking] | None = Field(
+        default=None,
+        title="Axial",
+        description="flexure along x",
+        examples=[{"rms": "0.005 g", "low": "14 Hz", "high": "16 Hz"}],
+    )
+    roll: Stated[Oscillation] | None = Field(
+        default=None,
+        title="Roll",
+        description="roll coupled in; adds gyro_roll and gyro_yaw",
+        examples=[{"amplitude": "1 deg", "frequency": "8 Hz"}],
+    )
+    yaw: Stated[Oscillation] | None = Field(
+        default=None,
+        title="Yaw",
+        description="yaw coupled in; adds gyro_roll and gyro_yaw",
+        examples=[{"amplitude": "1 deg", "frequency": "8 Hz"}],
+    )
 
 
 def disturbances_of(
