@@ -198,6 +198,8 @@ def _type(schema: Schema, definitions: Mapping[str, Schema]) -> str:
     if "properties" in found or isinstance(found.get("additionalProperties"), Mapping):
         return "table"
     examples = found.get("examples", ())
+    if examples and found.get("type") in ("array", "integer"):
+        return f"{_plain_type(found, definitions)}, such as {_literal(examples[0])}"
     if examples:
         return ("quantity, such as " if "pattern" in found else "such as ") + ", ".join(
             map(_literal, examples)
@@ -221,7 +223,9 @@ def _plain_type(found: Schema, definitions: Mapping[str, Schema]) -> str:
 
 def _literal(value: object) -> str:
     """A value as TOML writes it."""
-    return code(f'"{value}"' if isinstance(value, str) else value)
+    from inercal.studies.commented import toml
+
+    return code(toml(value))
 
 
 # codes and terms ------------------------------------------------------------------------------------------------------

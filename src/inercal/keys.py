@@ -68,7 +68,7 @@ class Key:
     exact : bool
         A quantity that is refused with an uncertainty.
     least, most : float or None
-        Bounds of a plain number.
+        Bounds of a plain number; ``least`` of a list is its length.
     """
 
     says: str
@@ -110,9 +110,11 @@ def quantity(
     return dataclasses.field(default=value, metadata={"key": key})
 
 
-def quantities(says: str, dimension: str, *, example: list[str], bounds: Bounds = ANYTHING) -> Any:
-    """A field that a study states as a list of quantities, one or more; empty where the key is absent."""
-    key = Key(says, dimension, example=example, bounds=bounds, several=True)
+def quantities(
+    says: str, dimension: str, *, example: list[str], bounds: Bounds = ANYTHING, at_least: int = 1
+) -> Any:
+    """A field that a study states as a list of quantities; empty where the key is absent."""
+    key = Key(says, dimension, example=example, bounds=bounds, several=True, least=at_least)
     return dataclasses.field(default=(), metadata={"key": key})
 
 

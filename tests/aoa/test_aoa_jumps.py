@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from new_studies import FILL
 from sting_study import BASE, layout, scenario, study
 
 from inercal.aoa.paper.delay import relative_delay
@@ -39,7 +40,7 @@ def test_the_whole_command_needs_no_memory_for_the_time_in_between(tmp_path):
     settings = study(motion=replace(BASE, duration=12.0, sample_rate=250.0))
     made = simulate(settings, np.random.default_rng(1)).recording
     of = tmp_path / "aoa.toml"
-    assert run(["new", "aoa", "--out", str(of), "--quiet"]) == 0
+    assert run(["new", "aoa", "--out", str(of), "--quiet", *FILL]) == 0
     files = []
     for jump in JUMPS:
         files.append(tmp_path / f"{jump:g}.csv")

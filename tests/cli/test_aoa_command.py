@@ -11,6 +11,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from new_studies import FILL
 
 from inercal.aoa import settings
 from inercal.cli import aoa as command
@@ -29,7 +30,7 @@ def folder(tmp_path_factory) -> Path:
     """The study that `new` writes, a model that swings for 6 s, and one that pauses at four angles."""
     path = tmp_path_factory.mktemp("aoa")
     study, quick = path / "aoa.toml", ["--set", "motion.sample_rate=250 Hz", "--quiet"]
-    assert run(["new", "aoa", "--out", str(study), "--quiet"]) == 0
+    assert run(["new", "aoa", "--out", str(study), "--quiet", *FILL]) == 0
     text = study.read_text().replace('"45(26) deg"', '"45 deg"').replace('"0(300) m"', '"0 m"')
     study.write_text(text)
     begin, end = text.index("[motion]"), text.index("[disturbances]")
@@ -341,7 +342,7 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(arguments, words, caps
     text = Path("model.csv").read_text()
     rows = [line.split(",") for line in text.splitlines()]
     if not Path("ten.csv").exists():
-        run(["new", "selfcal", "--out", "selfcal.toml", "--quiet"])
+        run(["new", "selfcal", "--out", "selfcal.toml", "--quiet", *FILL])
         Path("gyro_only.csv").write_text("".join(f"{row[0]},{row[4]}\n" for row in rows))
         Path("one_axis.csv").write_text("".join(f"{row[0]},{row[1]},{row[3]},{row[4]}\n" for row in rows))
         Path("counts.csv").write_text(text.replace("a1 [g]", "a1 [count]"))

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from new_studies import filled
 
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.studies.template import imu_template
 from rows import for_each
 
 
@@ -128,7 +128,7 @@ def test_apply_refuses_what_the_calibration_is_not_for(simulated, capsys):
 def test_new_writes_what_calibrate_reads(simulated, capsys, monkeypatch):
     monkeypatch.chdir(simulated)
     (simulated / "imu.toml").unlink()
-    assert run(["new", "imu", "log.csv"]) == 0
+    assert run(["new", "imu", "log.csv", "--set", "site.latitude=48 deg"]) == 0
     assert run(["inspect", "log.csv", "--map", "imu-map.toml", "--json"]) == 0
     out = capsys.readouterr().out
     data = json.loads(out[out.index("{") :])
@@ -306,7 +306,7 @@ def test_interrupted_while_a_library_is_loaded():
 
 def test_an_untouched_template_calibrates(simulated, capsys):
     """The study that `new` writes is a study: gravity then is uncertain by what it is over the Earth."""
-    (simulated / "imu.toml").write_text(imu_template(), "utf-8")
+    (simulated / "imu.toml").write_text(filled("imu"), "utf-8")
     assert run(calibrate(simulated, "--json", "--quiet")) == 0
     data = json.loads(capsys.readouterr().out)
     share = {item["source"]: item["share"].get("K1_x", 0) for item in data["budget"]}

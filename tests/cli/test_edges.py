@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from new_studies import filled
 
 from inercal.cli import run
-from inercal.studies.template import imu_template
 from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="a shell and file names as on POSIX")
@@ -24,7 +24,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     rows = [f"{i / 10},0.1,0.2,9.8,{i % 3},{i % 5},0.3" for i in range(50)]
     rows[20] = rows[20].replace(",0.2,", ",,")
     Path("log.csv").write_text(CSV + "\n".join(rows) + "\n")
-    Path("imu.toml").write_text(imu_template(), "utf-8")
+    Path("imu.toml").write_text(filled("imu"), "utf-8")
     columns = [f"[columns.{name.split(' [')[0]}]\nfrom = {name!r}" for name in CSV.strip().split(",")]
     units = [name.split("[")[1][:-1] for name in CSV.strip().split(",")]
     Path("map.toml").write_text("".join(f'{c}\nunit = "{u}"\n' for c, u in zip(columns, units, strict=True)))
@@ -202,7 +202,7 @@ def test_a_decimal_comma_is_recognised(folder, capsys):
 
 def test_new_names_the_files_it_wrote_and_asks_for_the_rate(folder, capsys):
     Path("raw.csv").write_text("ax,ay,az\n" + "".join(f"0.{i % 7},0.2,9.8\n" for i in range(50)))
-    assert run(["new", "imu", "raw.csv", "--out", "my.toml"]) == 0
+    assert run(["new", "imu", "raw.csv", "--set", "site.latitude=48 deg", "--out", "my.toml"]) == 0
     next_line = "# Next: inercal calibrate imu raw.csv --map my-map.toml --study my.toml\n"
     assert next_line in Path("my.toml").read_text("utf-8")
     capsys.readouterr()

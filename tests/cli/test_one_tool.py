@@ -5,9 +5,11 @@ import re
 import shutil
 import subprocess
 import tomllib
+from functools import partial
 from itertools import pairwise
 
 import pytest
+from new_studies import FILL, filled
 
 from inercal.cli import run
 from inercal.cli.completion import script
@@ -15,7 +17,6 @@ from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES
 from inercal.instruments.terms import term
 from inercal.studies.load import load_aoa_study, load_imu_study, load_selfcal_study, load_turntable_study
-from inercal.studies.template import aoa_template, imu_template, selfcal_template, turntable_template
 
 BAD_VERDICT = 1
 OPTION = re.compile(r"^ {2}(--[\w-]+)(?: (PATH|STR\.\.\.|STR|INT|CHOICE))?: (.*)$", re.MULTILINE)
@@ -29,10 +30,10 @@ READ_A_STUDY = {
 }
 WITHOUT_A_FILE = {"monitor"}
 TEMPLATES = {
-    "imu": (imu_template, load_imu_study),
-    "turntable": (turntable_template, load_turntable_study),
-    "selfcal": (selfcal_template, load_selfcal_study),
-    "aoa": (aoa_template, load_aoa_study),
+    "imu": (partial(filled, "imu"), load_imu_study),
+    "turntable": (partial(filled, "turntable"), load_turntable_study),
+    "selfcal": (partial(filled, "selfcal"), load_selfcal_study),
+    "aoa": (partial(filled, "aoa"), load_aoa_study),
 }
 
 
@@ -80,7 +81,7 @@ def test_common_options_are_where_they_apply(helps):
         assert {"--json", "--quiet"} <= given, command
         assert ("--out" in given) == (command not in WITHOUT_A_FILE), command
         assert ("--map" in given) == (command in READ_A_RECORD), command
-        assert ("--set" in given) == (command in READ_A_STUDY), command
+        assert ("--set" in given) == (command in READ_A_STUDY or command.startswith("new ")), command
     assert set(helps) >= READ_A_RECORD | READ_A_STUDY | WITHOUT_A_FILE
 
 
@@ -153,7 +154,7 @@ def results(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for kind in ("turntable", "selfcal"):
-            assert run(["new", kind, "--quiet"]) == 0
+            assert run(["new", kind, "--quiet", *FILL]) == 0
         small = ["--set", "positions.grid={phi1=6, phi2=6}"]
         assert run(["simulate", "turntable", "turntable.toml", *small, "--out", "tt.csv", "--quiet"]) == 0
         commands = {
@@ -199,7 +200,7 @@ def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_pa
     """An example, or a simulated test, with a column of 21.5 and 22.5 degC by turns."""
     monkeypatch.chdir(tmp_path)
     name = command.split()[-1]
-    assert run(["new", name, "--quiet"]) == 0
+    assert run(["new", name, "--quiet", *FILL]) == 0
     small = ["--set", "positions.grid={phi1=6, phi2=6}"] if name == "turntable" else []
     assert run(["simulate", name, f"{name}.toml", *small, "--seed", "1", "--out", "made.csv", "--quiet"]) == 0
     head, *rows = (tmp_path / "made.csv").read_text("utf-8").splitlines()
@@ -308,7 +309,7 @@ def test_a_whole_number_is_one(command, tmp_path, capsys, monkeypatch):
 def test_a_kind_of_motion_that_is_set_takes_the_place_of_the_other(tmp_path):
     """The keys of the old kind go; those that the new one needs are still asked for."""
     path = tmp_path / "aoa.toml"
-    path.write_text(aoa_template(), encoding="utf-8")
+    path.write_text(filled("aoa"), encoding="utf-8")
     swept = ["motion.first=0 deg", "motion.kind=static", "motion.last=10 deg"]
     assert load_aoa_study(path, swept).motion.kind == "static"
 
@@ -317,7 +318,7 @@ def test_a_missing_unit_gets_an_example_of_its_own_key(tmp_path):
     from inercal.errors import StudyError
 
     path = tmp_path / "selfcal.toml"
-    path.write_text(selfcal_template(), encoding="utf-8")
+    path.write_text(filled("selfcal"), encoding="utf-8")
     with pytest.raises(StudyError, match=r"noise\.accelerometer: .*without a unit") as caught:
         load_selfcal_study(path, ["noise.accelerometer=10"])
     assert "9.81" not in str(caught.value)

@@ -13,6 +13,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from new_studies import FILL
 from paper_study import TRUTH
 
 from inercal.cli import run
@@ -35,7 +36,7 @@ def folder(tmp_path_factory) -> Path:
     """The study of the paper at the best path, its simulated recording, and a piece of it."""
     path = tmp_path_factory.mktemp("selfcal")
     study, out = path / "selfcal.toml", path / "platform.csv"
-    assert run(["new", "selfcal", "--out", str(study), "--quiet"]) == 0
+    assert run(["new", "selfcal", "--out", str(study), "--quiet", *FILL]) == 0
     text = study.read_text().replace('"45(26) deg"', '"40 deg"').replace('"0(300) m"', '"0 m"')
     turns = next(line for line in text.splitlines() if line.startswith("turns = [["))
     study.write_text(text.replace(turns, 'path = "best"'))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from new_studies import FILL
 from numpy.testing import assert_allclose, assert_array_equal
 
 from inercal.aoa.reading.from_record import recording_of
@@ -22,7 +23,7 @@ PAUSES = 'motion={kind="pitch-pause", first="0 deg", last="4 deg", step="2 deg",
 def folder(tmp_path, monkeypatch) -> Path:
     """A folder to work in, with the study that `inercal new aoa` writes."""
     monkeypatch.chdir(tmp_path)
-    assert run(["new", "aoa", "--quiet"]) == 0
+    assert run(["new", "aoa", "--quiet", *FILL]) == 0
     return tmp_path
 
 
@@ -127,7 +128,7 @@ def test_a_study_without_motion_says_so(folder, capsys):
 
 
 def test_a_study_of_another_kind(folder, capsys):
-    assert run(["new", "selfcal", "--quiet"]) == 0
+    assert run(["new", "selfcal", "--quiet", *FILL]) == 0
     capsys.readouterr()
     assert run(["simulate", "aoa", "selfcal.toml", "--out", "run.csv"]) == 2
     said_once(capsys.readouterr(), "selfcal.toml", "a study for `inercal selfcal`")
@@ -136,7 +137,7 @@ def test_a_study_of_another_kind(folder, capsys):
 def test_new_for_a_recording_that_says_what_it_holds_needs_no_map(folder, capsys):
     assert simulated("--out", "run.csv", "--quiet") == 0
     capsys.readouterr()
-    assert run(["new", "aoa", "run.csv", "--out", "s.toml", "--json", "--quiet"]) == 0
+    assert run(["new", "aoa", "run.csv", "--out", "s.toml", "--json", "--quiet", *FILL]) == 0
     assert json.loads(capsys.readouterr().out)["result"] == {"study": "s.toml", "map": None}
     assert "# Next: inercal aoa run.csv --study s.toml\n" in Path("s.toml").read_text()
     assert load_aoa_study("s.toml").motion is not None

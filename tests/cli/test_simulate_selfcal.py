@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from new_studies import FILL
 from numpy.testing import assert_allclose, assert_array_equal
 from paper_study import TRUTH
 
@@ -28,7 +29,7 @@ SHORT = [
 def folder(tmp_path, monkeypatch) -> Path:
     """A folder to work in, with the study that `inercal new selfcal` writes."""
     monkeypatch.chdir(tmp_path)
-    assert run(["new", "selfcal", "--quiet"]) == 0
+    assert run(["new", "selfcal", "--quiet", *FILL]) == 0
     return tmp_path
 
 
@@ -121,7 +122,7 @@ def test_a_study_without_plan_or_truth_says_so(table, folder, capsys):
 
 
 def test_a_study_of_another_kind(folder, capsys):
-    assert run(["new", "turntable", "--quiet"]) == 0
+    assert run(["new", "turntable", "--quiet", *FILL]) == 0
     capsys.readouterr()
     assert run(["simulate", "selfcal", "turntable.toml", "--out", "run.csv"]) == 2
     said_once(capsys.readouterr(), "turntable.toml", "a study for `inercal calibrate turntable`")
@@ -132,7 +133,7 @@ def test_a_study_of_another_kind(folder, capsys):
 def test_new_for_a_recording_that_says_what_it_holds_needs_no_map(folder, capsys):
     assert simulated("--out", "run.csv", "--quiet") == 0
     capsys.readouterr()
-    assert run(["new", "selfcal", "run.csv", "--out", "s.toml", "--json", "--quiet"]) == 0
+    assert run(["new", "selfcal", "run.csv", "--out", "s.toml", "--json", "--quiet", *FILL]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["result"] == {"study": "s.toml", "map": None}
     assert "# Next: inercal selfcal run.csv --study s.toml\n" in Path("s.toml").read_text()
@@ -144,7 +145,7 @@ def test_new_for_a_recording_without_units_guesses_a_map(folder, capsys):
     head, rest = Path("run.csv").read_text().split("\n", 1)
     plain = ",".join(title.partition(" ")[0] for title in head.split(","))
     Path("plain.csv").write_text(f"{plain}\n{rest}")
-    assert run(["new", "selfcal", "plain.csv", "--out", "s.toml", "--quiet"]) == 0
+    assert run(["new", "selfcal", "plain.csv", "--out", "s.toml", "--quiet", *FILL]) == 0
     guessed = tomllib.loads(Path("s-map.toml").read_text())["columns"]
     assert {"t", "acc_x", "acc_y", "acc_z"} <= set(guessed)
     assert guessed["acc_x"]["unit"] == "m/s^2"

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from new_studies import FILL
 
 from inercal.cli import run
 from inercal.rigs.plans import named
@@ -299,7 +300,7 @@ def test_a_record_of_dwells_needs_no_time(folder, capsys):
 def test_new_writes_a_study_that_runs_without_a_map_where_the_header_says_all(folder, capsys):
     assert run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet"]) == 0
     capsys.readouterr()
-    data = as_json(["new", "turntable", "r.csv"], capsys)
+    data = as_json(["new", "turntable", "r.csv", *FILL], capsys)
     assert data["result"] == {"study": "turntable.toml", "map": None}
     assert not Path("turntable-map.toml").exists()
     text = Path("turntable.toml").read_text("utf-8")
@@ -319,7 +320,7 @@ def test_new_chooses_the_instrument_of_the_record_and_guesses_a_map_where_it_mus
     rows = [line.split(",", 2)[2] for line in Path("r.csv").read_text().splitlines()[1:]]
     Path("plain.csv").write_text("\n".join(["phi1_deg,phi2_deg,ax,ay,az", *rows]) + "\n")
     capsys.readouterr()
-    data = as_json(["new", "turntable", "plain.csv"], capsys)
+    data = as_json(["new", "turntable", "plain.csv", *FILL], capsys)
     assert data["result"] == {"study": "turntable.toml", "map": "turntable-map.toml"}
     assert '\nkind = "accelerometer"' in Path("turntable.toml").read_text("utf-8")
     command = [
@@ -337,7 +338,7 @@ def test_new_chooses_the_instrument_of_the_record_and_guesses_a_map_where_it_mus
     assert abs(scale["value"] - 1.0) < 5 * scale["u"]
     Path("bare.csv").write_text("\n".join(rows) + "\n")
     refused(
-        ["new", "turntable", "bare.csv", "--out", "x.toml"],
+        ["new", "turntable", "bare.csv", "--out", "x.toml", *FILL],
         capsys,
         "bare.csv",
         "expected a header such as phi1",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from new_studies import FILL
 
 from inercal.cli import run
 
@@ -124,7 +125,7 @@ HEADS = {"log.csv": LOG, "model.csv": MODEL, "table.csv": TABLE, "platform.csv":
 def folder(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("absurd")
     for kind in ("imu", "turntable", "selfcal", "aoa"):
-        assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet"]) == 0
+        assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet", *FILL]) == 0
     names = [f"{name}_{axis}" for name in ("K1", "S") for axis in "xyz"]
     whole = {
         "command": "calibrate imu",

@@ -3,6 +3,7 @@
 import resource
 
 import pytest
+from new_studies import FILL
 
 from inercal.cli import run
 from rows import for_each
@@ -12,7 +13,7 @@ from rows import for_each
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("studies")
     for kind in ("turntable", "selfcal", "aoa"):
-        assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet"]) == 0
+        assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet", *FILL]) == 0
     return path
 
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from new_studies import FILL
 
 from inercal._files import write_text
 from inercal.cli import run
@@ -165,7 +166,7 @@ def test_a_pipe_as_a_file_is_refused(words, expected, tmp_path, monkeypatch, cap
     """A file is read more than once; a pipe would be waited for without end."""
     monkeypatch.chdir(tmp_path)
     Path("log.csv").write_text(LOG)
-    assert run(["new", "turntable", "--quiet"]) == 0
+    assert run(["new", "turntable", "--quiet", *FILL]) == 0
     os.mkfifo(next(word.rpartition("=")[2] for word in words.split() if "PIPE" in word))
     capsys.readouterr()
     assert run([*words.split(), "--quiet"]) == 2

@@ -20,6 +20,7 @@ from typing import IO
 
 import numpy as np
 import pytest
+from new_studies import FILL
 
 from inercal.cli import main, run
 from inercal.cli.tree import COMMANDS as TREE
@@ -87,7 +88,7 @@ def folder(tmp_path_factory) -> Path:
     write_record(record, path / "log.csv")
     (path / "imu.toml").write_text('[site]\ngravity = "9.81(1) m/s^2"\n[imu]\nstatic_start = "10 s"\n')
     for kind in ("turntable", "selfcal", "aoa"):
-        assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet"]) == 0
+        assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet", *FILL]) == 0
     smaller = {"turntable": ("phi1 = 36, phi2 = 36", "phi1 = 5, phi2 = 5"), "selfcal": ('"0.2 s"', '"2 s"')}
     for kind, (old, new) in smaller.items():
         text = (path / f"{kind}.toml").read_text("utf-8")

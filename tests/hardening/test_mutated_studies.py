@@ -6,18 +6,19 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from new_studies import filled
 
 from inercal.errors import StudyError
 from inercal.studies.aoa import aoa_study
 from inercal.studies.imu import imu_study
 from inercal.studies.load import load_aoa_study, load_selfcal_study
 from inercal.studies.selfcal import selfcal_study
-from inercal.studies.template import aoa_template, imu_template, selfcal_template, turntable_template
 from inercal.studies.turntable import turntable_study
 
 # the seed of the examples is fixed: that of each test's own source
@@ -25,11 +26,11 @@ FIXED = settings(
     derandomize=True, deadline=None, max_examples=120, suppress_health_check=list(HealthCheck), database=None
 )
 KINDS = {
-    "imu": (imu_template, imu_study),
+    "imu": (partial(filled, "imu"), imu_study),
     # the grid is made small: what is checked is the reading
-    "turntable": (lambda: turntable_template().replace("36", "6"), turntable_study),
-    "selfcal": (selfcal_template, selfcal_study),
-    "aoa": (aoa_template, aoa_study),
+    "turntable": (lambda: filled("turntable").replace("36", "6"), turntable_study),
+    "selfcal": (partial(filled, "selfcal"), selfcal_study),
+    "aoa": (partial(filled, "aoa"), aoa_study),
 }
 READ = {"selfcal": load_selfcal_study, "aoa": load_aoa_study}
 TEXTS = {kind: template().encode() for kind, (template, _) in KINDS.items()}

@@ -7,16 +7,16 @@ import re
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from new_studies import filled
 
 from inercal.errors import StudyError
 from inercal.imu.settings import ImuSettings
 from inercal.studies.imu import imu_study
 from inercal.studies.load import load_imu_study
-from inercal.studies.template import imu_template
 from rows import for_each
 
 RELAXED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-TEMPLATE = re.sub(r"(?m)^# (\w+ = )", r"\1", imu_template()).encode()
+TEMPLATE = re.sub(r"(?m)^# (\w+ = )", r"\1", filled("imu")).encode()
 SITE = '[site]\ngravity = "9.8 m/s^2"\n'
 IMU = SITE + "[imu]\n"
 

@@ -5,10 +5,10 @@ import re
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from new_studies import filled
 
 from inercal.errors import StudyError
 from inercal.studies.load import load_turntable_study
-from inercal.studies.template import turntable_template
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.settings import TurntableSettings
 from rows import for_each
@@ -20,7 +20,7 @@ RELAXED = settings(
 TEMPLATE = re.sub(
     r"(?m)^# (\w+ = )",
     r"\1",
-    turntable_template().replace("36", "6"),
+    filled("turntable").replace("36", "6"),
 ).encode()
 HEAD = '[site]\nlatitude = "39.1 deg"\n[rig]\nkind = "two_axis_turntable"\n'
 ERRORS = HEAD + "[rig.errors]\n"

@@ -3,7 +3,6 @@
 import copy
 import json
 import math
-import re
 import tomllib
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
+from new_studies import filled
 from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
@@ -18,12 +18,10 @@ from inercal.errors import StudyError
 from inercal.instruments.terms import TERMS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
-from inercal.selfcal.settings import KINDS, Gating, SelfcalSettings
+from inercal.selfcal.settings import KINDS, Gating
 from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
-from inercal.studies.template import selfcal_template
-from rows import for_each
 
 # The study of the interface description, to the letter.
 CONTRACT = """
@@ -59,8 +57,7 @@ gating = "off"
 """  # noqa: E501
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
-KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
-TEMPLATE = selfcal_template()
+TEMPLATE = filled("selfcal")
 
 
 def study(**tables):
@@ -268,7 +265,7 @@ REFUSED = {
 }  # fmt: skip
 
 
-@for_each(("override", "words"), REFUSED.items())
+@pytest.mark.parametrize(("override", "words"), REFUSED.items())
 def test_one_sentence_for_what_is_wrong(write, override, words):
     with pytest.raises(StudyError, match=words) as error:
         load_selfcal_study(write(CONTRACT), [override])
@@ -276,7 +273,7 @@ def test_one_sentence_for_what_is_wrong(write, override, words):
     assert str(error.value).startswith(str(error.value.where))
 
 
-@for_each(
+@pytest.mark.parametrize(
     ("tables", "words"),
     [
         ({"noise": None}, "noise: missing, expected a value"),
@@ -316,42 +313,9 @@ def test_the_template_loads_as_written_and_is_the_paper():
     assert found.site.latitude_u == pytest.approx(26 * DEG)
 
 
-def test_every_key_and_table_of_the_template_has_its_comment():
-    lines = TEMPLATE[TEMPLATE.index("schema = 1") :].splitlines()
-    for line in lines:
-        assert len(line) <= 120
-        if re.match(r"(# )?\w+ = ", line):
-            assert KEY.fullmatch(line), line
-        elif line.startswith(("[", "# [")):
-            assert re.fullmatch(r"(# )?\[[\w.]+\]  +# \S.*", line), line
-
-
-def test_every_key_is_in_the_template():
-    text = re.sub(r"(?m)^# ((\w+) = |\[)", r"\1", TEMPLATE)
-    whole = tomllib.loads(re.sub("(?m)^path = .*", "", text))
-    assert set(whole) == set(SCHEMA["$defs"]["SelfcalStudyFile"]["properties"])
-    of_file = SCHEMA["$defs"]["SelfcalStudyFile"]["properties"]
-    for name, given_keys in whole.items():
-        if name != "schema":
-            keys = set(SCHEMA["$defs"][of_file[name]["$ref"].rpartition("/")[2]]["properties"])
-            assert set(given_keys) | ({"path"} if name == "plan" else set()) == keys
-    VALIDATOR.validate(whole)
-    assert isinstance(selfcal_study(whole, "t.toml"), SelfcalSettings)
-
-
-@for_each("line", [line for line in TEMPLATE.splitlines() if re.match(r"# \w+ = ", line)])
-def test_every_commented_key_loads_alone(line):
-    text = TEMPLATE.replace(line, line.removeprefix("# "))
-    if line.startswith("# path"):
-        text = re.sub("(?m)^turns = \\[.*", "", text)
-    data = tomllib.loads(text)
-    VALIDATOR.validate(data)
-    assert selfcal_study(data, "t.toml").given != selfcal_study(tomllib.loads(TEMPLATE), "t.toml").given
-
-
 def test_the_next_command_of_the_template():
-    assert "# Next: inercal simulate selfcal s.toml --out simulated.csv\n" in selfcal_template((), "s.toml")
-    assert "# Next: inercal selfcal a.csv --study s.toml\n" in selfcal_template(["a.csv"], "s.toml")
+    assert "# Next: inercal simulate selfcal s.toml --out simulated.csv\n" in filled("selfcal", (), "s.toml")
+    assert "# Next: inercal selfcal a.csv --study s.toml\n" in filled("selfcal", ["a.csv"], "s.toml")
 
 
 SCALARS = st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=8), st.just("1 deg"))

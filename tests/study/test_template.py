@@ -7,14 +7,20 @@ from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
+from new_studies import filled
+from sting_text import calibrated
 
+from inercal.errors import StudyError
 from inercal.rigs.tables import slots
-from inercal.studies.load import load_imu_study
+from inercal.studies import load as load_module
+from inercal.studies.aoa import aoa_study
+from inercal.studies.imu import imu_study
 from inercal.studies.schema import json_schema
-from inercal.studies.template import imu_template, turntable_template
+from inercal.studies.selfcal import selfcal_study
+from inercal.studies.template import template
 from inercal.studies.turntable import turntable_study
+from inercal.studies.ways import PATHS, POSITIONS
 from inercal.units import parse_unit
-from rows import for_each
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
 SCHEMA = json_schema()
@@ -32,134 +38,165 @@ INSTRUMENTS = {
 }
 
 
-def load(tmp_path, text):
-    path = tmp_path / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_imu_study(path)
+READ = {"imu": imu_study, "turntable": turntable_study, "selfcal": selfcal_study, "aoa": aoa_study}
+#: tables that hold one of several keys, and what stands beside a key
+INSTEAD = {"positions": POSITIONS, "plan": PATHS, "sensors.a1": ("axis", "angle")}
 
 
-def uncommented(text):
-    return re.sub(r"^# (\w+ = )", r"\1", text, flags=re.MULTILINE)
+def lines_of(text):
+    """(table, whether it is in force, key, line) of every key."""
+    table, there = "", True
+    for line in text.splitlines():
+        if found := re.match(r"(# )?\[([\w.]+)\]", line):
+            there, table = found[1] is None, found[2]
+        elif found := re.match(r"(?:# )?(\w+) = ", line):
+            yield table, there, found[1], line
 
 
-def test_it_loads_as_written_and_fits_the_schema(tmp_path):
-    study = load(tmp_path, imu_template())
+def commented_keys():
+    """Kind, table and line of every key that is commented out in a table that is in force."""
+    for kind in READ:
+        for table, there, _, line in lines_of(filled(kind)):
+            if there and line.startswith("# ") and table != "motion":
+                yield kind, table, line
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_filled_in_it_loads_as_written_and_fits_the_schema(kind):
+    data = tomllib.loads(filled(kind))
+    study = READ[kind](data, "t.toml")
     assert study.site.latitude == pytest.approx(math.radians(45.0))
-    Draft202012Validator(json_schema()).validate(tomllib.loads(imu_template()))
+    assert study.site.latitude_u == pytest.approx(math.radians(26.0))
+    Draft202012Validator(SCHEMA).validate(data)
 
 
-def test_unedited_its_gravity_is_that_of_anywhere_on_earth(tmp_path):
-    site = load(tmp_path, imu_template()).site
+def test_anywhere_in_the_north_its_gravity_is_that_of_anywhere_on_earth():
+    site = imu_study(tomllib.loads(filled("imu")), "t.toml").site
     u = math.hypot(*(each.u * each.sensitivity for each in site.inputs))
     assert site.gravity - 2 * u < 9.780 < 9.832 < site.gravity + 2 * u
     assert u < 0.03
 
 
-def of_method(method: str) -> str:
-    """The template for a method, with everything taken from its comment that is for it."""
-    kept = []
-    others = {"ferraris", "aided"} - {method}
-    skipped = False
-    for line in imu_template().splitlines():
-        if found := re.match(r"# \[imu\.(\w+)", line):
-            skipped = found[1] in others
-        elif line.startswith("[") or (line.startswith("# [") and not found):
-            skipped = False
-        if not skipped:
-            kept.append(re.sub(r"^# (\w+ = |\[)", r"\1", line))
-    text = "\n".join(kept).replace('method = "multiposition"', f'method = "{method}"')
-    unheeded = {"ferraris": "static_start|g_sensitivity|bias_drift", "aided": "static_start|bias_drift"}.get(
-        method
-    )
-    return re.sub(f"(?m)^({unheeded}) = .*$", "", text) if unheeded else text
-
-
-@pytest.mark.parametrize("method", ["multiposition", "ferraris", "aided"])
-def test_every_key_is_there_and_loads_when_uncommented(tmp_path, method):
-    text = of_method(method)
-    study = load(tmp_path, text)
-    whole = tomllib.loads(text)
-    Draft202012Validator(json_schema()).validate(whole)
-    assert list(whole) == list(SCHEMA["$defs"]["ImuStudyFile"]["properties"])
-    for name, given in whole.items():
-        if name not in ("schema", "imu"):
-            assert list(given) == list(SCHEMA["$defs"][f"{name.title()}Table"]["properties"])
-    if method == "multiposition":
-        assert study.static_start == 50.0
-        keys = list(SCHEMA["$defs"]["ImuTable"]["properties"])
-        assert set(whole["imu"]) == set(keys) - {"ferraris", "aided"}
-    else:
-        table = "FerrarisTable" if method == "ferraris" else "AidedTable"
-        assert set(whole["imu"][method]) == set(SCHEMA["$defs"][table]["properties"])
-        assert type(study.method).__name__ == f"{method.title()}Settings"
-
-
-@pytest.mark.parametrize("template", [imu_template, turntable_template])
-def test_every_key_and_table_has_its_comment_on_the_line(template):
-    body = template().partition("schema = 1")
-    for line in (body[1] + body[2]).splitlines():
-        assert len(line) <= 110
-        if "= " in line:
+@pytest.mark.parametrize("kind", READ)
+def test_every_key_and_table_has_its_comment_on_the_line(kind):
+    text = template(kind)
+    for line in text[text.index("schema = 1") :].splitlines():
+        assert len(line) <= 120
+        if re.match(r"(# )?\w+ = ", line):
             assert KEY.fullmatch(line), line
-        elif "[" in line:
+        elif line.startswith(("[", "# [")):
             assert re.fullmatch(r"(# )?\[[\w.]+\]  +# \S.*", line), line
+        else:
+            assert not line or re.fullmatch(r" {36}# \S.*", line), line
 
 
-def test_the_study_of_a_turntable_loads_as_written_and_fits_the_schema():
-    data = tomllib.loads(turntable_template())
-    study = turntable_study(data, "t.toml")
-    assert (len(study.chain.factors), len(study.plan)) == (11, 1296)
-    assert study.site.latitude_u == pytest.approx(math.radians(26.0))
+def keys_of(schema, path=""):
+    """Dotted keys of a schema, tables that a template writes on one line as one key."""
+    for key, field in schema["properties"].items():
+        inner = SCHEMA["$defs"][field["$ref"].rpartition("/")[2]] if "$ref" in field else {}
+        if "properties" in inner and "examples" not in field:
+            yield from keys_of(inner, f"{path}{key}.")
+        else:
+            yield f"{path}{key}"
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_every_key_is_there(kind):
+    """All but errors that a table of two axes does not have, more sensors, and a second table of the same keys."""
+    shown = {f"{table}.{key}".lstrip(".") for table, _, key, _ in lines_of(template(kind))}
+    known = set(keys_of(SCHEMA["$defs"][f"{kind.capitalize()}StudyFile"]))
+    assert {key for key in shown - known if not key.startswith("instrument.coefficients.")} == set()
+    alike = r"sensors\.(a[2-9]|a\d\d|gyro_\w+)\..*|prior\.axial\..*|imu\.aided\.rig\.(errors|base|limits)\..*"
+    two, three = (
+        {slot.name for slot in slots(each)} for each in ("two_axis_turntable", "three_axis_turntable")
+    )
+    others = {f"rig.errors.{name}" for name in three - two} | {"instrument.coefficients"}
+    assert {key for key in known - shown - others if not re.fullmatch(alike, key)} == set()
+
+
+@pytest.mark.parametrize(("kind", "table", "line"), list(commented_keys()))
+def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
+    calibrated(tmp_path / "calibration.json", K0_x=(0.0, "g"), K1_x=(1.0, "g/(m/s^2)"), D_F_x=(0.0, "V"),
+               S_x=(1.0, "V/(rad/s)"))  # fmt: skip
+    (tmp_path / "positions.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n")
+    data = tomllib.loads(filled(kind))
+    key = line.split()[1]
+    place = data
+    for part in table.split("."):
+        place = place[part]
+    for other in INSTEAD.get(table, ()) if key in INSTEAD.get(table, ()) else ():
+        place.pop(other, None)
+    place |= tomllib.loads(line.removeprefix("# "))
+    if key == "channel":
+        place["calibration"] = "calibration.json"
+    if key == "clip":
+        data["sensors"]["a1"]["range"] = "2 g"
     Draft202012Validator(SCHEMA).validate(data)
+    READ[kind](data, tmp_path / "t.toml")
 
 
-def lines_with_keys():
-    """(table, line) of every key that is commented out in the study of a turntable."""
-    table = ""
-    for line in turntable_template().splitlines():
-        if found := re.match(r"(?:# )?\[([\w.]+)\]", line):
-            table = found[1]
-        elif re.match(r"# \w+ = ", line):
-            yield table, line
-
-
-@for_each(("table", "line"), list(lines_with_keys()))
-def test_every_key_of_a_turntable_loads_when_uncommented(table, line, tmp_path, monkeypatch):
-    text = turntable_template().replace(line, line.removeprefix("# "))
-    if table == "rate_test":
-        text = text.replace("# [rate_test]", "[rate_test]")
-    if table == "positions":  # one of four
-        monkeypatch.chdir(tmp_path)
-        Path("positions.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n")
-        text = re.sub("(?m)^grid = .*", "", text)
+@pytest.mark.parametrize("method", ["ferraris", "aided"])
+def test_the_options_of_a_method_load(method, tmp_path):
+    """With the "# " taken from their tables."""
+    text = filled("imu", overrides=[f"imu.method={method}"])
+    begin = text.index(f"# [imu.{method}]")
+    end = text.index("# [imu.aided]") if method == "ferraris" else text.index("[traceability]")
+    text = text[:begin] + re.sub("(?m)^# ", "", text[begin:end]) + text[end:]
     data = tomllib.loads(text)
-    if 'unit = "deg/h"' not in line:
-        assert (
-            turntable_study(data, "t.toml").given
-            != turntable_study(tomllib.loads(turntable_template()), "t.toml").given
-        )
     Draft202012Validator(SCHEMA).validate(data)
+    assert type(imu_study(data, "t.toml").method).__name__ == f"{method.title()}Settings"
 
 
-def test_every_key_of_a_turntable_is_there():
-    """Keys of a three-axis table are those of the rig; they are told in words."""
-    text = re.sub(r"(?m)^# ((\w+) = |\[)", r"\1", turntable_template())
-    text = re.sub(r"(?m)^(plan|list|file) = .*", "", text)
-    whole = tomllib.loads(text)
-    assert set(whole) == set(SCHEMA["$defs"]["TurntableStudyFile"]["properties"])
-    for name, given in whole.items():
-        if name in ("schema", "positions"):
-            continue
-        title = "".join(part.title() for part in name.split("_"))
-        assert set(given) == set(SCHEMA["$defs"][f"{title}Table"]["properties"]), name
-    factors = [slot.name for slot in slots("two_axis_turntable")]
-    assert list(whole["rig"]["errors"]) == ["default", *factors]
+@pytest.mark.parametrize("kind", READ)
+def test_what_must_be_filled_in_is_named_in_one_sentence(kind, tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(template(kind).replace("# operator", 'date = "?"\n# operator'), encoding="utf-8")
+    load = getattr(load_module, f"load_{kind}_study")
+    with pytest.raises(StudyError) as refused:
+        load(path)
+    assert str(refused.value).removeprefix(f"{path}: ") == (
+        'fill in site.latitude and traceability.date: found "?", expected their values in the file, or as '
+        '--set site.latitude="48.1 deg"'
+    )
+    filled_in = load(path, ["site.latitude=48.1 deg", "traceability.date=today"])
+    assert filled_in.site.latitude == pytest.approx(math.radians(48.1))
 
 
-@for_each("channels", INSTRUMENTS.values())
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("site.latitud=48 deg", "site.latitud: unknown key, did you mean latitude?"),
+        ("site.latitude=48", "site.latitude: found '48' without a unit"),
+        ("site.latitude", "found no key and value"),
+    ],
+)
+def test_a_new_study_refuses_what_it_cannot_state(override, words):
+    with pytest.raises(StudyError, match=re.escape(words)):
+        template("imu", overrides=[override])
+
+
+def test_gravity_is_enough_where_nothing_turns_with_the_earth():
+    data = tomllib.loads(template("imu", overrides=["site.gravity=9.81 m/s^2"]))
+    assert imu_study(data, "t.toml").site.gravity == 9.81
+    with pytest.raises(StudyError, match=r"site\.latitude: missing"):
+        template("turntable", overrides=["site.gravity=9.81 m/s^2"])
+
+
+def test_keys_of_the_instrument_can_be_stated():
+    stated = [
+        "instrument.dwell=30 s",
+        "instrument.coefficients.DX_F=4 deg/h",
+        "instrument.coefficients.DX_Y=1 deg/h/g",
+    ]
+    found = turntable_study(tomllib.loads(filled("turntable", overrides=stated)), "t.toml").instrument
+    assert found.dwell == 30.0
+    assert {"DX_F", "DX_X", "DX_XX", "DX_Y", "k_x"} == set(found.coefficients)
+
+
+@pytest.mark.parametrize("channels", INSTRUMENTS.values(), ids=INSTRUMENTS)
 def test_the_instrument_is_that_of_the_record_with_examples_in_its_unit(channels):
     """Every example loads, alone and with all others; kind and unit are those of the channels."""
-    text = turntable_template(channels=channels)
+    text = filled("turntable", channels=channels)
     table = text[text.index("[instrument]") : text.index("[design]")]
     for line in table.splitlines():
         assert len(line) <= 110
@@ -177,36 +214,38 @@ def test_the_instrument_is_that_of_the_record_with_examples_in_its_unit(channels
         one = text.replace(line, line.removeprefix("# "))
         assert one != text
         turntable_study(tomllib.loads(one), "t.toml")
-    everything = turntable_study(tomllib.loads(text.replace(table, uncommented(table))), "t.toml").instrument
+    everything = turntable_study(
+        tomllib.loads(text.replace(table, re.sub(r"(?m)^# (\w+ = )", r"\1", table))), "t.toml"
+    ).instrument
     assert len(everything.coefficients) == 4
     assert all(symbol.split("_")[-1][0] in (name[-1], *"XFx") for symbol in everything.coefficients)
     assert everything.noise is not None
 
 
 def test_counts_are_told_to_state_the_response_to_earth_rate():
-    text = turntable_template(channels={"y_x": parse_unit("count")})
+    text = filled("turntable", channels={"y_x": parse_unit("count")})
     assert re.search(r'# k_x = ".* count/\(deg/h\)" +# .*; needed where it is not fitted', text)
     assert 'or "stated", which needs k below' in text
-    assert "needed" not in turntable_template()
+    assert "needed" not in filled("turntable")
 
 
 def test_the_next_command_of_a_turntable():
-    assert "# Next: inercal sensitivity t.toml\n" in turntable_template((), "t.toml")
-    assert "# Next: inercal calibrate turntable a.csv --study t.toml\n" in turntable_template(
-        ["a.csv"], "t.toml"
+    assert "# Next: inercal sensitivity t.toml\n" in filled("turntable", (), "t.toml")
+    assert "# Next: inercal calibrate turntable a.csv --study t.toml\n" in filled(
+        "turntable", ["a.csv"], "t.toml"
     )
 
 
 def test_the_header_names_the_next_command():
-    assert "# Next: inercal calibrate imu RECORD.csv --study" in imu_template()
-    assert "# Next: inercal calibrate imu 'run 1.csv' b.csv --study" in imu_template(
-        [Path("run 1.csv"), "b.csv"]
+    assert "# Next: inercal calibrate imu RECORD.csv --study" in filled("imu")
+    assert "# Next: inercal calibrate imu 'run 1.csv' b.csv --study" in filled(
+        "imu", [Path("run 1.csv"), "b.csv"]
     )
-    assert "# Next: inercal calibrate imu a.csv --map my-map.toml --study my.toml\n" in imu_template(
-        ["a.csv"], "my.toml", "my-map.toml"
+    assert "# Next: inercal calibrate imu a.csv --map my-map.toml --study my.toml\n" in filled(
+        "imu", ["a.csv"], "my.toml", "my-map.toml"
     )
 
 
 @pytest.mark.parametrize("name", ["a\nb = 1", "a\x00b", "a\udcffb", "{records}", "a\u2028b"])
-def test_odd_file_names_stay_in_their_comment(tmp_path, name):
-    load(tmp_path, imu_template([name]))
+def test_odd_file_names_stay_in_their_comment(name):
+    imu_study(tomllib.loads(filled("imu", [name])), "t.toml")

@@ -13,6 +13,18 @@ import numpy as np
 from inercal.aoa.layout import Layout
 from inercal.arrays import Array
 from inercal.geometry.site import Site
+from inercal.keys import (
+    DEVIATION,
+    FREQUENCY,
+    PART,
+    REQUIRED,
+    TIME,
+    Bounds,
+    option,
+    quantities,
+    quantity,
+    within,
+)
 from inercal.units import STANDARD_GRAVITY, Quantity
 
 States = Literal[8, 11, 15, 19]
@@ -26,18 +38,36 @@ STATES: tuple[States, ...] = (8, 11, 15, 19)
 
 GYROS = ("gyro", "gyro_roll", "gyro_yaw")
 
+_OF_BIASES = Bounds(
+    lambda deviation: 0.0 < deviation <= 0.3 * STANDARD_GRAVITY,
+    f"{DEVIATION.words}, 0.3 g at most, or gravity cannot be told from it (mg given as g?)",
+)
+_OF_PLACES = Bounds(
+    lambda deviation: 0.0 < deviation <= 1.0, f"{DEVIATION.words}, 1 m at most (mm given as m?)"
+)
+_ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
+_OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg to 45 deg")
+_PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
+_SIZE = within(0.0, math.pi, "an angle from 0 to 180 deg")
+_FORCE = within(0.0, math.inf, "an acceleration of 0 or more")
+_SHIFT = within(-1.0, 1.0, "a length within 1 m (mm given as m?)")
+DELAY = within(-1.0, 1.0, "a delay from -1 s to 1 s")
+
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of each sample, ``accelerometer`` [m/s^2] and ``gyro`` [rad/s], and of the biases.
+    """Noise of each sample, and biases that nobody knows beforehand: standard deviations."""
 
-    ``accelerometer_bias`` [m/s^2] is the total, half its variance common to all accelerometers; ``gyro_bias`` [rad/s].
-    """
-
-    accelerometer: float
-    accelerometer_bias: float
-    gyro: float
-    gyro_bias: float
+    accelerometer: float = quantity(
+        "of a sample of an accelerometer", "acceleration", REQUIRED, example="1e-4 g", bounds=DEVIATION
+    )
+    # a bias near gravity leaves the angle unknown, which no u of first order can say
+    accelerometer_bias: float = quantity(
+        "of the accelerometers' biases, half its variance common to all; 0.3 g at most", "acceleration", REQUIRED,
+        example="1e-4 g", bounds=_OF_BIASES,
+    )  # fmt: skip
+    gyro: float = quantity("of a sample of a gyro", "rate", REQUIRED, example="0.2 deg/s", bounds=DEVIATION)
+    gyro_bias: float = quantity("of the gyros' biases", "rate", REQUIRED, example="5 deg/h", bounds=DEVIATION)
 
 
 @dataclass(frozen=True)
@@ -52,17 +82,20 @@ class Resonance:
 
 @dataclass(frozen=True)
 class Prior:
-    """Standard deviations of what the filter estimates beside motion and biases, about 0.
+    """What is not known of the sensors before the run: standard deviations about 0.
 
-    Positions r [m]: ``lever_common`` to all (the pivot) and ``lever`` of each; ``height`` z [m] of each;
-    ``gyro_scale``; ``gyro_delay`` [s], where it is estimated. ``heave`` and ``axial`` are the sting's flexure.
+    ``heave`` and ``axial`` are the sting's flexure.
     """
 
-    lever_common: float = 3e-3
-    lever: float = 1e-3
-    height: float = 5e-3
-    gyro_scale: float = 1e-3
-    gyro_delay: float = 5e-3
+    lever_common: float = quantity(
+        "of all positions r together, the pivot", "length", "3 mm", bounds=_OF_PLACES
+    )
+    lever: float = quantity("of each position r", "length", "1 mm", bounds=_OF_PLACES)
+    height: float = quantity("of each height z", "length", "5 mm", bounds=_OF_PLACES)
+    gyro_scale: float = quantity("of the gyro's scale", "number", "0.1 %", bounds=DEVIATION)
+    gyro_delay: float = quantity(
+        "of the gyro's delay, where it is estimated", "time", "5 ms", bounds=DEVIATION
+    )
     heave: Resonance = Resonance(2.0 * math.pi * 9.0, 0.3, 0.01 * STANDARD_GRAVITY)
     axial: Resonance = Resonance(2.0 * math.pi * 12.0, 0.5, 0.01 * STANDARD_GRAVITY)
 
@@ -116,15 +149,22 @@ class Timing:
 
 @dataclass(frozen=True)
 class Estimator:
-    """The fusion: number of ``states`` for three accelerometers, whether it smooths, and the posterior of an earlier
-    run as its ``prior``. ``snap`` [rad^2/s^7] the spectral density of the angle's fourth derivative, None where it is
-    not stated (`density`), ``gate`` the innovation squared over its variance from which it is held back."""
+    """The fusion of all sensors.
 
-    states: States = 19
-    smooth: bool = False
-    prior: Path | None = None
+    ``snap`` [rad^2/s^7], None where it is not stated (`density`).
+    """
+
+    states: States = option("of three accelerometers: 19 all errors, 15, 11, 8 biases alone", 19)
+    smooth: bool = option("smooth, which uses later samples too", False)
+    prior: Path | None = option(
+        "result (--out) of an earlier run, beside the study, whose posterior is the prior of this one",
+        None,
+        example="last.json",
+    )
     snap: float | None = None
-    gate: float = 25.0
+    gate: float = option(
+        "innovation squared over its variance from which a sample is held back", 25.0, least=1.0
+    )
 
     @property
     def density(self) -> float:
@@ -135,25 +175,42 @@ class Estimator:
 
 @dataclass(frozen=True)
 class Methods:
-    """The paper's way: static mechanisation, centrifugal and tangential compensation."""
+    """The paper's way, where an option of the command asks for it; the options win."""
 
-    static: Static = "improved"
-    centrifugal: Centrifugal = "mechanical"
-    tangential: Tangential = "dual"
+    static: Static = option("the static mechanisation", "improved")
+    centrifugal: Centrifugal = option("compensation of r w^2", "mechanical")
+    tangential: Tangential = option("compensation of r times angular acceleration", "dual")
 
 
 @dataclass(frozen=True)
-class Attitude:
-    """How the model lies in the stream, beside its pitch; values [rad] with standard uncertainties.
+class ModelAttitude:
+    """How the model lies in the tunnel beside its pitch; alpha and beta are given where this or the flow is."""
 
-    ``roll`` right wing down, constant over the record (with gyros for roll and yaw: at its start); ``yaw`` nose left of
-    the tunnel's axis; ``upwash`` and ``sidewash`` of the flow: a stream that rises, one that comes from the right.
-    """
+    roll: Quantity | None = quantity(
+        "right wing down positive; 0 if absent; with gyros for roll and yaw at the start of the record", "angle",
+        example="2.0(1) deg", bounds=_ANY_ANGLE,
+    )  # fmt: skip
+    yaw: Quantity | None = quantity(
+        "nose left of the tunnel's axis positive; 0 if absent", "angle", example="0.5(1) deg",
+        bounds=_ANY_ANGLE,
+    )  # fmt: skip
 
-    roll: Quantity | None = None
-    yaw: Quantity | None = None
-    upwash: Quantity | None = None
-    sidewash: Quantity | None = None
+
+@dataclass(frozen=True)
+class Flow:
+    """Angularity of the flow."""
+
+    upwash: Quantity | None = quantity(
+        "a stream that rises positive; 0 if absent", "angle", example="0.10(2) deg", bounds=_OF_THE_STREAM
+    )
+    sidewash: Quantity | None = quantity(
+        "a stream from the right positive; 0 if absent", "angle", example="0.05(2) deg", bounds=_OF_THE_STREAM
+    )
+
+
+@dataclass(frozen=True)
+class Attitude(Flow, ModelAttitude):
+    """How the model lies in the stream, beside its pitch; values [rad] with standard uncertainties."""
 
 
 @dataclass(frozen=True)
@@ -169,78 +226,123 @@ class Zero:
 
 @dataclass(frozen=True)
 class MotionPlan:
-    """Pitch to be simulated; angles [rad], frequencies [Hz], times [s].
+    """Pitch of the model in a simulation: its kind, and the keys of that kind.
 
     ``static``: a sweep from ``first`` to ``last`` at a constant rate, over all of the duration. ``pitch-pause``: pauses
-    of ``pause`` at ``first``, by ``step``, to ``last``, quintic moves of ``move`` between, and a buffet of ``rms`` from
-    ``low`` to ``high`` (its duration follows). ``sine``: ``mean`` + ``amplitude`` sin 2 pi ``frequency`` t.
-    ``two-tone``: with a second sine. ``chirp``: about ``mean``, from ``low`` to ``high``. ``buffet``: about ``mean``,
-    150 equal sines of random frequency and phase from ``low`` to ``high``, ``rms`` in all. ``file``: the columns t and
-    theta_ref of ``path``, for ``duration`` at most.
+    at ``first``, by ``step``, to ``last``, quintic moves between, and a buffet (its duration follows). ``sine``:
+    ``mean`` + ``amplitude`` sin 2 pi ``frequency`` t. ``two-tone``: with a second sine. ``chirp``: about ``mean``,
+    from ``low`` to ``high``. ``buffet``: about ``mean``, 150 equal sines of random frequency and phase from ``low`` to
+    ``high``, ``rms`` in all. ``file``: the columns t and theta_ref of ``path``, for ``duration`` at most.
     """
 
-    kind: MotionKind = "sine"
-    duration: float = 60.0
-    sample_rate: float = 1000.0
-    mean: float = 0.0
-    amplitude: float = 0.0
-    frequency: float = 1.0
-    second_amplitude: float = 0.0
-    second_frequency: float = 1.0
-    low: float = 2.0
-    high: float = 15.0
-    rms: float = 0.0
-    first: float = 0.0
-    last: float = 0.0
-    step: float = 0.0
-    move: float = 1.5
-    pause: float = 4.0
-    path: Path | None = None
+    kind: MotionKind = option(
+        "static: a sweep; pitch-pause: steps with pauses; sine; two-tone; chirp; buffet: random; file: as recorded"
+    )
+    duration: float = quantity(
+        "of all kinds but pitch-pause; of a file all if absent", "time", "60 s", bounds=TIME
+    )
+    sample_rate: float = quantity("samples per second", "frequency", "1 kHz", bounds=FREQUENCY)
+    mean: float = quantity(
+        "of sine, two-tone, chirp and buffet", "angle", "0 deg", example="30 deg", bounds=_PITCH
+    )
+    amplitude: float = quantity("of sine, two-tone and chirp", "angle", 0.0, example="10 deg", bounds=_SIZE)
+    frequency: float = quantity("of sine and two-tone", "frequency", 1.0, example="1 Hz", bounds=FREQUENCY)
+    second_amplitude: float = quantity(
+        "of the second sine of two-tone", "angle", 0.0, example="2 deg", bounds=_SIZE
+    )
+    second_frequency: float = quantity(
+        "of the second sine of two-tone", "frequency", 1.0, example="3 Hz", bounds=FREQUENCY
+    )
+    low: float = quantity(
+        "lowest frequency of chirp, buffet and of the buffet in a pitch-pause", "frequency", 2.0,
+        example="0.1 Hz", bounds=FREQUENCY,
+    )  # fmt: skip
+    high: float = quantity("highest frequency of those", "frequency", 15.0, example="5 Hz", bounds=FREQUENCY)
+    rms: float = quantity(
+        "of the buffet, in all; in a pitch-pause none if absent",
+        "angle",
+        0.0,
+        example="0.2 deg",
+        bounds=_SIZE,
+    )
+    first: float = quantity(
+        "angle at the start of static and pitch-pause", "angle", 0.0, example="-10 deg", bounds=_PITCH
+    )
+    last: float = quantity(
+        "angle at the end of static and pitch-pause", "angle", 0.0, example="90 deg", bounds=_PITCH
+    )
+    step: float = quantity("of pitch-pause, negative downward", "angle", 0.0, example="10 deg", bounds=_PITCH)
+    move: float = quantity("time of a move of pitch-pause", "time", "1.5 s", bounds=TIME)
+    pause: float = quantity("time of a pause of pitch-pause", "time", "4 s", bounds=TIME)
+    path: Path | None = option(
+        "of kind file: a record beside the study with the columns t and theta_ref", None, example="pitch.csv",
+        name="file",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Shaking:
-    """A random vibration of ``rms``, 40 equal sines from ``low`` to ``high`` [Hz]."""
+    """A random vibration, 40 equal sines."""
 
-    rms: float
-    low: float
-    high: float
+    rms: float = quantity("in all", "acceleration", REQUIRED, example="0.03 g", bounds=_FORCE)
+    low: float = quantity("lowest frequency", "frequency", REQUIRED, example="8 Hz", bounds=FREQUENCY)
+    high: float = quantity("highest frequency", "frequency", REQUIRED, example="10 Hz", bounds=FREQUENCY)
+
+
+@dataclass(frozen=True)
+class AngleShaking(Shaking):
+    """A random vibration of an angle, 40 equal sines."""
+
+    rms: float = quantity("in all", "angle", REQUIRED, example="0.1 deg", bounds=_SIZE)
 
 
 @dataclass(frozen=True)
 class Oscillation:
-    """A rigid rotation ``amplitude`` [rad] sin 2 pi ``frequency`` [Hz] t."""
+    """A rigid oscillation: a sine."""
 
-    amplitude: float
-    frequency: float
+    amplitude: float = quantity("of the angle", "angle", REQUIRED, example="1 deg", bounds=_SIZE)
+    frequency: float = quantity("of the sine", "frequency", REQUIRED, example="8 Hz", bounds=FREQUENCY)
 
 
 @dataclass(frozen=True)
 class Disturbances:
-    """What a simulation adds to the rigid, well-known model; nothing by default.
+    """What a simulation adds to the rigid, well-known model; nothing if absent.
 
     Flexure of the sting: ``pitch`` [rad], ``heave`` and ``axial`` [m/s^2]. ``roll`` and ``yaw`` [rad] coupled in.
-    ``pivot`` [m] added to all r, ``heights`` [m] to each z. ``gyro_scale``; ``gyro_delay``, ``common_delay`` [s].
-    ``bandwidth`` [Hz] of all sensors, first order. ``spikes``: probability that a sample of a sensor is off by
-    ``spike`` [m/s^2] (accelerometers) or that over 9.80665 in rad/s (gyro). ``clip``: limit readings to the ranges of
-    the sensors. ``dropouts``: probability that a row is missing.
+    ``heights`` [m] added to each z. A gyro's spikes are ``spike`` over 9.80665 in rad/s.
     """
 
-    pitch: Shaking | None = None
+    pitch: AngleShaking | None = None
     heave: Shaking | None = None
     axial: Shaking | None = None
     roll: Oscillation | None = None
     yaw: Oscillation | None = None
-    pivot: float = 0.0
-    heights: tuple[float, ...] = ()
-    gyro_scale: float = 0.0
-    gyro_delay: float = 0.0
-    common_delay: float = 0.0
-    bandwidth: float = math.inf
-    spikes: float = 0.0
-    spike: float = 0.5 * STANDARD_GRAVITY
-    clip: bool = False
-    dropouts: float = 0.0
+    pivot: float = quantity("added to all positions r", "length", "0 m", example="3 mm", bounds=_SHIFT)
+    heights: tuple[float, ...] = quantities(
+        "added to the heights z, one for each accelerometer; 0 if absent", "length",
+        example=["5 mm", "-3 mm", "5 mm"], bounds=_SHIFT, at_least=0,
+    )  # fmt: skip
+    gyro_scale: float = quantity(
+        "scale error of the gyro", "number", "0", example="0.1 %", bounds=within(-0.5, 0.5, "within 50 %")
+    )
+    gyro_delay: float = quantity(
+        "by which the gyro comes later than the accelerometers", "time", "0 s", example="2 ms", bounds=DELAY
+    )
+    common_delay: float = quantity(
+        "by which all sensors come later than their stamps", "time", "0 s", example="0.5 ms", bounds=DELAY
+    )
+    bandwidth: float = quantity(
+        "of all sensors, first order; without limit if absent", "frequency", math.inf, example="100 Hz",
+        bounds=FREQUENCY,
+    )  # fmt: skip
+    spikes: float = quantity(
+        "part of the samples of each sensor that are spikes", "number", "0", example="0.01 %", bounds=PART
+    )
+    spike: float = quantity(
+        "size of a spike, of a gyro 1 rad/s for each g", "acceleration", "0.5 g", bounds=_FORCE
+    )
+    clip: bool = option("limit sensors to their ranges", False)
+    dropouts: float = quantity("part of the rows that are empty", "number", "0", example="1 %", bounds=PART)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ COMMANDS = {
         "Write a commented study for `inercal calibrate imu`.\n\nGiven a recording, also a column map guessed from "
         "it. The study goes to --out (imu.toml if absent), the map beside it (imu-map.toml). Nothing that exists "
         "is overwritten.",
-        "inercal new imu log.csv --out imu.toml",
+        'inercal new imu log.csv --set site.latitude="48.1 deg" --out imu.toml',
     ),
     ("new", "turntable"): (
         "inercal.cli.new:new_turntable",

@@ -8,25 +8,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainSerializer, PlainValidator, StrictBool, WithJsonSchema, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from inercal._toml import Strict, check
 from inercal.aoa.settings import (
+    DELAY,
     AoaSettings,
     Attitude,
-    Centrifugal,
     Estimator,
+    Flow,
     Methods,
+    ModelAttitude,
     Noise,
     Prior,
     Resonance,
-    States,
-    Static,
-    Tangential,
     Timing,
     Zero,
 )
 from inercal.errors import StudyError
+from inercal.keys import DEVIATION, FREQUENCY
 from inercal.studies.common import (
     Conditions,
     ConditionsTable,
@@ -36,56 +36,20 @@ from inercal.studies.common import (
     Version,
     site_of,
 )
-from inercal.studies.fields import QuantityText, positive, refusal
+from inercal.studies.fields import QuantityText, refusal
 from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
 from inercal.studies.ratios import ExactText
 from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
-from inercal.units import STANDARD_GRAVITY, Quantity, shown
+from inercal.studies.tables import Stated, as_typed, settings_of, table_of
+from inercal.units import Quantity, shown
 
-_DEVIATION = "a standard deviation above zero"
-
-
-def _deviation(dimension: str, example: str) -> QuantityText:
-    """A standard deviation."""
-    return QuantityText(dimension, example, positive, _DEVIATION)
-
-
-_Force = Annotated[Quantity, _deviation("acceleration", "1e-4 g")]
-# a bias near gravity leaves the angle unknown, which no u of first order can say
-_Bias = Annotated[
-    Quantity,
-    QuantityText(
-        "acceleration",
-        "1e-4 g",
-        lambda d: 0.0 < d <= 0.3 * STANDARD_GRAVITY,
-        f"{_DEVIATION}, 0.3 g at most, or gravity cannot be told from it (mg given as g?)",
-    ),
-]
-_Rate = Annotated[Quantity, _deviation("rate", "0.2 deg/s")]
-_Length = Annotated[
-    Quantity,
-    QuantityText("length", "3 mm", lambda d: 0.0 < d <= 1.0, f"{_DEVIATION}, 1 m at most (mm given as m?)"),
-]
-_Time = Annotated[Quantity, _deviation("time", "5 ms")]
-_Number = Annotated[Quantity, _deviation("number", "0.1 %")]
-_Frequency = Annotated[Quantity, QuantityText("frequency", "9 Hz", positive, "a frequency above zero")]
+_Frequency = Annotated[Quantity, QuantityText("frequency", "9 Hz", FREQUENCY.accept, FREQUENCY.words)]
 _Damping = Annotated[
     Quantity, QuantityText("number", "0.3", lambda z: 0.0 < z < 1.0, "a relative damping above 0, below 1")
 ]
-_Delay = Annotated[Quantity, ExactText("time", "2 ms", lambda t: abs(t) <= 1.0, "a delay from -1 s to 1 s")]
-_CommonDelay = Annotated[
-    Quantity, QuantityText("time", "0.5(1) ms", lambda t: abs(t) <= 1.0, "a delay from -1 s to 1 s")
-]
-_Roll = Annotated[
-    Quantity,
-    QuantityText("angle", "2.0(1) deg", lambda a: abs(a) <= math.pi, "an angle from -180 deg to 180 deg"),
-]
-_Stream = Annotated[
-    Quantity,
-    QuantityText(
-        "angle", "0.10(2) deg", lambda a: abs(a) <= 0.25 * math.pi, "an angle from -45 deg to 45 deg"
-    ),
-]
+_Force = Annotated[Quantity, QuantityText("acceleration", "0.01 g", DEVIATION.accept, DEVIATION.words)]
+_Delay = Annotated[Quantity, ExactText("time", "2 ms", DELAY.accept, DELAY.words)]
+_CommonDelay = Annotated[Quantity, QuantityText("time", "0.5(1) ms", DELAY.accept, DELAY.words)]
 _Instant = Annotated[Quantity, QuantityText("time", "5 s", lambda t: abs(t) < 1e10, "a time of the record")]
 
 
@@ -132,17 +96,6 @@ class StingTable(Strict):
     kind: Literal["sting"] = Field(description="a model that pitches about a pivot, on a sting")
 
 
-class SensorNoiseTable(Strict):
-    """Noise of each sample, and biases that nobody knows beforehand: standard deviations."""
-
-    accelerometer: _Force = Field(description="of a sample of an accelerometer")
-    accelerometer_bias: _Bias = Field(
-        description="of the accelerometers' biases, half its variance common to all; 0.3 g at most"
-    )
-    gyro: _Rate = Field(description="of a sample of a gyro")
-    gyro_bias: _Rate = Field(description="of the gyros' biases")
-
-
 class FlexureTable(Strict):
     """Flexure of the sting as the filter takes it: a band-pass with random input."""
 
@@ -153,18 +106,9 @@ class FlexureTable(Strict):
     )
 
 
-class SensorPriorTable(Strict):
+class SensorPriorTable(table_of(Prior)):  # type: ignore[misc]
     """What is not known of the sensors before the run: standard deviations; the usual ones if absent."""
 
-    lever_common: _Length | None = Field(
-        default=None, description="of all positions r together, the pivot; 3 mm if absent"
-    )
-    lever: _Length | None = Field(default=None, description="of each position r; 1 mm if absent")
-    height: _Length | None = Field(default=None, description="of each height z; 5 mm if absent")
-    gyro_scale: _Number | None = Field(default=None, description="of the gyro's scale; 0.1 % if absent")
-    gyro_delay: _Time | None = Field(
-        default=None, description="of the gyro's delay, where it is estimated; 5 ms if absent"
-    )
     heave: FlexureTable = Field(
         default=FlexureTable(), title="Heave", description="flexure along z: 9 Hz, damping 0.3 if absent"
     )
@@ -186,59 +130,20 @@ class TimingTable(Strict):
     )
 
 
-class EstimatorTable(Strict):
+class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
     """The fusion of all sensors."""
 
-    states: States = Field(
-        default=19, description="of three accelerometers: 19 all errors, 15, 11, 8 biases alone"
-    )
-    smooth: StrictBool = Field(default=False, description="smooth, which uses later samples too")
-    prior: str | None = Field(
-        default=None,
-        min_length=1,
-        description="result (--out) of an earlier run, beside the study, whose posterior is the prior of this one",
-        examples=["last.json"],
-    )
     snap: _Snap | None = Field(
         default=None,
         description="spectral density of the angle's fourth derivative; 1e7 rad^2/s^7 if absent, 1e8 from 15 "
         "states on",
-    )
-    gate: Annotated[float, Field(strict=True, ge=1.0)] = Field(
-        default=25.0, description="innovation squared over its variance from which a sample is held back"
-    )
-
-
-class MethodsTable(Strict):
-    """The paper's way, where an option of the command asks for it; the options win."""
-
-    static: Static = Field(default="improved", description="the static mechanisation")
-    centrifugal: Centrifugal = Field(default="mechanical", description="compensation of r w^2")
-    tangential: Tangential = Field(default="dual", description="compensation of r times angular acceleration")
-
-
-class ModelTable(Strict):
-    """How the model lies in the tunnel beside its pitch; alpha and beta are given where this or the flow is."""
-
-    roll: _Roll | None = Field(default=None, description="right wing down positive; 0 if absent")
-    yaw: _Roll | None = Field(
-        default=None, description="nose left of the tunnel's axis positive; 0 if absent"
-    )
-
-
-class FlowTable(Strict):
-    """Angularity of the flow."""
-
-    upwash: _Stream | None = Field(default=None, description="a stream that rises positive; 0 if absent")
-    sidewash: _Stream | None = Field(
-        default=None, description="a stream from the right positive; 0 if absent"
     )
 
 
 class ZeroTable(Strict):
     """A stretch at rest, wind off, at a known angle."""
 
-    start: _Instant = Field(description="of the stretch, in the record's time")
+    start: _Instant = Field(description="of the stretch, in the record's time", examples=["0 s"])
     end: _Instant = Field(description="of the stretch")
     angle: Annotated[
         Quantity,
@@ -262,7 +167,7 @@ class AoaStudyFile(Strict):
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the tunnel stands")
     rig: StingTable = Field(title="Rig", description="what carries the model")
     sensors: SensorsTable = Field(title="Sensors", description="the sensors, by the names of their columns")
-    noise: SensorNoiseTable = Field(title="Noise", description="noise and biases of the sensors")
+    noise: Stated[Noise] = Field(title="Noise", description="noise and biases of the sensors")
     prior: SensorPriorTable = Field(
         default=SensorPriorTable(), title="Prior", description="what is not known of the sensors"
     )
@@ -276,9 +181,11 @@ class AoaStudyFile(Strict):
     )
     timing: TimingTable = Field(default=TimingTable(), title="Timing", description="delays of the sensors")
     estimator: EstimatorTable = Field(default=EstimatorTable(), title="Estimator", description="the fusion")
-    methods: MethodsTable = Field(default=MethodsTable(), title="Methods", description="the paper's way")
-    model: ModelTable = Field(default=ModelTable(), title="Model", description="how the model lies")
-    flow: FlowTable = Field(default=FlowTable(), title="Flow", description="angularity of the flow")
+    methods: Stated[Methods] = Field(default=Methods(), title="Methods", description="the paper's way")
+    model: Stated[ModelAttitude] = Field(
+        default=ModelAttitude(), title="Model", description="how the model lies"
+    )
+    flow: Stated[Flow] = Field(default=Flow(), title="Flow", description="angularity of the flow")
     zero: ZeroTable | None = Field(default=None, title="Zero", description="a stretch at a known angle")
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
@@ -292,45 +199,30 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
     """
     file = check(AoaStudyFile, data, path, StudyError)
     layout, sensors = layout_of(file.sensors), calibrations_of(file.sensors, path)
-    noise = file.noise
     return AoaSettings(
         site=site_of(file.site, path),
         layout=layout,
-        noise=Noise(
-            noise.accelerometer.value, noise.accelerometer_bias.value, noise.gyro.value, noise.gyro_bias.value
-        ),
+        noise=file.noise,
         prior=_prior(file.prior),
         sensors=sensors,
         timing=_timing(file.timing),
         estimator=_estimator(file.estimator, path),
-        methods=Methods(file.methods.static, file.methods.centrifugal, file.methods.tangential),
+        methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
         zero=None if file.zero is None else _zero(file.zero),
         motion=None if file.motion is None else motion_of(file.motion, path),
         disturbances=disturbances_of(file.disturbances, layout, sensors, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
-        given=file.model_dump(mode="json", by_alias=True, exclude_unset=True),
+        given=as_typed(data),
     )
-
-
-def _given(table: Strict) -> dict[str, float]:
-    """The quantities that a table gives, by key."""
-    return {
-        key: value.value
-        for key in type(table).model_fields
-        if isinstance(value := getattr(table, key), Quantity)
-    }
 
 
 def _prior(table: SensorPriorTable) -> Prior:
     """What is not known of the sensors."""
     usual = Prior()
-    return Prior(
-        **_given(table),
-        heave=_flexure(table.heave, usual.heave),
-        axial=_flexure(table.axial, usual.axial),
-    )
+    heave, axial = _flexure(table.heave, usual.heave), _flexure(table.axial, usual.axial)
+    return settings_of(Prior, table, heave=heave, axial=axial)
 
 
 def _flexure(table: FlexureTable, usual: Resonance) -> Resonance:
@@ -352,13 +244,8 @@ def _timing(table: TimingTable) -> Timing:
 
 def _estimator(table: EstimatorTable, path: str | Path) -> Estimator:
     """The fusion."""
-    return Estimator(
-        states=table.states,
-        smooth=table.smooth,
-        prior=None if table.prior is None else Path(path).parent / table.prior,
-        snap=table.snap,
-        gate=table.gate,
-    )
+    prior = None if table.prior is None else Path(path).parent / table.prior
+    return settings_of(Estimator, table, snap=table.snap, prior=prior)
 
 
 def _zero(table: ZeroTable) -> Zero:

@@ -59,10 +59,16 @@ def _date_text(value: object) -> object:
 class TraceabilityTable(Strict):
     """Free texts that go with the result."""
 
-    instrument: str = Field(default="", description="model and serial number of the instrument")
-    operator: str = Field(default="", description="who made the recording")
-    date: Annotated[str, BeforeValidator(_date_text)] = Field(default="", description="when it was made")
-    reference: str = Field(default="", description="number of the order, report or standard")
+    instrument: str = Field(
+        default="", examples=["model, serial no."], description="model and serial number of the instrument"
+    )
+    operator: str = Field(default="", examples=["name"], description="who made the recording")
+    date: Annotated[str, BeforeValidator(_date_text)] = Field(
+        default="", examples=["2026-01-31"], description="when it was made"
+    )
+    reference: str = Field(
+        default="", examples=["order or report"], description="number of the order, report or standard"
+    )
 
 
 class ConditionsTable(Strict):

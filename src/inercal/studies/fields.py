@@ -157,8 +157,3 @@ Temperature = Annotated[
     QuantityText("temperature", "23 degC", lambda t: t > -273.15, "a temperature above absolute zero"),
 ]
 """A temperature."""
-
-RelativeUncertainty = Annotated[
-    Quantity, QuantityText("number", "20 ppm", lambda u: 0.0 <= u < 1.0, "0 or more, and below 1")
-]
-"""A relative standard uncertainty."""

@@ -48,9 +48,15 @@ Signs = Annotated[
 class GimbalLimitsTable(Strict):
     """Ranges within which the gimbals turn; no limits if absent."""
 
-    x: Annotated[Several, _ENDS] | None = Field(default=None, description="lowest and highest outer angle")
-    y: Annotated[Several, _ENDS] | None = Field(default=None, description="of the inner joint")
-    z: Annotated[Several, _ENDS] | None = Field(default=None, description="of the joint of the platform")
+    x: Annotated[Several, _ENDS] | None = Field(
+        default=None, description="lowest and highest outer angle", examples=[["-180 deg", "180 deg"]]
+    )
+    y: Annotated[Several, _ENDS] | None = Field(
+        default=None, description="of the inner joint", examples=[["-80 deg", "80 deg"]]
+    )
+    z: Annotated[Several, _ENDS] | None = Field(
+        default=None, description="of the joint of the platform", examples=[["-360 deg", "360 deg"]]
+    )
 
 
 class GimbalsTable(Strict):
@@ -72,6 +78,7 @@ class GimbalsTable(Strict):
     )
     gimbals: Order = Field(
         default=["z", "x", "y"],
+        examples=[["z", "x", "y"]],
         description="axis of the platform along which each joint lies at zero angles, outer first",
     )
     signs: Signs = Field(default=[1, 1, 1], description="of the angles: -1 where one counts left-handed")

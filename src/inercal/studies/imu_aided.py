@@ -20,10 +20,12 @@ class AidedTable(Strict):
     rig: RigTable = Field(
         default=RigTable(kind="two_axis_turntable"),
         title="Rig",
-        description="the table; of two axes and without errors if absent, its azimuth unknown unless given",
+        description="the table, as in a study of a turntable; of two axes and without errors if absent, "
+        "its azimuth unknown unless given",
     )
     mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = Field(
         default=("+x", "+y", "+z"),
+        examples=[["+x", "+y", "+z"]],
         description="axes of the table, at zero angles, along which the instrument's x, y and z point",
     )
 

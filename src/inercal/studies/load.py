@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inercal._toml import read_toml
 from inercal.errors import StudyError
+from inercal.studies.starting import UNKNOWN
 from inercal.studies.ways import DISTRIBUTIONS, PATHS, POSITIONS
 from inercal.units import shown
 
@@ -50,6 +52,17 @@ _ONE_OF = (
 
 #: keys (a regular expression) that name a file
 _FILES = r"estimator\.prior|motion\.file|positions\.file|sensors\.\w+\.calibration"
+
+
+#: dotted key that a new study leaves open -> an example
+_OPEN = {"site.latitude": "48.1 deg"}
+
+
+def reader(kind: str) -> Callable[[Mapping[str, Any], str | Path], Any]:
+    """What makes settings of the parsed TOML of a study: of ``imu``, ``turntable``, ``selfcal`` or ``aoa``."""
+    module = importlib.import_module(f"inercal.studies.{kind}")
+    read: Callable[[Mapping[str, Any], str | Path], Any] = getattr(module, f"{kind}_study")
+    return read
 
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
@@ -111,13 +124,15 @@ def files_of(path: Path, given: Mapping[str, Any], unread: str = "") -> tuple[Pa
     return (path, *(path.parent / name for key, name in named.items() if key.split(".")[0] != unread))
 
 
-def _texts(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
-    """Dotted keys and values of all texts in a table."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _texts(value, f"{above}{key}.")
-        elif isinstance(value, str):
-            yield above + key, value
+def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Dotted keys and values of all texts in a table, in their order; however deep it is nested."""
+    left = list(table.items())[::-1]
+    while left:
+        name, found = left.pop()
+        if isinstance(found, Mapping):
+            left += [(f"{name}.{key}", value) for key, value in list(found.items())[::-1]]
+        elif isinstance(found, str):
+            yield name, found
 
 
 def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
@@ -139,12 +154,42 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
             f"found a study for `inercal calibrate imu`, expected {_EXPECTED[command]}, with a table [rig]",
         )
     for override in sorted(overrides, key=lambda each: not each.startswith("motion.kind")):  # it makes room
-        _put(data, override, Path(path).parent)
+        put(data, override, Path(path).parent)
+    _refuse_unfilled(data, path)
     return data
 
 
-def _put(data: dict[str, Any], override: str, folder: Path) -> None:
-    """Set one key of the freshly read ``data``, of a study in ``folder``, by its dotted name."""
+def _refuse_unfilled(data: Mapping[str, Any], path: str | Path) -> None:
+    """Refuse a study with keys that are still to be filled in, naming all of them."""
+    keys = [key for key, value in _texts(data) if value.strip() == UNKNOWN]
+    if not keys:
+        return
+    names = keys[0] if len(keys) == 1 else f"{', '.join(keys[:-1])} and {keys[-1]}"
+    example = next((f'{key}="{_OPEN[key]}"' for key in keys if key in _OPEN), f"{keys[0]}=VALUE")
+    such = "their values" if len(keys) > 1 else "its value"
+    raise StudyError(
+        path, f'fill in {names}: found "{UNKNOWN}", expected {such} in the file, or as --set {example}'
+    )
+
+
+def unfilled(data: Mapping[str, Any], value: str) -> dict[str, Any]:
+    """The study with ``value`` in place of what is still to be filled in, in its tables."""
+    return {
+        name: {key: value if each == UNKNOWN else each for key, each in table.items()}
+        if isinstance(table, Mapping)
+        else table
+        for name, table in data.items()
+    }
+
+
+def put(data: dict[str, Any], override: str, folder: Path) -> None:
+    """Set one key of the freshly parsed ``data``, of a study in ``folder``, by its dotted name.
+
+    Raises
+    ------
+    StudyError
+        No key and value, or a key inside what is no table.
+    """
     where = f"--set {shown(override)}"
     name, equals, text = override.partition("=")
     keys = [key.strip() for key in name.split(".")]
@@ -156,6 +201,10 @@ def _put(data: dict[str, Any], override: str, folder: Path) -> None:
         if not isinstance(table, dict):
             raise StudyError(where, f"{'.'.join(keys[:depth])} is no table, expected the key of a value")
         _make_room(table, ".".join(keys[:depth]), keys[depth])
+    if keys == ["site", "gravity"] and table.get("latitude") == UNKNOWN:
+        del table[
+            "latitude"
+        ]  # where the latitude is needed for earth rate too, it is missed with that reason
     value = _value(text.strip())
     if keys == ["motion", "kind"]:
         _make_room_for_motion(table, value)

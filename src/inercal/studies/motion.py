@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, model_validator
 
-from inercal._toml import Strict
 from inercal.aoa.layout import Layout
 from inercal.aoa.motion import duration, moves
-from inercal.aoa.settings import (
-    Calibration,
-    Disturbances,
-    MotionKind,
-    MotionPlan,
-    Oscillation,
-    Shaking,
-)
+from inercal.aoa.settings import AngleShaking, Calibration, Disturbances, MotionPlan, Oscillation, Shaking
 from inercal.errors import StudyError
-from inercal.studies.fields import Duration, QuantityText, positive, refusal
-from inercal.units import Quantity, shown
+from inercal.studies.fields import refusal
+from inercal.studies.tables import Stated, settings_of, table_of
+from inercal.units import shown
 
 MOST_ROWS = 20_000_000
 """Samples that a simulation may have."""
@@ -40,27 +33,6 @@ _KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "file": (("file",), ("duration",)),
 }
 
-_PITCH = QuantityText(
-    "angle", "30 deg", lambda a: abs(a) <= 2.0 * math.pi, "an angle from -360 deg to 360 deg"
-)
-_Pitch = Annotated[Quantity, _PITCH]
-_SIZE = QuantityText("angle", "10 deg", lambda a: 0.0 <= a <= math.pi, "an angle from 0 to 180 deg")
-_Size = Annotated[Quantity, _SIZE]
-_Frequency = Annotated[Quantity, QuantityText("frequency", "1 Hz", positive, "a frequency above zero")]
-_Part = Annotated[
-    Quantity, QuantityText("number", "0.1 %", lambda p: 0.0 <= p < 1.0, "a part from 0 to below 1")
-]
-_Delay = Annotated[
-    Quantity, QuantityText("time", "2 ms", lambda t: abs(t) <= 1.0, "a delay from -1 s to 1 s")
-]
-_Force = Annotated[
-    Quantity, QuantityText("acceleration", "0.03 g", lambda a: a >= 0.0, "an acceleration of 0 or more")
-]
-_Shift = Annotated[
-    Quantity,
-    QuantityText("length", "3 mm", lambda d: abs(d) <= 1.0, "a length within 1 m (mm given as m?)"),
-]
-
 
 def of_other_kinds(kind: object) -> frozenset[str]:
     """The keys that a motion of that kind does not heed, but others do; none where there is no such kind."""
@@ -70,42 +42,8 @@ def of_other_kinds(kind: object) -> frozenset[str]:
     return frozenset(every.difference(*_KEYS[str(kind)]))
 
 
-class MotionTable(Strict):
+class MotionTable(table_of(MotionPlan)):  # type: ignore[misc]
     """Pitch of the model in a simulation: its kind, and the keys of that kind."""
-
-    kind: MotionKind = Field(
-        description="static: a sweep; pitch-pause: steps with pauses; sine; two-tone; chirp; buffet: random; file: as "
-        "recorded"
-    )
-    duration: Duration | None = Field(
-        default=None, description="of all kinds but pitch-pause; 60 s, or all of a file, if absent"
-    )
-    sample_rate: _Frequency | None = Field(default=None, description="samples per second; 1 kHz if absent")
-    mean: _Pitch | None = Field(
-        default=None, description="of sine, two-tone, chirp and buffet; 0 deg if absent"
-    )
-    amplitude: _Size | None = Field(default=None, description="of sine, two-tone and chirp")
-    frequency: _Frequency | None = Field(default=None, description="of sine and two-tone")
-    second_amplitude: _Size | None = Field(default=None, description="of the second sine of two-tone")
-    second_frequency: _Frequency | None = Field(default=None, description="of the second sine of two-tone")
-    low: _Frequency | None = Field(
-        default=None, description="lowest frequency of chirp, buffet and of the buffet in a pitch-pause"
-    )
-    high: _Frequency | None = Field(default=None, description="highest frequency of those")
-    rms: _Size | None = Field(
-        default=None, description="of the buffet, in all; in a pitch-pause none if absent"
-    )
-    first: _Pitch | None = Field(default=None, description="angle at the start of static and pitch-pause")
-    last: _Pitch | None = Field(default=None, description="angle at the end of static and pitch-pause")
-    step: _Pitch | None = Field(default=None, description="of pitch-pause, negative downward")
-    move: Duration | None = Field(default=None, description="time of a move of pitch-pause; 1.5 s if absent")
-    pause: Duration | None = Field(default=None, description="time of a pause of pitch-pause; 4 s if absent")
-    file: str | None = Field(
-        default=None,
-        min_length=1,
-        description="of kind file: a record beside the study with the columns t and theta_ref",
-        examples=["pitch.csv"],
-    )
 
     @model_validator(mode="after")
     def _of_the_kind(self) -> MotionTable:
@@ -133,15 +71,10 @@ def motion_of(table: MotionTable, where: str | Path) -> MotionPlan:
     StudyError
         Frequencies out of order, steps that do not lead from first to last, too many samples.
     """
-    keys = {
-        key: getattr(table, key).value
-        for key in type(table).model_fields
-        if key not in ("kind", "file") and getattr(table, key) is not None
-    }
-    if table.file is not None:
-        keys = {"duration": math.inf} | keys
-    path = None if table.file is None else Path(where).parent / table.file
-    plan = MotionPlan(table.kind, path=path, **keys)
+    plan = settings_of(MotionPlan, table)
+    if plan.path is not None:
+        whole = plan.duration if table.duration is not None else math.inf
+        plan = replace(plan, path=Path(where).parent / plan.path, duration=whole)
     if table.low is not None or table.high is not None:
         _ordered(plan.low, plan.high, "motion", where)
     if table.kind == "pitch-pause":
@@ -158,63 +91,39 @@ def motion_of(table: MotionTable, where: str | Path) -> MotionPlan:
     return plan
 
 
-class ShakingTable(Strict):
-    """A random vibration, 40 equal sines."""
-
-    rms: _Force = Field(description="in all")
-    low: _Frequency = Field(description="lowest frequency")
-    high: _Frequency = Field(description="highest frequency")
-
-
-class AngleShakingTable(Strict):
-    """A random vibration of an angle, 40 equal sines."""
-
-    rms: _Size = Field(description="in all")
-    low: _Frequency = Field(description="lowest frequency")
-    high: _Frequency = Field(description="highest frequency")
-
-
-class OscillationTable(Strict):
-    """A rigid oscillation."""
-
-    amplitude: _Size = Field(description="of the angle")
-    frequency: _Frequency = Field(description="of the sine")
-
-
-class AoaDisturbancesTable(Strict):
+class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
     """What a simulation adds to the rigid, well-known model; nothing if absent."""
 
-    pitch: AngleShakingTable | None = Field(
-        default=None, title="Pitch", description="flexure of the sting in pitch"
+    pitch: Stated[AngleShaking] | None = Field(
+        default=None,
+        title="Pitch",
+        description="flexure of the sting in pitch",
+        examples=[{"rms": "0.1 deg", "low": "8 Hz", "high": "10 Hz"}],
     )
-    heave: ShakingTable | None = Field(default=None, title="Heave", description="flexure along z")
-    axial: ShakingTable | None = Field(default=None, title="Axial", description="flexure along x")
-    roll: OscillationTable | None = Field(default=None, title="Roll", description="roll coupled in")
-    yaw: OscillationTable | None = Field(default=None, title="Yaw", description="yaw coupled in")
-    pivot: _Shift | None = Field(default=None, description="added to all positions r; 0 if absent")
-    heights: list[_Shift] | None = Field(
-        default=None, description="added to the heights z, one for each accelerometer; 0 if absent"
+    heave: Stated[Shaking] | None = Field(
+        default=None,
+        title="Heave",
+        description="flexure along z",
+        examples=[{"rms": "0.03 g", "low": "8 Hz", "high": "10 Hz"}],
     )
-    gyro_scale: (
-        Annotated[Quantity, QuantityText("number", "0.1 %", lambda k: abs(k) <= 0.5, "within 50 %")] | None
-    ) = Field(default=None, description="scale error of the gyro; 0 if absent")
-    gyro_delay: _Delay | None = Field(
-        default=None, description="by which the gyro comes later than the accelerometers; 0 if absent"
+    axial: Stated[Shaking] | None = Field(
+        default=None,
+        title="Axial",
+        description="flexure along x",
+        examples=[{"rms": "0.005 g", "low": "14 Hz", "high": "16 Hz"}],
     )
-    common_delay: _Delay | None = Field(
-        default=None, description="by which all sensors come later than their stamps; 0 if absent"
+    roll: Stated[Oscillation] | None = Field(
+        default=None,
+        title="Roll",
+        description="roll coupled in; adds gyro_roll and gyro_yaw",
+        examples=[{"amplitude": "1 deg", "frequency": "8 Hz"}],
     )
-    bandwidth: _Frequency | None = Field(
-        default=None, description="of all sensors, first order; without limit if absent"
+    yaw: Stated[Oscillation] | None = Field(
+        default=None,
+        title="Yaw",
+        description="yaw coupled in; adds gyro_roll and gyro_yaw",
+        examples=[{"amplitude": "1 deg", "frequency": "8 Hz"}],
     )
-    spikes: _Part | None = Field(
-        default=None, description="part of the samples of each sensor that are spikes; 0 if absent"
-    )
-    spike: _Force | None = Field(
-        default=None, description="size of a spike, of a gyro 1 rad/s for each g; 0.5 g if absent"
-    )
-    clip: StrictBool = Field(default=False, description="limit sensors to their ranges")
-    dropouts: _Part | None = Field(default=None, description="part of the rows that are empty; 0 if absent")
 
 
 def disturbances_of(
@@ -227,29 +136,21 @@ def disturbances_of(
     StudyError
         Frequencies out of order, heights for another number of accelerometers, clipping without a range.
     """
-    found: dict[str, Any] = {}
-    for key in type(table).model_fields:
-        given = getattr(table, key)
-        if isinstance(given, Quantity):
-            found[key] = given.value
-        elif isinstance(given, ShakingTable | AngleShakingTable):
-            _ordered(given.low.value, given.high.value, f"disturbances.{key}", where)
-            found[key] = Shaking(given.rms.value, given.low.value, given.high.value)
-        elif isinstance(given, OscillationTable):
-            found[key] = Oscillation(given.amplitude.value, given.frequency.value)
-    if table.heights is not None:
-        if len(table.heights) != len(layout.names):
-            raise StudyError(
-                where,
-                f"disturbances.heights: found {len(table.heights)}, expected one for each of "
-                f"{', '.join(layout.names)}",
-            )
-        found["heights"] = tuple(each.value for each in table.heights)
+    shaking = {key: getattr(table, key) for key in ("pitch", "heave", "axial", "roll", "yaw")}
+    found = settings_of(Disturbances, table, **shaking)
+    for key, each in shaking.items():
+        if isinstance(each, Shaking):
+            _ordered(each.low, each.high, f"disturbances.{key}", where)
+    if table.heights is not None and len(found.heights) != len(layout.names):
+        raise StudyError(
+            where,
+            f"disturbances.heights: found {len(found.heights)}, expected one for each of {', '.join(layout.names)}",
+        )
     if table.clip and all(each.range is None for each in sensors.values()):
         raise StudyError(
             where, "disturbances.clip: found true, but no range of a sensor, expected one under [sensors]"
         )
-    return Disturbances(clip=table.clip, **found)
+    return found
 
 
 def _ordered(low: float, high: float, key: str, where: object) -> None:

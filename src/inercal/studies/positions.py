@@ -47,8 +47,8 @@ PlanName = Annotated[str, BeforeValidator(_known_plan), Field(json_schema_extra=
 class GridTable(Strict):
     """All combinations of evenly spaced angles over full circles, the outer axis slowest."""
 
-    phi1: Count = Field(description="number of outer angles")
-    phi2: Count = Field(description="number of angles of the next axis")
+    phi1: Count = Field(description="number of outer angles", examples=[36])
+    phi2: Count = Field(description="number of angles of the next axis", examples=[36])
     phi3: Count | None = Field(default=None, description="number of inner angles of a three-axis table")
     offset: Literal["half", "none"] = Field(
         default="half", description="start half a step from zero, clear of singular attitudes, or at zero"
@@ -58,15 +58,24 @@ class GridTable(Strict):
 class PositionsTable(Strict):
     """The positions to analyse, simulate or calibrate at: one of four."""
 
-    grid: GridTable | None = Field(default=None, title="Grid", description="evenly spaced angles")
-    plan: PlanName | None = Field(default=None, description="a plan of a two-axis table by its name")
+    grid: GridTable | None = Field(
+        default=None,
+        title="Grid",
+        description="numbers of evenly spaced angles; offset none starts at zero",
+        examples=[{"phi1": 36, "phi2": 36, "offset": "half"}],
+    )
+    plan: PlanName | None = Field(default=None, description="instead: a plan of a two-axis table by its name")
     list_: list[list[Angle]] | None = Field(
-        default=None, alias="list", min_length=1, description="the angles of each position"
+        default=None,
+        alias="list",
+        min_length=1,
+        description="instead: the angles of each position",
+        examples=[[["0 deg", "45 deg"]]],
     )
     file: str | None = Field(
         default=None,
         min_length=1,
-        description="a CSV beside the study with the header phi1 [deg],phi2 [deg] and a position a row",
+        description="instead: a CSV beside the study with the header phi1 [deg],phi2 [deg] and a position a row",
         examples=["positions.csv"],
     )
 

@@ -149,7 +149,10 @@ def _error_field(slot: Slot) -> Any:
     table = OffsetErrorTable if slot.is_offset else AngularErrorTable
     note = "; only where it is given" if slot.optional else ""
     field = Field(
-        default=None, title=slot.name, description=f"{slot.what}; usual scope {slot.scope.value}{note}"
+        default=None,
+        title=slot.name,
+        description=f"{slot.what}; usual scope {slot.scope.value}{note}",
+        examples=[{"normal": "10 um" if slot.is_offset else "1 arcmin"}],
     )
     return (Annotated[table | Literal["none"], OrNone()], field)
 
@@ -163,7 +166,10 @@ class ErrorsTable(_BY_NAME):  # type: ignore[misc]
     """Errors of the table: one default, and by name what differs from it."""
 
     default: AngularErrorTable | None = Field(
-        default=None, title="Default", description="of every error not named here, the optional ones aside"
+        default=None,
+        title="Default",
+        examples=[{"uniform": "2 arcmin"}],
+        description="of every error not named here, the optional ones aside",
     )
 
 
@@ -180,9 +186,15 @@ class BaseTable(Strict):
 class LimitsTable(Strict):
     """Ranges within which the axes turn; a whole circle if absent."""
 
-    phi1: tuple[Angle, Angle] | None = Field(default=None, description="lowest and highest outer angle")
-    phi2: tuple[Angle, Angle] | None = Field(default=None, description="of the next axis")
-    phi3: tuple[Angle, Angle] | None = Field(default=None, description="of the inner axis of three")
+    phi1: tuple[Angle, Angle] | None = Field(
+        default=None, description="lowest and highest outer angle", examples=[["-90 deg", "90 deg"]]
+    )
+    phi2: tuple[Angle, Angle] | None = Field(
+        default=None, description="of the next axis", examples=[["-180 deg", "180 deg"]]
+    )
+    phi3: tuple[Angle, Angle] | None = Field(
+        default=None, description="of the inner axis of three", examples=[["-180 deg", "180 deg"]]
+    )
 
 
 class RigTable(Strict):
@@ -190,7 +202,9 @@ class RigTable(Strict):
 
     kind: RigKind = Field(description="two axes (outer y, inner z) or three (z, y, x)")
     errors: ErrorsTable = Field(
-        default=ErrorsTable(), title="Errors", description="errors of the table; none if absent"
+        default=ErrorsTable(),
+        title="Errors",
+        description='errors of the table, NAME = "none" leaves one out; none if absent',
     )
     base: BaseTable = Field(
         default=BaseTable(), title="Base", description="known attitude of the base; level and north if absent"

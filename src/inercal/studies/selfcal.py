@@ -158,7 +158,11 @@ class HarmonicTable(Strict):
 class DisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
     """What a simulation adds to the model; nothing if absent."""
 
-    harmonics: list[HarmonicTable] = Field(default=[], description="errors of the encoders; none if absent")
+    harmonics: list[HarmonicTable] = Field(
+        default=[],
+        description="errors of the encoders; none if absent",
+        examples=[[{"axis": "z", "order": 2, "amplitude": "5 arcsec", "phase": "0 deg"}]],
+    )
 
 
 class SelfcalStudyFile(Strict):

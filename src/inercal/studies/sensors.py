@@ -46,14 +46,18 @@ _Slope = {
 _Relative = Annotated[Ratio, SlopeText("number", "50 ppm/K")]
 
 
+def _bias_like(*examples: str) -> Any:
+    """The key of a bias."""
+    return Field(
+        default=None,
+        description="what it indicates at zero input; 0 if absent; in volts or counts too where its scale is",
+        examples=list(examples),
+    )
+
+
 class _SensorTable(Strict):
     """What accelerometers and gyros have in common; ``scale``, ``bias``, ``bias_slope`` and ``range`` differ."""
 
-    bias: str | None = Field(
-        default=None,
-        description="what it indicates at zero input; 0 if absent; in volts or counts too where its scale is",
-        examples=["1 mg", "2.5 V"],
-    )
     scale_slope: _Relative | None = Field(
         default=None, description="relative change of the scale with temperature; 0 if absent"
     )
@@ -93,12 +97,15 @@ class AccelerometerTable(_SensorTable):
         default=None, description="of its input axis from +x (forward) towards -z (down), in place of axis"
     )
     r: _Position = Field(description="how far ahead of the pivot it sits")
-    z: _Position | None = Field(default=None, description="how far above the pivot; 0 if absent")
+    z: _Position | None = Field(
+        default=None, description="how far above the pivot; 0 if absent", examples=["20 mm"]
+    )
     scale: Annotated[Ratio, _SCALES["acceleration"]] | None = Field(
         default=None,
         description="what its column is multiplied by; with a unit over V or count, or the inverse, where the column "
         "is in volts or counts; 1 if absent",
     )
+    bias: str | None = _bias_like("1 mg", "2.5 V")
     range: Annotated[Quantity, _G] | None = Field(
         default=None, description="at or beyond which it is saturated; not known if absent"
     )
@@ -123,6 +130,7 @@ class RateGyroTable(_SensorTable):
         description="what its column is multiplied by; with a unit over V or count, or the inverse, where the column "
         "is in volts or counts; 1 if absent",
     )
+    bias: str | None = _bias_like("0.1 deg/s", "2.5 V")
     range: Annotated[Quantity, _RATE] | None = Field(
         default=None, description="at or beyond which it is saturated; not known if absent"
     )

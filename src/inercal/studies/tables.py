@@ -6,6 +6,7 @@ import datetime
 import functools
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 from pydantic import Field, GetCoreSchemaHandler, create_model
@@ -24,7 +25,7 @@ T = TypeVar("T")
 def table_of(settings: type) -> Any:
     """The pydantic model of a table whose keys are those of ``settings``; a base class for tables with more keys."""
     hints = get_type_hints(settings)
-    system = settings.__module__.split(".")[1].capitalize()
+    system = settings.__module__.split(".")[:2][-1].capitalize()
     fields: dict[str, Any] = {
         key.name or field.name: (
             _quantity(key) if key.dimension else _plain(hints[field.name]),
@@ -49,7 +50,7 @@ def settings_of(settings: type[T], table: Any, **more: Any) -> T:
             if key.u:
                 values[key.u] = stated.u
         elif stated is not None:
-            values[field.name] = stated
+            values[field.name] = Path(stated) if "Path" in str(hints[field.name]) else stated
     return settings(**values | more)
 
 
@@ -106,9 +107,9 @@ def _described(key: Key, default: Any) -> Any:
     return Field(
         default=absent,
         description=key.says,
-        ge=key.least,
+        ge=None if key.several else key.least,
         le=key.most,
-        min_length=1 if key.several else None,
+        min_length=int(key.least or 0) or None if key.several else None,
         examples=examples,
         json_schema_extra={"default": key.default} if key.default else None,
     )

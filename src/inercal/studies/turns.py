@@ -85,7 +85,7 @@ class PlanTable(Strict):
         description=f"one after the other, each a joint and an angle, as {_EXPECTED}",
     )
     path: Literal["paper", "paper two turns", "best", "plain"] | None = Field(
-        default=None, description="a path by its name, at the rate of the plan"
+        default=None, description="instead: a path by its name, at the rate of the plan"
     )
     rate: RateAbove | None = Field(default=None, description="of the turns; 1 deg/s if absent")
     step: Duration | None = Field(default=None, description="from row to row; 0.2 s if absent")

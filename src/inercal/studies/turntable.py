@@ -55,12 +55,16 @@ class DesignTable(table_of(Design)):  # type: ignore[misc]
         default=None,
         title="Candidates",
         description="positions to choose from; every 10 deg from 0 if absent",
+        examples=[{"phi1": 36, "phi2": 36, "offset": "none"}],
     )
     compare: list[PlanName] | None = Field(
         default=None, description="named plans to set beside; all the table can take if absent"
     )
     sensitivity: ConstraintTable | None = Field(
-        default=None, title="Sensitivity", description="only positions of low sensitivity; all if absent"
+        default=None,
+        title="Sensitivity",
+        description="only positions of low sensitivity; all if absent",
+        examples=[{"factors": ["dtheta_x"], "outputs": ["ax"], "below": 0.3}],
     )
 
 
@@ -76,7 +80,10 @@ class RateTestTable(table_of(RateTest)):  # type: ignore[misc]
     """A rate test of gyros: the table turns at each rate in turn."""
 
     at: AnglesTable = Field(
-        default=AnglesTable(), title="At", description="angles of a simulation, where each stay begins"
+        default=AnglesTable(),
+        title="At",
+        description="angles of a simulation, where each stay begins",
+        examples=[{"phi1": "90 deg"}],
     )
 
 

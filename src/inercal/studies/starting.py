@@ -1,0 +1,112 @@
+"""What a new study of each kind states: the keys in force; `inercal new` adds all others as comments."""
+
+from typing import Final
+
+UNKNOWN: Final = "?"
+"""The value of a key that the user must fill in."""
+
+_COMMON = '[site]\nlatitude = "?"\n[traceability]\n[conditions]\n'
+
+_TURNTABLE = (
+    _COMMON
+    + """
+[rig]
+kind = "two_axis_turntable"
+[rig.errors]
+default = { uniform = "2 arcmin" }
+[positions]
+grid = { phi1 = 36, phi2 = 36, offset = "half" }
+[analysis]
+outputs = ["ax", "ay", "az", "wx", "wy"]
+method = "exact"
+[design]
+positions = 24
+criterion = "D"
+"""
+)
+
+_SELFCAL = (
+    _COMMON
+    + """
+[rig]
+kind = "three_axis_gimbals"
+heading = "0 deg"
+[rig.limits]
+[plan]
+turns = [["z", "180 deg"], ["x", "90 deg"], ["z", "-180 deg"], ["x", "90 deg"]]
+rate = "1 deg/s"
+step = "0.2 s"
+[truth]
+kg0 = ["0.08 deg/h", "-0.06 deg/h", "0.10 deg/h"]
+eta = ["60 arcsec", "-90 arcsec", "120 arcsec"]
+ds = ["60 arcsec", "-45 arcsec", "90 arcsec"]
+do = ["-75 arcsec", "50 arcsec", "-100 arcsec"]
+ka0 = ["100 ug", "-150 ug", "200 ug"]
+ka1 = ["500 ppm", "-300 ppm", "800 ppm"]
+[noise]
+angle_random_walk = "5e-4 deg/sqrt(h)"
+accelerometer = "10 ug"
+encoder = "2 arcsec"
+[prior]
+kg0 = "0.3 deg/h"
+eta = "300 arcsec"
+ds = "300 arcsec"
+do = "300 arcsec"
+ka0 = "500 ug"
+ka1 = "1500 ppm"
+[goal]
+[filter]
+kind = "error-state"
+[disturbances]
+[design]
+turns = 5
+"""
+)
+
+_AOA = (
+    _COMMON
+    + """
+[rig]
+kind = "sting"
+[sensors.a1]
+axis = "-z"
+r = "-0.25 m"
+[sensors.a2]
+axis = "+x"
+r = "0.20 m"
+[sensors.a3]
+axis = "+z"
+r = "0.25 m"
+[sensors.gyro]
+[noise]
+accelerometer = "1e-4 g"
+accelerometer_bias = "1e-4 g"
+gyro = "0.2 deg/s"
+gyro_bias = "5 deg/h"
+[prior]
+[prior.heave]
+[prior.axial]
+[motion]
+kind = "sine"
+duration = "60 s"
+sample_rate = "1 kHz"
+mean = "30 deg"
+amplitude = "10 deg"
+frequency = "1 Hz"
+[disturbances]
+[timing]
+[estimator]
+states = 19
+[methods]
+[model]
+[flow]
+"""
+)
+
+STARTING: Final = {
+    "imu": _COMMON + '[imu]\nmethod = "multiposition"\n',
+    "turntable": _TURNTABLE,
+    "selfcal": _SELFCAL,
+    "aoa": _AOA,
+}
+"""A study of each kind as TOML: it loads as it is, but for the keys that must be filled in."""
