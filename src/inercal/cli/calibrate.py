@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.imu.multiposition.calibration import Calibration
+    from inercal.imu.multiposition.calibration import MultipositionCalibration
     from inercal.records.record import Record
     from inercal.report.html import Picture
 
@@ -88,7 +88,7 @@ def calibrate_imu(
     return hand_over(estimate, [printed(estimate)], page, output)
 
 
-def _imu_pictures(found: Calibration | FerrarisCalibration | AidedCalibration) -> list[Picture]:
+def _imu_pictures(found: MultipositionCalibration | FerrarisCalibration | AidedCalibration) -> list[Picture]:
     """The pictures of whichever method was used."""
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
@@ -120,7 +120,8 @@ def calibrate_turntable(
     """Calibrate an instrument that was taken through positions on a turntable."""
     from inercal.studies.load import load_turntable_study
     from inercal.turntable.display import tolerances
-    from inercal.turntable.task import Calibration, calibrate
+    from inercal.turntable.positions.calibration import PositionCalibration
+    from inercal.turntable.task import calibrate
 
     ((found, estimate),) = _solve(
         files,
@@ -137,7 +138,7 @@ def calibrate_turntable(
         from inercal.report.html import render
         from inercal.turntable.figures import pictures, rate_pictures
 
-        drawn = pictures(found) if isinstance(found, Calibration) else rate_pictures(found)
+        drawn = pictures(found) if isinstance(found, PositionCalibration) else rate_pictures(found)
         return render(shown, drawn, "Calibration on a turntable")
 
     return hand_over(estimate, [printed(shown), tolerances(estimate)], page, output)

@@ -49,8 +49,7 @@ def design_positions(
     """Find the positions of a turntable that calibrate best."""
     from inercal._files import write_text
     from inercal.studies.load import files_of, load_turntable_study
-    from inercal.turntable.positions.planning import REFERENCES
-    from inercal.turntable.task import design
+    from inercal.turntable.positions.planning import REFERENCES, design
 
     output.check((*WHOLE, ".csv"), (study,))
     clock = time.perf_counter()

@@ -25,12 +25,12 @@ from inercal.turntable.weights import weights
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
+    from inercal.turntable.positions.calibration import PositionCalibration
     from inercal.turntable.positions.planning import Designed
     from inercal.turntable.rate.calibration import RateCalibration
     from inercal.turntable.readings import Readings
     from inercal.turntable.sensitivity.analysis import Analysed
     from inercal.turntable.settings import TurntableSettings
-    from inercal.turntable.task import Calibration
 
 
 _FLAGS = 12
@@ -43,12 +43,12 @@ _SCOPES = {
 }
 
 
-def pictures(calibration: Calibration) -> list[Picture]:
+def pictures(calibration: PositionCalibration) -> list[Picture]:
     """Draw what there is to see of a calibration.
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : PositionCalibration
         Of any status; where the positions do not identify the terms there is one picture, of the positions.
     """
     found, fit, estimate = calibration.readings, calibration.fitting.fit, calibration.shown
