@@ -18,7 +18,7 @@ from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.settings import Filter
 from inercal.studies.load import load_selfcal_study

@@ -11,6 +11,7 @@ house and the laws always run first.
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -23,8 +24,12 @@ ROOT = Path(__file__).parents[1]
 SECONDS = 35.0
 """Tests that have not begun after this time are left to `make test` [s]."""
 
+FILES = 60
+"""The nearest test files that are read at all: reading them all would take half of the time."""
+
 ALWAYS = ("tests/test_architecture.py", "tests/laws")
 PAGES = "tests/docs/test_pages.py"
+APART = "docs/how-to/repeat-and-compare.md"
 OF_PAGES = ("tests/docs/test_claims.py", "tests/docs/test_readme.py")
 
 
@@ -68,6 +73,7 @@ def imported(tree: ast.Module, modules: dict[str, Path]) -> set[str]:
     return found & modules.keys()
 
 
+@functools.cache
 def graph() -> tuple[dict[str, Path], dict[str, set[str]]]:
     """Files of the modules of the package, the benchmarks and the tests; and what each imports."""
     others = helpers()
@@ -113,7 +119,7 @@ def pages(files: list[str]) -> list[str]:
     runs = [
         file
         for file in changed
-        if re.search(r"^```(python|console)$", (ROOT / file).read_text("utf-8"), re.M)
+        if file != APART and re.search(r"^```(python|console)$", (ROOT / file).read_text("utf-8"), re.M)
     ]
     return [f"{PAGES}::test_a_page_runs_and_prints_what_it_shows[{file}]" for file in runs] + (
         list(OF_PAGES) if changed else []
@@ -126,8 +132,11 @@ def selected(files: list[str]) -> list[str]:
     found = distances(touched(files, modules), uses)
     tests = {name: modules[name].relative_to(ROOT).as_posix() for name in found if name.startswith("test_")}
     near = sorted(tests, key=lambda name: (found[name], len(uses[name]), tests[name]))
-    always = [*ALWAYS, *pages(files)]
-    return always + [tests[name] for name in near if not tests[name].startswith(ALWAYS)]
+    return [
+        *ALWAYS,
+        *pages(files),
+        *[tests[name] for name in near if not tests[name].startswith(ALWAYS)][:FILES],
+    ]
 
 
 def main() -> int:

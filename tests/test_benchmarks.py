@@ -41,6 +41,7 @@ def column(text, head):
     return found
 
 
+@pytest.mark.slow
 def test_each_part_gives_rows(quick):
     for title, rows in quick.items():
         assert rows, title
@@ -50,6 +51,7 @@ def test_each_part_gives_rows(quick):
             assert row.ratio is None or row.peer
 
 
+@pytest.mark.slow
 def test_table_objects_and_picture_are_written(quick, tmp_path):
     told = {
         "date": "2026-11-22T00:00:00+00:00",
@@ -94,6 +96,7 @@ def test_a_slope_is_the_exponent():
     assert curve.slope == pytest.approx(2.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_page_has_the_rows_that_the_scripts_give(quick):
     """By name: the page's table is of the scripts as they are."""
     known = {cells[0] for cells in column(PAGE.read_text(encoding="utf-8"), "Work")}
@@ -127,6 +130,7 @@ def test_no_other_speed_is_claimed():
         assert SPEED.findall(text) == [], page.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "says"),
     [
@@ -158,6 +162,7 @@ def test_a_short_campaign_of_faults(capsys, monkeypatch):
     assert "stuck_encoder 1" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_stress_campaign_goes_on_where_it_stopped(tmp_path, capsys, monkeypatch):
     """Kept in chunks, resumed, its runs that broke a law made again, in a table: as one undisturbed campaign."""
     stress = importlib.import_module("stress")

@@ -40,6 +40,7 @@ print(_jit.cache_folder())
 """
 
 
+@pytest.mark.slow
 def test_a_changed_callee_changes_the_result_of_its_cached_caller(tmp_path):
     """numba's own cache would give the old number here: it hashes the caller's file alone."""
     package = tmp_path / "tiny"
@@ -60,6 +61,7 @@ def test_a_changed_callee_changes_the_result_of_its_cached_caller(tmp_path):
     assert python(program, **here) == "30.0 1"
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing(tmp_path):
     """Of the whole package a copy, so that nobody's editing meanwhile starts a new cache."""
     shutil.copytree(PACKAGE, tmp_path / "inercal", ignore=shutil.ignore_patterns("__pycache__"))

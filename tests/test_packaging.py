@@ -99,6 +99,7 @@ def test_the_metadata_say_what_a_user_of_an_index_asks(built):
     assert "# inercal" in text, "the README is the page of the project"
 
 
+@pytest.mark.slow
 def test_the_installed_package_calibrates_outside_the_tree(installed, tmp_path):
     def inercal_says(*arguments: object) -> str:
         return run(

@@ -8,6 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from inercal._toml import Strict, check, read_toml
 from inercal.errors import InputError, MapError, StudyError
+from rows import for_each
 
 
 class Leaf(Strict):
@@ -24,7 +25,7 @@ class Tree(Strict):
     leaves: dict[str, Leaf] = Field(default_factory=dict)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("data", "message"),
     [
         ({"leef": {}}, "f.toml: leef: unknown key, did you mean leaf?"),

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 from inercal.errors import QuantityError
 from inercal.report.style import plain_unit
 from inercal.units import _TABLE, STANDARD_GRAVITY, parse_quantity, parse_unit, shown
+from rows import for_each
 
 UNITS = [(unit, dimension) for dimension, (_, factors) in _TABLE.items() for unit in factors]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "dimension", "si"),
     [
         ("1 deg/h", "rate", 4.84813681e-6),
@@ -37,7 +38,7 @@ def test_the_unit_g_is_no_gravity_of_a_site():
     assert STANDARD_GRAVITY == 9.80665
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "value", "u"),
     [
         ("9.81744(2) m/s^2", 9.81744, 2e-5),
@@ -73,7 +74,7 @@ def test_format_and_parse_round_trip(unit_of, value):
     assert parse_quantity(quantity.text, dimension, "key") == quantity
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("typed", "meant"),
     [
         ("deg / h", "deg/h"),
@@ -102,7 +103,7 @@ def test_spellings(typed, meant):
     assert parse_unit(typed) == parse_unit(meant)
 
 
-@pytest.mark.parametrize("unit", [unit for unit, _ in UNITS])
+@for_each("unit", [unit for unit, _ in UNITS])
 def test_units_are_read_as_pages_write_them(unit):
     """What a report states, as N in deg/√h, can be copied into a study."""
     assert parse_unit(plain_unit(unit)) == parse_unit(unit)
@@ -117,7 +118,7 @@ def test_white_noise_of_a_rate_is_a_random_walk_of_its_angle():
     )
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("unit", "dimension", "factor"),
     [
         ("inch", "length", 0.0254),
@@ -135,7 +136,7 @@ def test_rare_units_are_looked_up_in_pint(unit, dimension, factor):
     assert (found.dimension, found.factor) == (dimension, pytest.approx(factor))
 
 
-@pytest.mark.parametrize("unit", ["furlongs per", "dB", "degR", "m*9^9^9^9", "kg", "m+m", "a" * 3000, "("])
+@for_each("unit", ["furlongs per", "dB", "degR", "m*9^9^9^9", "kg", "m+m", "a" * 3000, "("])
 def test_no_unit(unit):
     with pytest.raises(QuantityError, match=r"found the unit .* expected one such as"):
         parse_unit(unit)

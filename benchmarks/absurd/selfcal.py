@@ -8,7 +8,7 @@ from absurd.outcome import made
 from absurd.stream import streamed
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.selfcal.display import displayed
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.platform.coefficients import GROUPS
 from inercal.selfcal.result.columns import history_record

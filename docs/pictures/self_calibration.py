@@ -7,10 +7,10 @@ import numpy as np
 
 from inercal.geometry.earth import gravity
 from inercal.geometry.site import Site
-from inercal.report.selfcal import attitude_errors
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.figures import relative_errors
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.figures.filters import attitude_errors
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import path
 from inercal.selfcal.settings import Noise, SelfcalSettings

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import cast
 
 
 class Harm(enum.Enum):
@@ -16,37 +18,43 @@ class Harm(enum.Enum):
 
 @dataclass(frozen=True)
 class Code:
-    """What a code means, and whether findings of it do harm."""
+    """What a code means, and whether findings of it do harm.
+
+    ``rank`` orders what may cause residuals that are too large, 1 the likeliest; 0 explains none. ``gross``: the fault
+    is one of unit, order, sign or time, for which a result is another one.
+    """
 
     meaning: str
     harm: Harm
+    rank: int = 0
+    gross: bool = False
 
 
 _NEVER, _BY_SIZE, _ALWAYS = Harm
 
 #: codes are a contract; more may be added
 CODES: dict[str, Code] = {
-    "gap": Code("samples are missing", _NEVER),
+    "gap": Code("samples are missing", _NEVER, rank=15),
     "duplicate_time": Code("a time stamp is repeated", _NEVER),
-    "backward_time": Code("time runs backward", _BY_SIZE),
+    "backward_time": Code("time runs backward", _NEVER),
     "nan": Code("values are missing or not numbers", _NEVER),
     "bad_row": Code("rows that cannot be read as numbers", _NEVER),
     "truncated": Code("the file ends within a row", _NEVER),
-    "file_changed": Code("a file was written to while it was read", _BY_SIZE),
-    "saturation": Code("a sensor sits at an extreme of its range", _BY_SIZE),
-    "dead_channel": Code("a channel never changes", _BY_SIZE),
-    "rate_change": Code("the sample rate changes", _BY_SIZE),
+    "file_changed": Code("a file was written to while it was read", _NEVER),
+    "saturation": Code("a sensor sits at an extreme of its range", _BY_SIZE, rank=8),
+    "dead_channel": Code("a channel never changes", _BY_SIZE, rank=6),
+    "rate_change": Code("the sample rate changes", _NEVER, rank=7),
     "other_clock": Code("channels have clocks of their own", _NEVER),
-    "unit_suspect": Code("the values do not fit the stated unit", _BY_SIZE),
-    "sign_suspect": Code("an axis looks reversed", _BY_SIZE),
-    "channel_swap": Code("axes look exchanged", _BY_SIZE),
-    "stuck_encoder": Code("an angle stands still while the instrument turns", _BY_SIZE),
-    "command_shift": Code("commanded and measured motion are shifted in time", _BY_SIZE),
-    "wrap_2pi": Code("an angle jumps by a full turn", _BY_SIZE),
+    "unit_suspect": Code("the values do not fit the stated unit", _BY_SIZE, rank=1, gross=True),
+    "sign_suspect": Code("an axis looks reversed", _BY_SIZE, rank=3, gross=True),
+    "channel_swap": Code("axes look exchanged", _BY_SIZE, rank=2, gross=True),
+    "stuck_encoder": Code("an angle stands still while the instrument turns", _BY_SIZE, rank=5),
+    "command_shift": Code("commanded and measured motion are shifted in time", _BY_SIZE, rank=4, gross=True),
+    "wrap_2pi": Code("an angle jumps by a full turn", _NEVER),
     "at_prior": Code("a parameter is no better known than before the measurement", _NEVER),
     "gimbal_lock": Code("two axes of the gimbals come close to each other", _BY_SIZE),
-    "outlier": Code("single samples far from their neighbours", _NEVER),
-    "contradiction": Code("sensors contradict each other", _ALWAYS),
+    "outlier": Code("single samples far from their neighbours", _BY_SIZE, rank=16),
+    "contradiction": Code("sensors contradict each other", _BY_SIZE, rank=14),
     "gyro_missing": Code("there are no gyro channels, or they cannot be calibrated", _NEVER),
     "gyro_restless": Code("the gyro is too restless in the holds to help in finding them", _NEVER),
     "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),
@@ -54,43 +62,57 @@ CODES: dict[str, Code] = {
     "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
-    "hysteresis": Code("values on rising and on falling temperature differ", _BY_SIZE),
-    "outside_range": Code("a value is stated outside the range it was measured over", _BY_SIZE),
-    "excess_scatter": Code("the scatter of the residuals exceeds what the sensor noise explains", _BY_SIZE),
+    "hysteresis": Code("values on rising and on falling temperature differ", _NEVER),
+    "outside_range": Code("a value is stated outside the range it was measured over", _ALWAYS),
+    "excess_scatter": Code(
+        "the scatter of the residuals exceeds what the sensor noise explains", _BY_SIZE, rank=12
+    ),
     "few_degrees_of_freedom": Code("hardly more data than unknowns", _NEVER),
     "resolution": Code(
-        "steps of the output hide its noise, or numbers have more digits than can be kept", _BY_SIZE
+        "steps of the output hide its noise, or numbers have more digits than can be kept", _NEVER
     ),
     "poor_section": Code("a section of the recording does not hold what it should", _BY_SIZE),
     "turn_cut": Code("a turn goes on beyond its section", _BY_SIZE),
-    "turn_doubtful": Code("which motion is a turn is not certain", _BY_SIZE),
+    "turn_doubtful": Code("which motion is a turn is not certain", _NEVER),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
     "uncertain_site": Code("gravity or earth rate is known so badly that it rules the uncertainties", _NEVER),
     "whole_turns": Code(
-        "the angle of a turning axis is not known, and whole turns are taken for granted", _BY_SIZE
+        "the angle of a turning axis is not known, and whole turns are taken for granted", _NEVER
     ),
     "weak_term": Code("a term is hardly known", _NEVER),
     "noise_misfit": Code("the noise is not of the kinds that are fitted", _NEVER),
     "large_errors": Code("errors of the table are so large that their squares matter", _ALWAYS),
-    "not_stated": Code("a file does not state what a calibration should", _NEVER),
+    "not_stated": Code("a file does not state what a calibration should", _BY_SIZE),
     "not_held": Code("something of a calibration is not taken along", _NEVER),
-    "other_frame": Code("the axes are not those of the calibration", _BY_SIZE),
-    "no_coefficients": Code("nothing is known of the instrument by which table errors act", _BY_SIZE),
+    "other_frame": Code("the axes are not those of the calibration", _NEVER),
+    "no_coefficients": Code("nothing is known of the instrument by which table errors act", _NEVER),
     "not_at_rest": Code("the instrument moves, or is disturbed, where it should be at rest", _BY_SIZE),
     "bad_verdict": Code("a calibration that is used ended with a bad verdict", _ALWAYS),
-    "other_model": Code("two calibrations are not of the same kind", _BY_SIZE),
-    "same_recording": Code("two calibrations rest on the same recording", _BY_SIZE),
+    "other_model": Code("two calibrations are not of the same kind", _ALWAYS),
+    "same_recording": Code("two calibrations rest on the same recording", _NEVER),
     "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),
     "flexure": Code("the support of the model shakes its sensors", _ALWAYS),
-    "unmodelled": Code("the recording shows errors that the model leaves out", _ALWAYS),
-    "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE),
+    "unmodelled": Code("the recording shows errors that the model leaves out", _BY_SIZE, rank=9),
+    "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE, rank=10),
     "low_scatter": Code("the scatter of the residuals is below what the stated noise explains", _NEVER),
-    "prior_suspect": Code("a value is far outside what its prior allows", _BY_SIZE),
-    "filter_fails": Code("an estimator fails on a sound recording", _BY_SIZE),
+    "prior_suspect": Code("a value is far outside what its prior allows", _ALWAYS, rank=11),
+    "filter_fails": Code("an estimator fails on a sound recording", _ALWAYS, rank=13),
     "perhaps_common": Code("sources that may act alike in two calibrations", _NEVER),
-    "failed_case": Code("a case of the validation did not pass", _BY_SIZE),
+    "failed_case": Code("a case of the validation did not pass", _NEVER),
 }
+
+
+def causes(findings: Iterable[Finding]) -> list[Finding]:
+    """Those of the findings that explain residuals too large, the likeliest first."""
+    explaining = [each for each in findings if CODES[each.code].rank]
+    return sorted(explaining, key=lambda each: CODES[each.code].rank)
+
+
+def settled(findings: Iterable[Finding], *codes: str) -> tuple[Finding, ...]:
+    """The findings, those of these codes without harm: what they say was left out of the fit, or corrected."""
+    return tuple(replace(each, harm=()) if each.code in codes else each for each in findings)
+
 
 EVERYTHING = ("*",)
 """The ``harm`` of a finding that may shift every value; an estimate puts its own names in its place."""
@@ -101,14 +123,14 @@ class Finding:
     """One thing worth knowing: a code of `CODES`, a sentence, and where it was seen.
 
     ``harm`` names what an effect outside the model may shift by more than its u: parameters, ``theta`` of angles,
-    channels of a recording, or `EVERYTHING`. Always empty for a code that never does harm; `EVERYTHING` if absent for
-    one that always does.
+    channels of a recording, or `EVERYTHING`. Always empty for a code that never does harm; to be stated, if only as
+    empty, for one that does by size; `EVERYTHING` if absent for one that always does.
     """
 
     code: str
     message: str
     where: str = ""
-    harm: tuple[str, ...] = ()
+    harm: tuple[str, ...] = cast("tuple[str, ...]", None)
 
     def __post_init__(self) -> None:
         """Refuse a code that is not in the table, and harm that its code rules out."""
@@ -117,6 +139,10 @@ class Finding:
         match CODES[self.code].harm:
             case Harm.NEVER if self.harm:
                 raise ValueError(f"findings of the code {self.code!r} do no harm, found {self.harm}")
+            case Harm.NEVER:
+                object.__setattr__(self, "harm", ())
+            case Harm.BY_SIZE if self.harm is None:
+                raise ValueError(f"a finding of the code {self.code!r} must state its harm, if only ()")
             case Harm.ALWAYS if not self.harm:
                 object.__setattr__(self, "harm", EVERYTHING)
 
@@ -125,6 +151,7 @@ class Status(enum.Enum):
     """How an estimate ended. The value is the code of the JSON result; codes are a contract."""
 
     OK = "ok"
+    SUSPECT = "suspect"
     ILL_CONDITIONED = "ill_conditioned"
     NOT_CONVERGED = "not_converged"
     INCONSISTENT = "inconsistent"
@@ -136,9 +163,15 @@ class Status(enum.Enum):
         """One sentence: what this verdict says."""
         return _MEANING[self]
 
+    @property
+    def done(self) -> bool:
+        """True where there are numbers to be used, though perhaps with care: ``ok`` and ``suspect``."""
+        return self in (Status.OK, Status.SUSPECT)
+
 
 _MEANING = {
     Status.OK: "the estimate is sound",
+    Status.SUSPECT: "an effect outside the model may shift some values by more than their uncertainty",
     Status.ILL_CONDITIONED: "the data fix some combination of the parameters only weakly",
     Status.NOT_CONVERGED: "the iteration ended before it reached a minimum",
     Status.INCONSISTENT: "the data contradict the model or the stated noise",

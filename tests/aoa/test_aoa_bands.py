@@ -38,6 +38,7 @@ def ratios():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_each_filter_is_near_its_figure(ratios, name):
     for method in FILTERS:
@@ -45,6 +46,7 @@ def test_each_filter_is_near_its_figure(ratios, name):
             assert (ratios[name, method] < ONE).all(), method
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", FILTERS)
 def test_over_all_scenarios_each_filter_reaches_its_figures(ratios, method):
     cells = [ratios[name, method] for name in FIGURES if held(name, method)]
@@ -52,6 +54,7 @@ def test_over_all_scenarios_each_filter_reaches_its_figures(ratios, method):
     assert (np.median(cells, axis=0) < limit).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_papers_method_comes_out_as_stated(ratios, name):
     """Its errors are noise and motion, hardly biases: within a half of the figures either way."""

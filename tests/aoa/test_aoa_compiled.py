@@ -71,6 +71,7 @@ def test_a_second_process_compiles_nothing(compiled):
     np.testing.assert_equal(again["found"], compiled["found"])
 
 
+@pytest.mark.slow
 def test_kernels_say_the_same_as_plain_python(compiled):
     """Without compiling: apart by rounding alone."""
     plain = ran(NUMBA_DISABLE_JIT="1")

@@ -20,6 +20,7 @@ def recorded(settings, seed=1):
     return simulate(settings, np.random.default_rng(seed)).recording
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["base", "chirp", "buffet"])
 def test_the_delay_is_found_within_its_uncertainty(name):
     """40 draws of 20 s: the mean square of error/u is 1 within 3 standard deviations, sqrt(2/40) each."""

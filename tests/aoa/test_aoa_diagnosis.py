@@ -32,6 +32,7 @@ def stated(settings, **changes):
     return replace(settings, layout=replace(settings.layout, **changes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0.5, -5.0])
 def test_an_axis_that_is_turned(degrees):
     # the sensor truly looks along 0 deg, the study says otherwise
@@ -51,6 +52,7 @@ def test_gravity_of_another_site():
     assert float(re.match(r"gravity looks to be (\S+) m/s\^2", message)[1]) == pytest.approx(G, abs=4e-3)
 
 
+@pytest.mark.slow
 def test_a_scale_and_a_bias():
     recording = recorded(SWEEP)
     code, message = said(replace(recording, acc=recording.acc * [1.0, 1.01, 1.0]), SWEEP)
@@ -69,6 +71,7 @@ def test_one_angle_cannot_tell_and_says_so():
     assert "the bias of a2 looks" in message
 
 
+@pytest.mark.slow
 def test_yaw_that_no_gyro_tells():
     amplitude, frequency = 1.0 * DEG, 8.0
     moving = replace(SHORT, disturbances=Disturbances(yaw=Oscillation(amplitude, frequency)))
@@ -112,6 +115,7 @@ def test_noise_is_not_told_from_uneven_rows():
     assert scatter(t, 1e3 * np.sin(2.0 * np.pi * t)) is None
 
 
+@pytest.mark.slow
 def test_a_roll_that_is_not_stated():
     # a plane model sees the part of gravity and of lever arms across it times the cosine of the roll
     roll = 25.0 * DEG

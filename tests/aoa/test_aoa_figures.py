@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario
 
-from inercal.aoa.figures import angle_page, pictures
+from inercal.aoa.figures import page as page_of
+from inercal.aoa.figures import pictures, sensors
+from inercal.aoa.figures.innovations import innovations
 from inercal.aoa.settings import Attitude, Disturbances, Methods, Oscillation
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
-from inercal.report import sting
-from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches, thinned
-from inercal.report.aoa_innovations import innovations
+from inercal.report.over_time import Marks, Panel, gaps, measured, over_time, stretches, thinned
 from inercal.report.spectra import of_angle, peak, spectral_density
 from inercal.units import Quantity, parse_unit
 
@@ -74,9 +74,10 @@ def by_title(drawn):
 def of_the_base():
     """Pictures of 30° + 10° sin 2 pi t."""
     settings = short()
-    return pictures(measurement(settings), settings)
+    return pictures(measurement(settings))
 
 
+@pytest.mark.slow
 def test_what_is_drawn_of_a_fusion():
     drawn = of_the_base()
     assert [picture.title for picture in drawn] == [
@@ -103,6 +104,7 @@ def test_what_is_drawn_of_a_fusion():
     assert float(found[1]) == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_alpha_beta_and_roll_are_drawn_where_they_are_known():
     """A roll of 20 deg with yaw gyros: roll, alpha and beta; stated alone: alpha and beta; else theta is no alpha."""
     lies = Attitude(roll=Quantity(20.0 * DEG, 0.1 * DEG, parse_unit("rad"), ""))
@@ -115,7 +117,7 @@ def test_alpha_beta_and_roll_are_drawn_where_they_are_known():
         ({"disturbances": coupled}, {"roll [°]"}),
     ):
         settings = short(**changes)
-        words = texts(by_title(pictures(measurement(settings), settings))[title])
+        words = texts(by_title(pictures(measurement(settings)))[title])
         assert {word for word in words if word.endswith("[°]")} == panels
         if "roll [°]" in panels and "attitude" in changes:
             told = next(word for word in words if word.startswith("roll:"))
@@ -126,20 +128,21 @@ def test_alpha_beta_and_roll_are_drawn_where_they_are_known():
 def test_sensors_against_the_reference_are_drawn_as_they_are():
     values = np.array([[100.0, -50.0], [0.1, 0.2]])
     seen = np.array([[True, False], [True, True]])
-    picture = sting.fitted(
+    picture = sensors.fitted(
         ("a1", "a2"), ("scale − 1 [ppm]", "axis [mrad]"), values, 0.1 * np.abs(values), seen
     )
     assert {"a1", "a2", "scale − 1 [ppm]", "axis [mrad]"} <= set(texts(picture))
-    texts(sting.fitted(("a1",), ("x",), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)))
+    texts(sensors.fitted(("a1",), ("x",), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("roll", "methods"), [(0.0, None), (60.0, None), (60.0, Methods())])
 def test_lever_arms_are_what_they_are_worth(roll, methods):
     """Of theta = 30° + A sin(W t): r W^2 A^2 centrifugal and, at a roll of cosine c, c r W^2 A tangential, in mg and,
     over g, in degrees, whatever the method."""
     lies = Attitude(roll=Quantity(roll * DEG, 0.0, parse_unit("rad"), ""))
     settings = short(attitude=lies)
-    drawn = pictures(measurement(settings, methods=methods), settings) if roll else of_the_base()
+    drawn = pictures(measurement(settings, methods=methods)) if roll else of_the_base()
     picture = by_title(drawn)["What lever arms add to the readings"]
     w, c = 2.0 * math.pi * BASE.frequency, math.cos(roll * DEG)
     for name, kind, size in (
@@ -153,11 +156,12 @@ def test_lever_arms_are_what_they_are_worth(roll, methods):
         assert float(found[2]) == pytest.approx(size / G / DEG, rel=0.06)
 
 
+@pytest.mark.slow
 def test_accelerometers_alone_with_a_gap_and_a_restart():
     settings = short()
     recording = without_rows(recorded(settings), np.r_[0:500, 1300:1700])
     found = measurement(settings, replace(recording, gyro=np.full(len(recording.t), np.nan)))
-    drawn = by_title(pictures(found, settings))
+    drawn = by_title(pictures(found))
     for picture in drawn.values():
         texts(picture)
     caption = drawn["Angle, its uncertainty, and its rate"].caption
@@ -170,27 +174,29 @@ def test_accelerometers_alone_with_a_gap_and_a_restart():
 def test_a_short_record_without_a_reference():
     settings = short()
     recording = replace(without_rows(recorded(settings), np.arange(40)), reference=None)
-    drawn = by_title(pictures(measurement(settings, recording), settings))
+    drawn = by_title(pictures(measurement(settings, recording)))
     for picture in drawn.values():
         texts(picture)
     assert "Angle, its uncertainty, and its rate" in drawn
     assert not {"Error against the reference", "Spectra", "Close-up"} & set(drawn)
 
 
+@pytest.mark.slow
 def test_rows_that_are_not_later_are_not_drawn():
     settings = short()
     recording = recorded(settings)
     t = recording.t.copy()
     t[700:705] -= 1.0
     found = measurement(settings, replace(recording, t=t))
-    page = check(angle_page(found, settings))
+    page = check(page_of(found))
     assert "Angle, its uncertainty, and its rate" in page
     assert np.isnan(found.angles.theta[700:705]).all()
 
 
+@pytest.mark.slow
 def test_saturated_samples_are_marked():
     settings = short("clipping")
-    drawn = by_title(pictures(measurement(settings), settings))
+    drawn = by_title(pictures(measurement(settings)))
     assert "Red strip: saturated" in drawn["Angle, its uncertainty, and its rate"].caption
     caption = drawn["What was measured"].caption
     # |rate| = X |cos| over 40 of 62.8 deg/s: a part 2/pi acos(40/62.8) of the time
@@ -199,23 +205,25 @@ def test_saturated_samples_are_marked():
     assert "a2" not in caption
 
 
+@pytest.mark.slow
 def test_points_and_their_errors():
     settings = replace(scenario("pitch-pause", sample_rate=100.0, last=10.0 * DEG))
     found = measurement(settings)
     assert len(found.points) == 3
-    drawn = by_title(pictures(found, settings))
+    drawn = by_title(pictures(found))
     assert "3 in all" in drawn["Points"].caption
     assert {"mean angle [°]", "mean less reference [°]", "u of the mean"} <= set(texts(drawn["Points"]))
     assert "at rest" in drawn["Error against the reference"].caption
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False], ids=["reference", "none"])
 def test_methods_side_by_side(known):
     """Errors against a reference, differences from the first without one; each method has its numbers."""
     settings = scenario("base", sample_rate=100.0, duration=4.0)
     recording = recorded(settings)
     found = measurement(settings, recording if known else replace(recording, reference=None), compare=True)
-    drawn = by_title(pictures(found, settings))
+    drawn = by_title(pictures(found))
     words, over = texts(drawn["Methods side by side"]), texts(drawn["Methods over time"])
     assert set(found.compared) <= set(words) & set(over)
     assert ("fusion 19" in words) == known
@@ -227,7 +235,7 @@ def test_methods_side_by_side(known):
 
 def test_the_paper_s_way_has_angles_and_no_coefficients():
     settings = short()
-    drawn = by_title(pictures(measurement(settings, methods=Methods()), settings))
+    drawn = by_title(pictures(measurement(settings, methods=Methods())))
     assert not {"Flexure of the sting", "What was learned of the sensors"} & set(drawn)
     assert "improved, mechanical, dual" in " ".join(texts(drawn["Angle, its uncertainty, and its rate"]))
     assert "tangential" in " ".join(texts(drawn["What lever arms add to the readings"]))
@@ -237,7 +245,7 @@ def test_flexure_of_a_smoothed_record():
     """0.03 g rms of heave come out as 30 mg, beyond the prior of 10 mg; smoothed constants have no course over time."""
     settings = short("flexure")
     settings = replace(settings, estimator=replace(settings.estimator, smooth=True))
-    drawn = by_title(pictures(measurement(settings), settings))
+    drawn = by_title(pictures(measurement(settings)))
     title = next(text for text in texts(drawn["Flexure of the sting"]) if text.startswith("across the model"))
     assert float(re.search(r"(\S+) mg rms", title)[1]) == pytest.approx(30.0, rel=0.15)
     assert title.endswith("prior 10 mg")
@@ -250,7 +258,7 @@ def test_positions_in_a_wrong_unit_are_seen(factor, doubt):
     """Millimetres given as metres, or the other way round."""
     r = factor * np.array([-0.25, 0.2, 0.25])
     angle = np.array([0.5, 0.0, -0.5]) * np.pi
-    picture = sting.side_view(("a1", "a2", "a3"), angle, r, np.zeros(3), True)
+    picture = sensors.side_view(("a1", "a2", "a3"), angle, r, np.zeros(3), True)
     assert ("are the units right?" in picture.caption) == doubt
     assert f"a2   r {200.0 * factor:g} mm, z 0 mm, axis 0°" in texts(picture)
     assert "nose up: +" in texts(picture)
@@ -258,7 +266,7 @@ def test_positions_in_a_wrong_unit_are_seen(factor, doubt):
 
 def test_what_is_learned_is_set_against_its_prior():
     values, u = np.array([1.0, 0.1, np.nan]), np.array([0.1, 0.98, np.nan])
-    picture = sting.learned(("b_1", "dr_1", "k_g"), ("ug", "mm", "ppm"), values, u, np.zeros(3), np.ones(3))
+    picture = sensors.learned(("b_1", "dr_1", "k_g"), ("ug", "mm", "ppm"), values, u, np.zeros(3), np.ones(3))
     assert "Left at their priors: dr_1." in picture.caption
     assert {"1.00 ± 0.10 ug", "0.10 ± 0.98 mm", "– ± – ppm"} <= set(texts(picture))
 
@@ -306,8 +314,8 @@ def test_extreme_numbers_can_be_drawn():
     strip = measured(t, ("a1",), np.ones((50, 1), dtype=bool), np.zeros((50, 1), dtype=bool), Marks())
     assert "a1 100 % missing" in strip.caption
     texts(strip)
-    texts(sting.side_by_side(("a", "b"), np.array([0.0, np.nan]), np.array([0.0, np.nan]), "error"))
-    texts(sting.points(*np.full((4, 2), np.nan), np.full(2, np.nan)))
+    texts(sensors.side_by_side(("a", "b"), np.array([0.0, np.nan]), np.array([0.0, np.nan]), "error"))
+    texts(sensors.points(*np.full((4, 2), np.nan), np.full(2, np.nan)))
 
 
 def test_squared_innovations_are_those_of_each_sensor():

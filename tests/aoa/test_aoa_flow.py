@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from inercal.aoa.flow import alpha_beta, stated, theta_by_roll
 from inercal.aoa.settings import Attitude
 from inercal.units import Quantity, parse_unit
+from rows import for_each
 
 DEG = math.pi / 180.0
 RAD = parse_unit("rad")
@@ -85,8 +86,8 @@ def test_an_upside_down_model_sees_the_opposite(theta, roll):
     assert math.cos(down.alpha[0]) == pytest.approx(math.cos(up.alpha[0]), abs=1e-6)
 
 
-@pytest.mark.parametrize("theta", [0.3, -0.6, 1.57, 2.8])
-@pytest.mark.parametrize("source", ["theta", "yaw", "upwash", "sidewash"])
+@for_each("theta", [0.3, -0.6, 1.57, 2.8])
+@for_each("source", ["theta", "yaw", "upwash", "sidewash"])
 def test_each_uncertainty_goes_on_by_the_derivative(theta, source):
     at = {"theta": theta, "roll": 0.5, "yaw": 0.2, "upwash": 0.03, "sidewash": -0.05}
 

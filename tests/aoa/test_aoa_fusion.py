@@ -61,6 +61,7 @@ def trace(of, recording):
     return advance(initial(of), of, recording.t, recording.rows, last=True)
 
 
+@pytest.mark.slow
 @pytest.mark.kernels
 @pytest.mark.parametrize("case", CASES)
 def test_filter_and_smoother_are_those_of_dense_matrices(case):

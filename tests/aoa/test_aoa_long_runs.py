@@ -52,6 +52,7 @@ def run(settings, seed):
     return (*ratios, max(map(abs, off)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "furthest"),
     [
@@ -85,6 +86,7 @@ def test_a_model_at_rest_tells_nothing_of_positions():
             assert state.P[k, k] > 0.9 * of.covariance[k, k], name
 
 
+@pytest.mark.slow
 def test_what_a_buffet_taught_does_not_mislead_the_next_run():
     """The posterior of a buffet as the prior of an oscillation with the same sensors."""
     ratios = []

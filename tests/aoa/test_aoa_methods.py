@@ -13,6 +13,7 @@ from inercal.aoa.settings import Attitude, Disturbances, Methods, Prior, Timing
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import RecordError, StudyError
 from inercal.units import parse_quantity
+from rows import for_each
 
 PAPER = Methods()
 SHORT = replace(BASE, duration=12.0)
@@ -45,6 +46,7 @@ def made(settings, seed=1, **errors):
     return simulate(settings, np.random.default_rng(seed), errors or None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_papers_method_errs_as_the_reference_figures_say(name):
     """Mean of 3 seeds within 1.3 times; the clipped case as the paper takes it, saturated samples and all."""
@@ -275,8 +277,8 @@ def test_rows_that_do_not_go_on_in_time_have_no_angle():
     assert np.flatnonzero(np.isnan(found.theta)).tolist() == [500, 600]
 
 
-@pytest.mark.parametrize("rows", [0, 1, 2, 30])
-@pytest.mark.parametrize("methods", MEASURED, ids=label)
+@for_each("rows", [0, 1, 2, 30])
+@for_each("methods", MEASURED)
 def test_few_rows_are_no_error(methods, rows):
     settings = study(motion=SHORT, timing=Timing(None, 1e-3))
     of = made(settings).recording

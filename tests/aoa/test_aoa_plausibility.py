@@ -111,6 +111,7 @@ def test_gross_faults_are_named(name):
     assert "as well possible" not in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", ["pitch-pause", "flexure", "buffet"])
 def test_gross_faults_in_other_motions(motion):
     settings = scenario(motion, duration=2.5)
@@ -134,6 +135,7 @@ def test_at_rest_only_accelerometers_across_show():
         assert message.startswith(text)
 
 
+@pytest.mark.slow
 def test_small_errors_are_no_gross_ones():
     # an axis off by a few mrad, and slow drifts, are not taken for a gyro that tells of something else
     settings = study(motion=replace(BASE, duration=4.0))

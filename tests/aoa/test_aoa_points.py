@@ -19,6 +19,7 @@ from inercal.aoa.result.points import COSINES, mean_u, points
 from inercal.aoa.settings import Attitude, MotionPlan
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit
+from rows import for_each
 
 DRAWS = 600
 
@@ -208,7 +209,7 @@ def test_a_slow_oscillation_has_no_pauses(frequency):
     assert points(simulated.recording, angles(simulated.theta), settings) == ()
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@for_each("name", SCENARIOS)
 def test_only_a_pitch_pause_has_pauses(name):
     # 10 deg and 16 deg at 1 Hz, a chirp to 5 Hz, a buffet of 0.2 deg: whatever the seed, none of them rests
     for seed in range(8):

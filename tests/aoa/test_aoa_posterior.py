@@ -17,10 +17,12 @@ from inercal.aoa.result.outcome import assemble, assemble_paper
 from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import drawn, simulate
 from inercal.errors import InputError, StudyError
+from inercal.estimate.basis import Basis
 from inercal.estimate.files import save
-from inercal.estimate.result import without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
+from rows import for_each
 
 SWEEP = MotionPlan("pitch-pause", first=-10.0 * DEG, last=90.0 * DEG, step=20.0 * DEG, move=1.0, pause=1.0)
 STILL = MotionPlan("static", duration=4.0, first=15.0 * DEG, last=15.0 * DEG)
@@ -111,6 +113,7 @@ def test_a_smaller_filter_takes_what_it_has_states_for(saved, states):
         )
 
 
+@pytest.mark.slow
 def test_a_sweep_lowers_u_of_the_next_run_which_stays_consistent():
     """A sweep shows the biases, which make most of u at one angle. Sensors drawn from the study's prior, each with a
     run of its own: the mean of error^2/u^2, all but constant over a run at rest, is 1 at most within 5 standard
@@ -183,8 +186,11 @@ def test_other_results_are_refused(saved, tmp_path):
     _, settings, found = saved
     made = simulate(settings, np.random.default_rng(1)).recording
     for result, words in (
-        (without_parameters("selfcal", Status.OK, ""), "a result of selfcal"),
-        (without_parameters("aoa", Status.INCONSISTENT, "mean NIS 9"), r"ended inconsistent \(mean NIS 9\)"),
+        (Estimate.without(Basis("selfcal"), Status.OK, ""), "a result of selfcal"),
+        (
+            Estimate.without(Basis("aoa"), Status.INCONSISTENT, "mean NIS 9"),
+            r"ended inconsistent \(mean NIS 9\)",
+        ),
         (assemble_paper(made, settings, of_fusion(found, 19), [], None), "holds no coefficients"),
     ):
         save(result, tmp_path / "other.json")
@@ -202,7 +208,7 @@ def used(path, settings):
     return load(path, settings), corrected(path, settings)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("keys", "value"),
     [
         (("result", "gravity"), {}),
@@ -251,6 +257,7 @@ def rig(settings, rng):
     return replace(settings, layout=layout), 1.0 + off[0]
 
 
+@pytest.mark.slow
 def test_a_turntable_puts_scales_and_axes_right(tmp_path):
     """0.5 mrad of an axis and 0.05 % of scale are 0.03 deg each, and no fusion sees them; a turntable does.
 
@@ -288,8 +295,8 @@ def test_a_turntable_puts_scales_and_axes_right(tmp_path):
 def test_corrections_are_handed_on_from_run_to_run(tmp_path):
     settings = study(motion=STILL)
     after = put_right(
-        without_parameters(
-            "aoa", Status.OK, "", result={"corrections": {"a1": {"scale": 1.002, "angle_rad": 1e-3}}}
+        Estimate.without(
+            Basis("aoa"), Status.OK, "", result={"corrections": {"a1": {"scale": 1.002, "angle_rad": 1e-3}}}
         ),
         settings,
     )

@@ -15,6 +15,7 @@ from inercal.errors import StudyError
 from inercal.records.read import read
 from inercal.records.write import write_record
 from inercal.units import Quantity, parse_unit
+from rows import for_each
 
 #: sensors in volts and counts, with biases and temperature terms
 RAW = {
@@ -38,8 +39,8 @@ def same(found, expected, atol=1e-11):
         assert_array_equal(found.point, expected.point)
 
 
-@pytest.mark.parametrize("name", [each for each in SCENARIOS if each != "clipping"])
-@pytest.mark.parametrize("raw", [False, True])
+@for_each("name", [each for each in SCENARIOS if each != "clipping"])
+@for_each("raw", [False, True])
 def test_read_again_with_its_study_it_is_the_same(name, raw):
     settings = scenario(name) if name == "pitch-pause" else scenario(name, duration=2.0)
     if raw:

@@ -11,6 +11,7 @@ from sting_study import DEG, G, layout
 from inercal.aoa.layout import Layout
 from inercal.aoa.paper.static import angle, bound, complementary, difference, gls, improved, segmented, spread
 from inercal.errors import StudyError
+from rows import for_each
 
 DA = 1e-4 * G
 ALL = ("segmented", "complementary", "improved", "difference", "gls")
@@ -58,9 +59,9 @@ def test_readings_without_error_give_the_angle_all_around_at_any_roll(way, of, t
     assert -math.pi < found[0] <= math.pi
 
 
-@pytest.mark.parametrize("of", LAYOUTS)
-@pytest.mark.parametrize("level", [1.0, 0.8])
-@pytest.mark.parametrize("way", ALL)
+@for_each("of", LAYOUTS)
+@for_each("level", [1.0, 0.8])
+@for_each("way", ALL)
 def test_gain_is_how_the_angle_errs_with_each_reading(way, level, of):
     """By central differences, at angles at which no way switches from one axis to another."""
     theta = (np.arange(-175.0, 180.0, 10.0) + 1.7) * DEG

@@ -9,6 +9,7 @@ from inercal.cli import run
 from inercal.estimate.files import load
 from inercal.examples import FOLDER
 from inercal.instruments.noise import NoiseModel
+from rows import for_each
 
 #: 0.1 deg/sqrt(h) and 50 ug/sqrt(Hz)
 WALKS = {"gyro": np.radians(0.1) / 60.0, "acc": 50e-6 * 9.80665}
@@ -117,7 +118,7 @@ def test_an_instrument_that_moved_is_exit_code_one_and_its_rest_is_not(capsys):
     assert run(["allan", "moved.csv", "--end", "39 s"]) == 0
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["no.csv"], ["no.csv"]),
@@ -131,7 +132,7 @@ def test_an_instrument_that_moved_is_exit_code_one_and_its_rest_is_not(capsys):
         ([], ["FILES"]),
     ],
 )
-@pytest.mark.parametrize("more", [[], ["--json"]])
+@for_each("more", [[], ["--json"]])
 def test_bad_input_gets_one_line(arguments, words, more, capsys):
     assert run(["allan", *arguments, *more]) == 2
     captured = capsys.readouterr()

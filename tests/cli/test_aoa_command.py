@@ -16,6 +16,7 @@ from inercal.aoa import settings
 from inercal.cli import aoa as command
 from inercal.cli import run
 from inercal.estimate.files import load
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 AOA = ["aoa", "model.csv", "--study", "aoa.toml"]
@@ -263,6 +264,7 @@ def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     assert err.count("excess_scatter: NIS is ") == 1
 
 
+@pytest.mark.slow
 @POSIX
 def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
     """Killed without warning, while it works: each row is answered, and always with the same digits."""
@@ -291,7 +293,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
 # What is refused.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["aoa", "none.csv", *AOA[2:]], ["none.csv"]),

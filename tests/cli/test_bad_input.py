@@ -72,6 +72,7 @@ def mutate(data: bytes, kind: str, seed: int) -> bytes:
             )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(change=mutation)
 def test_a_spoiled_recording_ends_with_a_verdict_or_one_line(folder, capsys, change):
@@ -98,6 +99,7 @@ def test_a_spoiled_recording_ends_with_a_verdict_or_one_line(folder, capsys, cha
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(change=mutation)
 def test_a_spoiled_study_ends_with_a_verdict_or_one_line(folder, capsys, change):

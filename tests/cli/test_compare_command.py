@@ -13,6 +13,7 @@ from inercal.geometry.site import GravityInput, Site
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
 from inercal.imu.task import calibrate
+from rows import for_each
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def test_a_change_is_found_named_and_exit_code_one(capsys):
     assert "<script" not in page
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("files", "words"),
     [
         (["no.json", "one.json"], ["no.json", "cannot be read"]),
@@ -90,7 +91,7 @@ def test_a_change_is_found_named_and_exit_code_one(capsys):
         (["one.json"], ["SECOND"]),
     ],
 )
-@pytest.mark.parametrize("more", [[], ["--json"]])
+@for_each("more", [[], ["--json"]])
 def test_what_cannot_be_compared_gets_one_line(files, words, more, capsys):
     one = load("one.json")
     run(["compare", "one.json", "two.toml", "--out", "drift.json", "--quiet"])

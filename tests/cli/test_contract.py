@@ -15,6 +15,7 @@ from inercal.cli import run
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES, FOLDER
 from inercal.studies.template import imu_template
+from rows import for_each
 
 
 def inercal(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
@@ -144,7 +145,7 @@ def test_set_overrides_one_key(simulated, capsys):
     assert len(json.loads(capsys.readouterr().out)["parameters"]) == 30
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["frobnicate"], ["frobnicate"]),
@@ -172,7 +173,7 @@ def test_set_overrides_one_key(simulated, capsys):
         (["examples", "nonesuch"], ["nonesuch", "xsens"]),
     ],
 )
-@pytest.mark.parametrize("json_too", [False, True])
+@for_each("json_too", [False, True])
 def test_bad_usage_and_input_get_one_line_and_exit_code_two(
     arguments, words, json_too, simulated, capsys, monkeypatch
 ):
@@ -183,7 +184,7 @@ def test_bad_usage_and_input_get_one_line_and_exit_code_two(
     assert sorted(simulated.iterdir()) == before
 
 
-@pytest.mark.parametrize("command", [(), ("new",), ("calibrate",), *COMMANDS], ids=" ".join)
+@for_each("command", [(), ("new",), ("calibrate",), *COMMANDS])
 def test_every_help_ends_with_an_example_that_runs_on_one_line(command, capsys):
     words = [word for word in command if word]
     assert run([*words, "--help"]) == 0

@@ -12,6 +12,7 @@ from inercal.estimate.files import load, save
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.instruments.triad import TriadModel
+from rows import for_each
 
 NAMES = (
     *(f"{term}_{axis}" for term in ("K0", "K1", "D_F", "S") for axis in "xyz"),
@@ -27,7 +28,7 @@ def calibration(status=Status.OK):
     """A calibration of counts, each coefficient known to a millionth."""
     return Estimate(
         "calibrate imu", NAMES, ("1",) * 21, VALUES, np.diag((1e-6 * VALUES) ** 2), np.full(21, 30.0),
-        np.full(21, 2.0), status, "made", result={"unit": {"acc": "count", "gyro": "count"}},
+        status, "made", result={"unit": {"acc": "count", "gyro": "count"}},
     )  # fmt: skip
 
 
@@ -136,7 +137,7 @@ def test_a_bad_verdict_goes_along(folder, capsys):
     assert "ill_conditioned" in captured.err
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["cal.json"], ["--to", "missing", "imu_tk, imucal, kalibr, psins"]),
@@ -186,6 +187,7 @@ def test_a_file_of_imu_tk_is_not_overwritten_by_its_second_name(folder, capsys):
     assert "x_acc.calib: is an input" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", CONVENTIONS)
 def test_spoiled_files_of_other_tools_end_with_a_calibration_or_one_line(folder, capsys, tool):
     run(["convert", "cal.json", "--to", tool, "--out", "theirs" + CONVENTIONS[tool].suffixes[0], "--quiet"])
@@ -222,7 +224,7 @@ def test_a_gyro_that_is_not_calibrated_is_said(folder, capsys):
     save(
         Estimate(
             "calibrate imu", tuple(np.array(NAMES)[acc].tolist()), ("1",) * 9, VALUES[acc],
-            whole.covariance[np.ix_(acc, acc)], whole.dof[acc], whole.k[acc], Status.OK, "made",
+            whole.covariance[np.ix_(acc, acc)], whole.dof[acc], Status.OK, "made",
             result={"unit": {"acc": "count"}},
         ),
         "acc.json",

@@ -11,6 +11,7 @@ import pytest
 
 from inercal.cli import run
 from inercal.studies.template import imu_template
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="a shell and file names as on POSIX")
 CSV = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]\n"
@@ -173,7 +174,7 @@ def test_schema_goes_to_a_file_and_as_json_to_standard_output_too(folder, capsys
     assert json.loads(capsys.readouterr().out) == json.loads(Path("s.json").read_text())
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["calibrate"], ["calibrate", "expected imu"]),
@@ -225,6 +226,7 @@ def test_standard_output_may_be_closed(folder):
     assert done.stderr == "inercal: error: standard output: found it closed, expected it open\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 @pytest.mark.parametrize(
     "command",
@@ -254,6 +256,7 @@ def test_standard_error_may_be_closed(folder):
     assert shell("$INERCAL inspect no.csv 2>&-").returncode == 2
 
 
+@pytest.mark.slow
 @POSIX
 def test_no_encoding_is_too_poor(folder):
     """Also without UTF-8 whatever is said can be printed, and files are written in UTF-8."""

@@ -180,6 +180,7 @@ def results(tmp_path_factory):
     return found
 
 
+@pytest.mark.slow
 def test_every_result_has_the_same_keys_in_the_same_order(results):
     """One type of result, by one road: what a command has not is empty, not absent."""
     assert len({tuple(data) for data, _ in results.values()}) == 1
@@ -192,6 +193,7 @@ def test_every_result_has_the_same_keys_in_the_same_order(results):
         assert data["inputs"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["selfcal", "aoa", "calibrate turntable"])
 def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_path, monkeypatch, command):
     """An example, or a simulated test, with a column of 21.5 and 22.5 degC by turns."""
@@ -214,6 +216,7 @@ def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_pa
         )
 
 
+@pytest.mark.slow
 def test_every_name_in_a_result_has_a_row_in_the_table_of_terms(results):
     """And the unit of that row, whatever that of the output is."""
     names = {p["name"]: p["unit"] for data, _ in results.values() for p in data["parameters"]}
@@ -231,6 +234,7 @@ def test_a_name_that_no_command_gives_has_no_row():
     assert [term(name) for name in ("K9_x", "b_", "N_", "gyro_w", "K0_x_T9", "dr_x")] == [None] * 6
 
 
+@pytest.mark.slow
 def test_every_result_of_a_method_says_what_it_rests_on(results):
     """Also that of a command that estimates nothing; a look at a file has no method."""
     assert [command for command, (data, _) in results.items() if not data["references"]] == ["inspect"]
@@ -238,12 +242,14 @@ def test_every_result_of_a_method_says_what_it_rests_on(results):
         assert (">References</h" in page) == bool(data["references"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("section", ["Findings", "How it was done", "Command and settings", "Inputs"])
 def test_every_report_has_the_sections_that_all_have(section, results):
     for command, (_, page) in results.items():
         assert f">{section}</h" in page, command
 
 
+@pytest.mark.slow
 def test_every_report_has_one_frame(results):
     """Title, verdict, findings first; how it was done last; one style sheet; no script."""
     styles = set()
@@ -260,12 +266,14 @@ def test_every_report_has_one_frame(results):
     assert len(styles) == 1
 
 
+@pytest.mark.slow
 def test_what_was_asked_for_comes_before_the_sensors(results):
     """Whoever measures an angle finds the angle ahead of the coefficients."""
     page = results["aoa"][1]
     assert page.index("<h2>Angle</h2>") < page.index("<h2>Coefficients</h2>")
 
 
+@pytest.mark.slow
 def test_a_report_says_nothing_twice(results):
     """A title stands once, and so does the row of a coefficient: under one heading only."""
     for command, (_, page) in results.items():
@@ -279,6 +287,7 @@ def test_a_report_says_nothing_twice(results):
         assert len(re.findall(rf"<td[^>]*>(?:<b>)?{name}\b", values)) == 1, name
 
 
+@pytest.mark.slow
 def test_a_report_has_no_radians(results):
     """Angles of place and range are in degrees for people; only coefficients that are small angles are in rad."""
     for command, (_, page) in results.items():

@@ -21,6 +21,7 @@ from inercal.estimate.files import load
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.settings import KINDS
 from inercal.studies.load import load_selfcal_study
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")
@@ -103,6 +104,7 @@ def test_json_is_the_contract_and_holds_the_truth(capsys):
     assert abs(data["statistics"]["nis_mean"] - 6.0) < 5.0 * np.sqrt(12.0 / 2700.0)
 
 
+@pytest.mark.slow
 def test_people_see_units_of_the_field_and_get_their_files(capsys):
     assert run([*SELFCAL, "--out", "cal.toml", "--report", "cal.html"]) == 0
     captured = capsys.readouterr()
@@ -140,6 +142,7 @@ def test_histories_end_with_the_estimate(suffix, capsys):
     assert np.abs(found[:, 1:4] - np.radians(platform[:, 4:7])).max() < np.radians(10.0 / 3600.0)
 
 
+@pytest.mark.slow
 def test_any_estimator_can_be_chosen_and_they_agree(capsys):
     """Recursive filters and the batch within 0.02 u of each other on one recording."""
     assert get_args(Kind) == KINDS
@@ -151,6 +154,7 @@ def test_any_estimator_can_be_chosen_and_they_agree(capsys):
         assert np.abs((values_and_u(other)[0] - values) / u).max() < 0.02
 
 
+@pytest.mark.slow
 def test_compare_sets_all_estimators_side_by_side(capsys):
     assert run([*SELFCAL, "--compare", "--out", "compared.json"]) == 0
     printed = capsys.readouterr().out
@@ -164,6 +168,7 @@ def test_compare_sets_all_estimators_side_by_side(capsys):
         assert list(compare[kind]["parameters"]) == list(NAMES)
 
 
+@pytest.mark.slow
 def test_a_bad_verdict_is_exit_code_one_and_still_the_whole_object(capsys):
     code, data = told(capsys, *SELFCAL, "--set", "noise.accelerometer=1 ug")
     assert (code, data["status"]["code"]) == (1, "inconsistent")
@@ -227,6 +232,7 @@ def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     assert err.count("excess_scatter: NIS is ") == 1
 
 
+@pytest.mark.slow
 @POSIX
 def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
     """Killed without warning, while it works: each row is answered, and always with the same digits."""
@@ -255,7 +261,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
 # What is refused.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["selfcal", "none.csv", *SELFCAL[2:]], ["none.csv"]),

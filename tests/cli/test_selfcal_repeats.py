@@ -41,6 +41,7 @@ def told(capsys, *files):
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_three_runs_give_one_value_with_the_runs_beside_it(capsys):
     """The truth lies within 4.5 u of the combined values, which are known better than those of a single run."""
     one, all_three = told(capsys, RUNS[0]), told(capsys, *RUNS)

@@ -12,6 +12,7 @@ from inercal.aoa.simulate import simulate
 from inercal.cli import run
 from inercal.records.read import read
 from inercal.studies.load import load_aoa_study
+from rows import for_each
 
 SHORT = ["--set", "motion.duration=2 s", "--set", "site.latitude=40 deg"]
 PAUSES = 'motion={kind="pitch-pause", first="0 deg", last="4 deg", step="2 deg", move="1 s", pause="1 s"}'
@@ -97,7 +98,7 @@ def test_another_seed_is_another_run_of_the_same_motion(folder):
     assert not np.array_equal(a["a1"].values, b["a1"].values)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("more", "words"),
     [
         ([], ["--out: missing"]),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
+from rows import for_each
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 HEADER = (
@@ -180,6 +181,7 @@ def test_apply_loads_no_more_than_it_needs(folder):
 # One line in, one line out.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["apply", "cal.json", "--stream"], ["monitor"]])
 def test_each_line_is_answered_before_the_next_is_sent(command, folder):
     process = subprocess.Popen(
@@ -204,6 +206,7 @@ def test_each_line_is_answered_before_the_next_is_sent(command, folder):
 # Killed, interrupted, left alone.
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_the_monitor_killed_at_any_moment_and_restarted(seed, folder, tmp_path):
@@ -235,6 +238,7 @@ def test_the_monitor_killed_at_any_moment_and_restarted(seed, folder, tmp_path):
     assert list(dict.fromkeys(given)) == whole
 
 
+@pytest.mark.slow
 @POSIX
 def test_an_interrupt_saves_and_ends_with_130(folder, tmp_path):
     log = (folder / "log.csv").read_bytes().splitlines(keepends=True)
@@ -288,7 +292,7 @@ def test_the_monitor_says_what_it_sees(folder):
 # What is refused.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["apply", "cal.json", "--stream", "--out", "x.csv"], ["--out"]),
@@ -320,7 +324,7 @@ def test_bad_usage_is_one_sentence(arguments, words, folder, here):
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("log", "words"),
     [
         ("", ["standard input", "ended without a row"]),

@@ -10,6 +10,7 @@ import xarray
 
 from inercal.cli import run
 from inercal.rigs.plans import named
+from rows import for_each
 
 STUDY = """
 [site]
@@ -103,7 +104,7 @@ def test_flagged_positions_leave_the_status_ok(folder, capsys):
     ).items()
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["sensitivity", "no.toml"], ["no.toml", "cannot be read"]),
@@ -371,6 +372,7 @@ def test_a_rate_test_is_simulated_and_calibrated(folder, capsys):
     assert Path("r.html").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -77,7 +77,6 @@ def estimate_of(model: ImuModel, rng: np.random.Generator, relative_u: float = 1
         x,
         covariance,
         np.full(len(x), 20.0),
-        np.full(len(x), 2.0),
         Status.OK,
         "made",
         result={"unit": dict(model.units)},

@@ -12,6 +12,7 @@ from inercal.instruments.triad import TriadModel
 from inercal.records.column import Column
 from inercal.records.record import Record
 from inercal.units import parse_unit
+from rows import for_each
 
 TRIAD = TriadModel(np.array([2.0, 3.0, 4.0]), np.eye(3) + 0.01 * np.triu(np.ones((3, 3)), 1), np.ones(3))
 
@@ -56,7 +57,7 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others():
             np.testing.assert_array_equal([pair[i] for pair in alone], together[i])
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("bad", "words"),
     [
         (estimate(K1_y=0.0), "accelerometers cannot be inverted"),

@@ -10,6 +10,7 @@ from inercal.convert.correct import ImuModel
 from inercal.convert.other_tools import from_tool
 from inercal.errors import InputError
 from inercal.instruments.triad import TriadModel
+from rows import for_each
 
 MODEL = instrument(1, sensitive=False)
 
@@ -86,7 +87,7 @@ def test_a_file_of_its_own_needs_the_unit_that_it_does_not_state(tmp_path):
     assert estimate["K1_x"].unit == "count/(m/s^2)"
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("texts", "words"),
     [
         (["1 2 3"], "found 3 numbers, expected the 21 numbers"),

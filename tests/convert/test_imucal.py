@@ -13,6 +13,7 @@ from inercal.convert import imucal
 from inercal.convert.correct import ImuModel, imu_model
 from inercal.convert.other_tools import from_tool
 from inercal.errors import InputError
+from rows import for_each
 
 
 @pytest.mark.parametrize("upper", [True, False])
@@ -72,7 +73,7 @@ def test_accelerometers_alone_have_no_place():
         imucal.terms(alone)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("change", "words"),
     [
         ({"_format_version": "1.0.0"}, "format version '1.0.0', expected a calibration written by imucal"),
@@ -94,7 +95,7 @@ def test_what_is_no_file_of_imucal_is_said(tmp_path, change, words):
         from_tool([path], "imucal", {"acc": "count", "gyro": "count"})
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", "[1, 2", "null", '"text"', "{" * 9])
+@for_each("text", ["", "[]", "{}", "[1, 2", "null", '"text"', "{" * 9])
 def test_what_is_not_even_json_of_it_is_said(tmp_path, text):
     (tmp_path / "bad.json").write_text(text)
     with pytest.raises(InputError, match=r"bad\.json: .*expected a calibration written by imucal") as caught:

@@ -13,6 +13,7 @@ from inercal.convert.correct import ImuModel
 from inercal.convert.other_tools import from_tool, to_tool
 from inercal.errors import InputError
 from inercal.instruments.triad import TriadModel
+from rows import for_each
 
 RuamelYaml = pytest.importorskip("ruamel.yaml").YAML
 
@@ -138,7 +139,7 @@ def test_mirrored_axes_and_accelerometers_alone_have_no_place():
         kalibr.terms(ImuModel(model.accelerometer, None, np.zeros((3, 3)), {"acc": "count"}))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("old", "new", "words"),
     [
         ("imu0:", "cam0:", "found 0 keys imu0"),
@@ -184,7 +185,7 @@ def test_yaml_by_hand_is_read_as_a_whole_reader_reads_it(text):
     assert yaml_subset.parse(text, "x") == RuamelYaml(typ="safe").load(text)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "text",
     ["", "# only words\n", "a: {b: 1}\n", "a: &x 1\n", "a: [1, 2\n", "a: [1]]\n", "a: 1\n  b: 2\n", "a: |\n  text\n",
      "-\n", "a: [" + "[" * 99, "a:\n" * 3 + " b\n c", "- " * 200 + "1"],

@@ -79,7 +79,6 @@ def test_a_coefficient_for_which_there_is_no_place_is_named():
         values=np.append(estimate.values, 0.01),
         covariance=covariance,
         dof=np.append(estimate.dof, 5.0),
-        k=np.append(estimate.k, 2.0),
     )
     found = to_tool(ramp, "imu_tk").estimate.findings
     assert Finding("not_held", "imu_tk has no place for D_R_x: left out") in found

@@ -13,6 +13,7 @@ from inercal.convert.correct import ImuModel
 from inercal.convert.other_tools import from_tool
 from inercal.errors import InputError
 from inercal.units import parse_unit
+from rows import for_each
 
 
 @pytest.mark.parametrize("upper", [True, False])
@@ -90,7 +91,7 @@ def test_accelerometers_alone_have_no_place():
         psins.terms(ImuModel(instrument(1).accelerometer, None, np.zeros((3, 3)), {"acc": "count"}))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("old", "new", "words"),
     [
         ("% ug\r", "\r", "states no unit of eb and db, expected"),

@@ -107,6 +107,7 @@ def pages(book):
     return {file.relative_to(book).with_suffix("").as_posix(): Page(file) for file in files}
 
 
+@pytest.mark.slow
 def test_every_page_is_in_the_book_and_can_be_reached_from_the_front(pages):
     written = {
         file.relative_to(ROOT / "docs").with_suffix("").as_posix() for file in ROOT.glob("docs/**/*.md")
@@ -135,6 +136,7 @@ def targets(name, page):
         yield "/".join(parts).removesuffix(".html"), unquote(anchor)
 
 
+@pytest.mark.slow
 def test_every_link_and_anchor_leads_somewhere(book, pages):
     for name, page in pages.items():
         for target, anchor in targets(name, page):
@@ -144,6 +146,7 @@ def test_every_link_and_anchor_leads_somewhere(book, pages):
                 assert (book / target).is_file(), f"{name} links to {target}"
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_from_a_network(book, pages):
     for name, page in pages.items():
         for load in (each for each in page.loads if not each.startswith("#")):
@@ -157,6 +160,7 @@ def test_nothing_is_loaded_from_a_network(book, pages):
             assert not re.match(r"(https?:)?//", "".join(address)), f"{style.name} loads {address}"
 
 
+@pytest.mark.slow
 def test_every_formula_is_set(pages):
     assert len([1 for page in pages.values() for _ in page.formulas]) > 80
     for name, page in pages.items():
@@ -166,6 +170,7 @@ def test_every_formula_is_set(pages):
             assert formula.count("{") == formula.count("}"), f"{name}: {formula!r}"
 
 
+@pytest.mark.slow
 def test_the_reference_has_every_command_term_code_channel_and_limit(book):
     text = {
         page: (book / "reference" / f"{page}.html").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import re
 from functools import cache
 from pathlib import Path
 
-import pytest
+from rows import for_each
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "claims.md"
@@ -80,13 +80,13 @@ def test_every_section_of_claims_is_one_of_the_readme():
     assert [heading for heading, of in CLAIMS.items() if of] == WITH_CLAIMS
 
 
-@pytest.mark.parametrize("heading", WITH_CLAIMS)
+@for_each("heading", WITH_CLAIMS)
 def test_what_is_quoted_stands_in_the_readme(heading):
     text = read(README[heading])
     assert [phrase for phrase in QUOTED[heading] if phrase not in text] == []
 
 
-@pytest.mark.parametrize("heading", WITH_CLAIMS)
+@for_each("heading", WITH_CLAIMS)
 def test_no_sentence_is_left_out(heading):
     left = [
         said for said in sentences(README[heading]) if not any(phrase in said for phrase in QUOTED[heading])
@@ -99,7 +99,7 @@ def test_sentences_that_claim_nothing_are_still_there():
     assert [start for start in SILENT if not any(said.startswith(start) for said in every)] == []
 
 
-@pytest.mark.parametrize("heading", WITH_CLAIMS)
+@for_each("heading", WITH_CLAIMS)
 def test_what_is_named_exists(heading):
     for phrases, shown in CLAIMS[heading]:
         tests = re.findall(r"`(tests/[\w/]+\.py)::([\w:]+)`", shown)

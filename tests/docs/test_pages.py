@@ -19,6 +19,25 @@ import inercal.cli
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+#: pages whose commands take more than two seconds
+SLOW = [
+    "docs/how-to/calibrate-a-platform.md",
+    "docs/how-to/calibrate-an-imu.md",
+    "docs/how-to/calibrate-on-a-turntable.md",
+    "docs/how-to/design-a-path.md",
+    "docs/how-to/live.md",
+    "docs/how-to/noise.md",
+    "docs/how-to/on-a-table-with-known-angles.md",
+    "docs/how-to/read-your-files.md",
+    "docs/how-to/temperature.md",
+    "docs/how-to/validate.md",
+    "docs/published/continuous-self-calibration.md",
+    "docs/published/zhao-2023.md",
+    "docs/theory/self-calibration-filters.md",
+    "docs/tutorials/angle-of-attack.md",
+    "docs/tutorials/self-calibration.md",
+    "docs/tutorials/turntable.md",
+]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"
 FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 EXIT = re.compile(r"\[exit (\d+)\]")
@@ -91,13 +110,20 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def marked(page: Path) -> object:
+    return pytest.param(page, marks=[pytest.mark.slow] if name(page) in SLOW else [])
+
+
 @pytest.mark.parametrize(
-    "page", [p for p in PAGES if p != APART and (blocks(p, "python") or blocks(p, "console"))], ids=name
+    "page",
+    [marked(p) for p in PAGES if p != APART and (blocks(p, "python") or blocks(p, "console"))],
+    ids=name,
 )
 def test_a_page_runs_and_prints_what_it_shows(page, folder, capsys):
     follow(page, folder, run, capsys)
 
 
+@pytest.mark.slow
 def test_a_page_runs_in_processes_of_their_own_too(folder, capsys):
     follow(APART, folder, run_apart, capsys)
 

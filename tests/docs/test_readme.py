@@ -64,6 +64,7 @@ def prepare(heading: str, folder: Path) -> None:
                 shutil.copyfileobj(packed, plain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", HEADINGS)
 def test_the_commands_run(heading, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

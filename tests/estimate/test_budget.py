@@ -27,10 +27,10 @@ def test_gum_h1_end_gauge():
         scalar("random", 3.9, 5),
         scalar("systematic", 6.7, 8),
     ]
-    covariance, (dof,), _ = combine(["d"], comparator)
+    covariance, (dof,), *_ = combine(["d"], comparator)
     assert np.sqrt(covariance[0, 0]) == pytest.approx(9.7, abs=0.05)
     assert dof == pytest.approx(25.6, abs=0.2)  # the standard goes on with the rounded 9.7
-    covariance, (dof,), budget = combine(
+    covariance, (dof,), budget, _ = combine(
         ["l"],
         [
             scalar("calibration of the standard", 25.0, 18),
@@ -51,7 +51,7 @@ def test_gum_h1_end_gauge():
 def test_gum_g4_product_of_three():
     """JCGM 100:2008, G.4.1: relative u of 0.25, 0.57 and 0.82 % with 9, 4, 14: u = 1.03 % with 19.0."""
     parts = [scalar("X1", 0.25, 9), scalar("X2", 0.57, 4), scalar("X3", 0.82, 14)]
-    covariance, dof, _ = combine(["y"], parts)
+    covariance, dof, *_ = combine(["y"], parts)
     assert np.sqrt(covariance[0, 0]) == pytest.approx(1.03, abs=0.005)
     assert dof[0] == pytest.approx(19.0, abs=0.1)
 
@@ -80,7 +80,7 @@ def sources(draw):
 @given(sources())
 def test_shares_are_those_of_the_variance(case):
     names, parts = case
-    covariance, dof, budget = combine(names, parts)
+    covariance, dof, budget, _ = combine(names, parts)
     assert [(item.source, item.type) for item in budget] == [(s.source, s.source[0]) for s in parts]
     for i, name in enumerate(names):
         shares = [item.share.get(name, 0.0) for item in budget]
@@ -105,8 +105,8 @@ def test_units_change_no_shares_and_no_degrees_of_freedom(case, unit):
         else TypeB(s.source, s.u / unit, s.unit, s.sensitivity * unit**2)
         for s in parts
     ]
-    covariance, dof, budget = combine(names, parts)
-    other, other_dof, other_budget = combine(names, scaled)
+    covariance, dof, budget, _ = combine(names, parts)
+    other, other_dof, other_budget, _ = combine(names, scaled)
     np.testing.assert_allclose(
         other, covariance * unit**2, rtol=1e-9, atol=1e-9 * np.abs(covariance * unit**2).max()
     )
@@ -117,7 +117,7 @@ def test_units_change_no_shares_and_no_degrees_of_freedom(case, unit):
 
 def test_a_type_b_input_moves_all_parameters_together():
     """One unknown value, common to the whole test: correlations of exactly +1 and -1, no degrees of freedom lost."""
-    covariance, dof, (item,) = combine("abc", [TypeB("gravity", 0.1, "m/s^2", np.array([2.0, -3.0, 0.0]))])
+    covariance, dof, (item,), _ = combine("abc", [TypeB("gravity", 0.1, "m/s^2", np.array([2.0, -3.0, 0.0]))])
     np.testing.assert_allclose(covariance, [[0.04, -0.06, 0.0], [-0.06, 0.09, 0.0], [0.0, 0.0, 0.0]])
     assert np.all(np.isinf(dof))
     assert item.share == {"a": 1.0, "b": 1.0}
@@ -127,7 +127,7 @@ def test_a_type_b_input_moves_all_parameters_together():
 @settings(deadline=None)
 @given(st.floats(1, 1e3), st.integers(1, 10))
 def test_pooling_equal_sources_adds_their_degrees_of_freedom(dof, count):
-    _, (total,), _ = combine(["y"], [scalar(str(i), 1.0, dof) for i in range(count)])
+    _, (total,), *_ = combine(["y"], [scalar(str(i), 1.0, dof) for i in range(count)])
     assert total == pytest.approx(count * dof)
 
 
@@ -141,7 +141,7 @@ def test_welch_satterthwaite_holds_in_monte_carlo():
     ua, ub = a.std(axis=1, ddof=1) / np.sqrt(5), b.std(axis=1, ddof=1) / 3.0
     held = 0
     for mean, u1, u2 in zip(a.mean(axis=1) - b.mean(axis=1), ua, ub, strict=True):
-        covariance, (dof,), _ = combine(["y"], [scalar("a", u1, 4), scalar("b", u2, 8)])
+        covariance, (dof,), *_ = combine(["y"], [scalar("a", u1, 4), scalar("b", u2, 8)])
         held += abs(mean) <= coverage_factor(dof, 0.95) * np.sqrt(covariance[0, 0])
     assert held / runs == pytest.approx(0.95, abs=0.01 + 4 * np.sqrt(0.95 * 0.05 / runs))
 
@@ -213,7 +213,7 @@ def test_six_positions_against_the_closed_form():
     for name, shift in shifts.items():
         expected += U[name] ** 2 * np.outer(shift, shift)
         parts[name] = (U[name] * shift) ** 2
-    covariance, dof, budget = six_position_budget()
+    covariance, dof, budget, _ = six_position_budget()
     np.testing.assert_allclose(covariance, expected, rtol=1e-9, atol=1e-9 * np.diag(expected).min())
     for item in budget:
         share = [item.share.get(name, 0.0) for name in NAMES]
@@ -238,7 +238,7 @@ def test_six_positions_against_monte_carlo():
     y += U["noise"] * rng.standard_normal(y.shape)
     solution = np.column_stack([solved(e).beta for e in np.eye(6)])  # linear in the readings
     errors = y @ solution.T - TRUTH
-    covariance, _, _ = six_position_budget()
+    covariance, *_ = six_position_budget()
     u = np.sqrt(np.diag(covariance))
     # each mean, variance and correlation within 4.5 standard errors (12 figures: risk 1e-4), and all together
     np.testing.assert_allclose(errors.mean(axis=0) / u, 0.0, atol=4.5 / np.sqrt(runs))
@@ -257,7 +257,7 @@ def test_independent_errors_of_each_position_are_a_source_each():
         TypeB(f"position {k}", u, "rad", solved(e * J).beta)
         for k, (e, J) in enumerate(zip(np.eye(6), by_angle, strict=True))
     ]
-    covariance, _, _ = combine(NAMES, parts)
+    covariance, *_ = combine(NAMES, parts)
     gain = np.linalg.pinv(DESIGN)
     np.testing.assert_allclose(
         covariance,
@@ -271,5 +271,5 @@ def test_independent_errors_of_each_position_are_a_source_each():
 def test_effective_degrees_of_freedom_do_not_depend_on_the_unit(size):
     """Welch-Satterthwaite is homogeneous of degree 0 in the variances, even where their squares leave the range."""
     sources = [scalar("a", 3.0 * np.sqrt(size), 10.0), scalar("b", 1.0 * np.sqrt(size), 4.0)]
-    _, (dof,), _ = combine(["y"], sources)
+    _, (dof,), *_ = combine(["y"], sources)
     assert dof == pytest.approx(10.0**2 / (9.0**2 / 10.0 + 1.0 / 4.0), rel=1e-12)

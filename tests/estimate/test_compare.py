@@ -27,9 +27,8 @@ def calibration(values, covariance, dof=np.inf, names=None, units=None, where="a
     dof = np.broadcast_to(np.asarray(dof, float), p).copy()
     settings = {"status": Status.OK, "message": "fine", "conditions": SITE} | more
     names = tuple(names or (f"c{k}" for k in range(p)))
-    k = np.array([coverage_factor(nu) for nu in dof])
     units = tuple(units or ("1",) * p)
-    return Saved(Estimate("calibrate imu", names, units, values, covariance, dof, k, **settings), where)
+    return Saved(Estimate("calibrate imu", names, units, values, covariance, dof, **settings), where)
 
 
 def scaled_by(source, u, fraction, values, covariance):

@@ -9,6 +9,7 @@ from scipy import stats
 from inercal.errors import InputError
 from inercal.estimate.coverage import coverage, nees
 from inercal.estimate.runs import Threads, run
+from rows import for_each
 
 
 def correlated(rng, runs, m, r):
@@ -137,7 +138,7 @@ def test_no_misses_at_all_are_no_proof_in_few_runs():
     assert not coverage(np.tile(errors, (20, 1)), np.ones(30)).passed
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("bad", "said"),
     [
         ({"errors": np.zeros(5)}, r"errors: got shape \(5,\)"),
@@ -202,7 +203,7 @@ def test_nees_band_against_monte_carlo():
     assert means.std() == pytest.approx(n.standard_error, rel=0.02)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("P", "said"),
     [
         (np.eye(3), r"covariances: got shape \(3, 3\)"),

@@ -17,6 +17,7 @@ from inercal.estimate.files import from_json, load, plain_objects, save, to_json
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, Finding, Status
 from inercal.inputs import Source
+from rows import for_each
 
 
 def example(**more):
@@ -27,7 +28,6 @@ def example(**more):
         "values": np.array([1e-3, 1.0]),
         "covariance": np.array([[4e-8, 1e-9], [1e-9, 9e-8]]),
         "dof": np.array([12.0, np.inf]),
-        "k": np.array([2.2, 2.0]),
         "status": Status.OK,
         "message": "fine",
         "findings": (Finding("gap", "t: 1 gap", "rows 5-6"),),
@@ -72,7 +72,6 @@ def estimates(draw):
         values=array(finite | st.just(math.nan), p),
         covariance=root @ root.T,
         dof=array(st.floats(1e-3, allow_nan=False), p),
-        k=array(st.floats(1e-3, 1e6) | st.just(math.nan), p),
         status=draw(st.sampled_from(Status)),
         message=draw(st.text()),
         findings=tuple(
@@ -127,7 +126,7 @@ def test_keys_of_the_contract():
     assert list(data["status"]) == ["code", "message"]
     assert [list(p) for p in data["parameters"]] == [["name", "value", "u", "U", "k", "dof", "unit"]] * 2
     assert list(data["covariance"]) == ["names", "matrix"]
-    assert list(data["findings"][0]) == ["code", "message", "where"]
+    assert list(data["findings"][0]) == ["code", "message", "where", "harm"]
     assert list(data["budget"][0]) == ["source", "type", "u", "unit", "share"]
     assert list(data["inputs"][0]) == ["path", "sha256"]
 
@@ -277,8 +276,8 @@ FOREIGN = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("suffix", [".json", ".toml", ".txt", ""])
-@pytest.mark.parametrize("content", FOREIGN, ids=range(len(FOREIGN)))
+@for_each("suffix", [".json", ".toml", ".txt", ""])
+@for_each("content", FOREIGN)
 def test_foreign_files(tmp_path, content, suffix):
     path = tmp_path / f"foreign{suffix}"
     path.write_bytes(content)

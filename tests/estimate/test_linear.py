@@ -12,6 +12,7 @@ from scipy import stats
 from inercal.estimate.identifiability import identify, in_words
 from inercal.estimate.linear import least_squares, whiten
 from inercal.geometry.rotations import elementary
+from rows import for_each
 
 
 def design(rng, n, p):
@@ -205,7 +206,7 @@ def test_whitened_noise_is_white():
     np.testing.assert_allclose(white @ white.T / runs, np.eye(4), atol=5 * np.sqrt(2 / runs))
 
 
-@pytest.mark.parametrize(
+@for_each(
     "covariance",
     [
         np.array([1.0, 0.0, 1.0]),

@@ -8,6 +8,7 @@ from scipy import stats
 
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import solve
+from rows import for_each
 
 T = np.linspace(0.0, 2.0, 12)
 
@@ -219,9 +220,9 @@ class Spoiled:
         return self.function(x) if self.left >= 0 else np.full_like(self.function(x), self.value)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("call", [0, 1, 2, 3, 4])
-@pytest.mark.parametrize("which", ["residuals", "jacobian"])
+@for_each("value", [np.nan, np.inf, -np.inf])
+@for_each("call", [0, 1, 2, 3, 4])
+@for_each("which", ["residuals", "jacobian"])
 def test_values_that_are_no_numbers_are_no_convergence(which, call, value):
     """At the start or on the way: no exception, no false minimum (MINPACK stops there and calls it one)."""
     y = decay([2.0, 0.7])

@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import InputError
+from inercal.estimate.basis import Basis
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import from_json, to_json
 from inercal.estimate.repeat import combine_runs, mandel_paule
-from inercal.estimate.result import Estimate, without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
 
@@ -23,7 +24,7 @@ def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:
     names = ("K0_x", "K0_y", "K1_x")[:p]
     return Estimate(
         "calibrate imu", names, ("count",) * p, np.asarray(values, dtype=float), np.diag(own) + shared,
-        np.full(p, dof), np.full(p, 2.0), Status.OK, "", common=shared, **more,
+        np.full(p, dof), Status.OK, "", common=shared, **more,
     )  # fmt: skip
 
 
@@ -136,8 +137,8 @@ def test_exact_runs_have_no_within_run_scatter_and_stay_finite():
 
 
 def test_a_bad_run_is_left_out_and_gives_the_verdict():
-    bad = without_parameters(
-        "calibrate imu", Status.TOO_FEW_INTERVALS, "found 3", inputs=(Source("b.csv", "0"),)
+    bad = Estimate.without(
+        Basis("calibrate imu", inputs=(Source("b.csv", "0"),)), Status.TOO_FEW_INTERVALS, "found 3"
     )
     found = combine_runs([run_of([1.0], [0.01]), bad, run_of([1.2], [0.01])])
     assert found["K0_x"].value == pytest.approx(1.1)

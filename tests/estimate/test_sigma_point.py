@@ -8,7 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inercal.estimate.factor import CHOLESKY, EIGEN, FACTORS, root
-from inercal.estimate.sigma_point import covariance, cross, draw, mean, moments, update, weights
+from inercal.estimate.sigma_point import (
+    covariance,
+    cross,
+    draw,
+    empty_moments,
+    empty_points,
+    mean,
+    moments,
+    update,
+    weights,
+)
 
 pytestmark = pytest.mark.kernels
 
@@ -85,13 +95,13 @@ def test_mean_of_a_square():
     assert out[0] == pytest.approx(3.0 * 0.09**2)
 
 
-def drawn(P, kind, told):
+def drawn(P, factor, health):
     """Columns of the points, and the weight of each of them."""
     n = len(P)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)
-    columns, work = np.full((n, n), np.nan), np.full((n, n), np.nan)
-    draw(P, kind, spread, np.empty((n, n)), work, columns, told)
-    return columns, other
+    points = empty_points(n)._replace(health=health)
+    draw(P, factor, spread, points)
+    return points.columns, other
 
 
 @pytest.mark.parametrize("kind", FACTORS.values(), ids=FACTORS)
@@ -106,25 +116,23 @@ def test_drawn_points_carry_the_covariance_through(kind, seed, n, m):
     np.testing.assert_allclose(2.0 * other * columns.T @ columns, P, atol=1e-11 * n)
     points = np.vstack([np.zeros(n), columns, -columns])
     read = h + points @ H.T + points[:, curved] ** 2
-    middle, odd = np.full(m, np.nan), np.full((n, m), np.nan)
-    Pzz, Pxz = np.full((m, m), np.nan), np.full((n, m), np.nan)
-    expected = read[1:] - read[1:].mean(axis=0)
-    moments(read.copy(), columns, other, middle, odd, Pzz, Pxz)
-    np.testing.assert_allclose(middle, h + np.diag(P)[curved], atol=1e-10 * n)
-    np.testing.assert_allclose(Pxz, P @ H.T, atol=1e-10 * n)
-    np.testing.assert_allclose(Pzz, expected.T @ expected / (2.0 * n), atol=1e-10 * n)
+    expected, got = read[1:] - read[1:].mean(axis=0), empty_moments(n, m)
+    moments(read.copy(), columns, other, got)
+    np.testing.assert_allclose(got.mean, h + np.diag(P)[curved], atol=1e-10 * n)
+    np.testing.assert_allclose(got.cross, P @ H.T, atol=1e-10 * n)
+    np.testing.assert_allclose(got.covariance, expected.T @ expected / (2.0 * n), atol=1e-10 * n)
 
 
 def test_drawing_remembers_the_worst():
     """The lowest eigenvalue of all steps, NaN while there is none, and the steps at which Cholesky failed."""
-    told = np.array([math.nan, 0.0])
-    drawn(np.eye(2), CHOLESKY, told)
-    assert math.isnan(told[0])
+    health = np.array([math.nan, 0.0])
+    drawn(np.eye(2), CHOLESKY, health)
+    assert math.isnan(health[0])
     for correlation in (0.5, 1.5, 0.9, 1.2):
-        drawn(np.array([[1.0, correlation], [correlation, 1.0]]), CHOLESKY, told)
-    assert told == pytest.approx([-0.5, 2.0])
-    drawn(np.array([[1.0, 1.75], [1.75, 1.0]]), EIGEN, told)
-    assert told == pytest.approx([-0.75, 2.0])
+        drawn(np.array([[1.0, correlation], [correlation, 1.0]]), CHOLESKY, health)
+    assert health == pytest.approx([-0.5, 2.0])
+    drawn(np.array([[1.0, 1.75], [1.75, 1.0]]), EIGEN, health)
+    assert health == pytest.approx([-0.75, 2.0])
 
 
 @given(seeds, st.integers(1, 26), st.integers(1, 7))

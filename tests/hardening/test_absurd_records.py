@@ -163,6 +163,7 @@ def check(words: list[str], capsys) -> None:
         assert all(math.isfinite(p["value"]) and p["u"] > 0.0 for p in data["parameters"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoiled", SPOILED)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_verdict_or_one_sentence(name, spoiled, folder, monkeypatch, capsys):

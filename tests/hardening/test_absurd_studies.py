@@ -5,6 +5,7 @@ import resource
 import pytest
 
 from inercal.cli import run
+from rows import for_each
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ POSITIONS = "design positions turntable.toml"
 PATH = "design selfcal selfcal.toml"
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("command", "override", "words"),
     [
         (

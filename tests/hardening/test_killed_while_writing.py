@@ -200,6 +200,7 @@ def test_no_command_that_writes_is_forgotten(capsys):
             assert (f"{option} PATH:" in text) == there, (words, option)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_old_file_or_the_new_one(name, folder, tmp_path, monkeypatch):
     """Whenever a command begins to write, forks of it go on, each to an end of its own; then it ends undisturbed.

@@ -133,6 +133,7 @@ def is_study_or_error(make) -> None:
     assert len(said) < 700
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_spoiled_keys(kind):
     @FIXED

@@ -173,13 +173,16 @@ def test_there_are_24_mountings_all_of_them_right_handed():
 # uncertainties
 
 
-@pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say():
-    sample = run(one_calibration, runs=RUNS, seed=SEED)
+@pytest.mark.parametrize("runs", [20, pytest.param(RUNS, marks=pytest.mark.campaign)])
+def test_intervals_cover_the_truth_as_often_as_they_say(runs):
+    """Of 20 runs 14 hits are the exact limit of one coefficient at a risk of 4e-5; 0.88 of all together is four and
+    a half standard deviations at a design effect of 3."""
+    sample = run(one_calibration, runs=runs, seed=SEED)
     assert np.all(sample["sound"] == 1.0)
     found = coverage(sample["error"], sample["u"], sample["dof"])
-    assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table()
-    assert 0.937 <= found.pooled <= 0.963, found.table()
+    each, least, most = ((0.892, 0.992), 0.937, 0.963) if runs == RUNS else ((0.7, 1.0), 0.88, 1.0)
+    assert np.all((found.fraction >= each[0]) & (found.fraction <= each[1])), found.table()
+    assert least <= found.pooled <= most, found.table()
 
 
 def test_errors_of_the_table_widen_the_uncertainties_and_are_in_the_budget(noisy):
@@ -344,9 +347,17 @@ def test_the_temperature_is_that_stated_or_else_that_recorded(noisy):
         "temperature", parse_unit("K"), 295.15 + np.sin(t), t, columns["acc_x"].source
     )
     recorded = calibrated(Record(columns)).conditions["temperature"]
-    assert recorded == f"{22.0 + np.sin(t).mean():.1f} degC"
+    assert recorded == {
+        "value": pytest.approx(22.0 + np.sin(t).mean()),
+        "u": pytest.approx(np.sin(t).std()),
+        "unit": "degC",
+    }
     stated = parse_quantity("20 degC", "temperature", "temperature")
-    assert calibrated(Record(columns), temperature=stated).conditions["temperature"] == "20 degC"
+    assert calibrated(Record(columns), temperature=stated).conditions["temperature"] == {
+        "value": 20.0,
+        "u": 0.0,
+        "unit": "degC",
+    }
     assert calibrated(noisy[0]).conditions["temperature"] is None
 
 
@@ -376,7 +387,8 @@ def test_pictures_of_sound_and_failed_calibrations(noisy):
     ):
         found = calibrate_aided(record, settings(), AidedSettings(CHAIN))
         drawn = pictures(found)
-        assert drawn[0].title == "The table"
-        assert len(drawn) == (1 if found.fit is None else 3 + len(found.fit.identified))
+        fitted = found.fit is not None
+        assert drawn[fitted].title == "The table"
+        assert len(drawn) == (4 + len(found.fit.identified) if fitted else 1)
         assert all(len(picture.svg) < 300_000 for picture in drawn)
         render(found.estimate, drawn, "Table")

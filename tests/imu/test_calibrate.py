@@ -15,6 +15,7 @@ from inercal.imu.multiposition.poses import sweep
 from inercal.imu.recording import prepare
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
+from rows import for_each
 
 SITE = Site(9.81, (), 0.8)
 SETTINGS = ImuSettings(SITE)
@@ -390,7 +391,7 @@ def test_g_sensitivity_is_named_where_it_is_not_estimated():
     assert "g_sensitivity" in codes
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("spoil", "sentence"),
     [
         (lambda t, a, w: (t[:5], a[:5], w[:5]), "samples"),

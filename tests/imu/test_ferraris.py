@@ -231,16 +231,18 @@ def test_outputs_coarser_than_their_noise_are_no_better_known_than_their_step():
 SEED, RUNS = 20261121, 250
 
 
-@pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say():
+@pytest.mark.parametrize("runs", [20, pytest.param(RUNS, marks=pytest.mark.campaign)])
+def test_intervals_cover_the_truth_as_often_as_they_say(runs):
     """250 sessions with every source drawn, the seed fixed before the first look.
 
     89.2 and 99.2 % are exact binomial limits of one coefficient, at a risk of 1e-4 each. All together: four standard
     deviations below 95 %; alignment of second order and the Allan fit at the length of a hold err on the safe side,
-    so that they may lie at 97 % and a standard deviation more.
+    so that they may lie at 97 % and a standard deviation more. The test run makes the first 20: 14 hits are the exact
+    limit of one at a risk of 4e-5, 0.88 of all is four and a half standard deviations at a design effect of 3.
     """
-    sample = run(one_calibration, runs=RUNS, seed=SEED)
+    sample = run(one_calibration, runs=runs, seed=SEED)
     assert np.all(sample["sound"] == 1.0)
     found = coverage(sample["error"], sample["u"], sample["dof"])
-    assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table(NAMES)
-    assert 0.936 <= found.pooled <= 0.974, found.table(NAMES)
+    each, least, most = ((0.892, 0.992), 0.936, 0.974) if runs == RUNS else ((0.7, 1.0), 0.88, 1.0)
+    assert np.all((found.fraction >= each[0]) & (found.fraction <= each[1])), found.table(NAMES)
+    assert least <= found.pooled <= most, found.table(NAMES)

@@ -15,6 +15,7 @@ from inercal.imu.ferraris.figures import pictures
 from inercal.report.html import render
 
 ALL = [
+    "Coefficients and their uncertainties",
     "Sections",
     "Scatter of the positions",
     "Turns",

@@ -21,8 +21,9 @@ from inercal.report.html import render
 from inercal.units import parse_unit
 
 ALL = [
-    "Static intervals",
     "Poses",
+    "Coefficients and their uncertainties",
+    "Static intervals",
     "Residual of each pose",
     "Miss of each turn",
     "Correlation of the coefficients",

@@ -170,8 +170,8 @@ def calibration(temperature, values, u=0.01, common=0.0) -> Estimate:
     shared = np.full((p, p), common**2)
     return Estimate(
         "calibrate imu", ("K1_x", "K0_x")[:p], ("count/(m/s^2)", "count")[:p], np.asarray(values, dtype=float),
-        np.eye(p) * u**2 + shared, np.full(p, 50.0), np.full(p, 2.0), Status.OK, "", common=shared,
-        conditions={"temperature": f"{temperature} degC"},
+        np.eye(p) * u**2 + shared, np.full(p, 50.0), Status.OK, "", common=shared,
+        conditions={"temperature": {"value": float(temperature), "u": 0.0, "unit": "degC"}},
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from scipy import stats
 from inercal.instruments.noise import BIAS_FLOOR, SYMBOLS, NoiseModel, allan_terms, flicker
 from inercal.instruments.terms import NOISE_TERMS, noise_shown, noise_term
 from inercal.units import parse_quantity, parse_unit
+from rows import for_each
 
 
 def allan(x, m):
@@ -104,8 +105,8 @@ def test_pins_of_units():
         assert parse_quantity(text, dimension, "key").value == pytest.approx(si, rel=1e-8)
 
 
-@pytest.mark.parametrize("channel", ["rad/s", "m/s^2"])
-@pytest.mark.parametrize("symbol", SYMBOLS)
+@for_each("channel", ["rad/s", "m/s^2"])
+@for_each("symbol", SYMBOLS)
 def test_units_of_inertial_channels(channel, symbol):
     """The unit in a result is SI, and the one for people is of the same dimension."""
     si, shown = parse_unit(noise_term(symbol, channel)), parse_unit(noise_shown(symbol, channel))

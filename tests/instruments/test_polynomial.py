@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
 from inercal.instruments.terms import TERMS
+from rows import for_each
 
 EVERY = [(kind, channel) for kind, channels in CHANNELS.items() for channel in channels]
 
@@ -25,7 +26,7 @@ def values_of(model, rng):
     return values
 
 
-@pytest.mark.parametrize(("kind", "channel"), EVERY)
+@for_each(("kind", "channel"), EVERY)
 def test_every_term_is_in_the_term_table(kind, channel):
     model = channel_model(kind, channel)
     assert set(model.symbols) <= set(TERMS)
@@ -74,7 +75,7 @@ def test_an_accelerometer_follows_its_equation(i, p, o):
     assert_allclose(model.regressors(f, w) @ model.linear(values), c["K0"] + c["K1"] * inside, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "channel"), EVERY)
+@for_each(("kind", "channel"), EVERY)
 def test_slopes_are_the_derivatives_of_the_regressors(kind, channel):
     """Against central differences, also where a component is negative (a|a| has a kink in its derivative at 0)."""
     model, (a, w), h = channel_model(kind, channel), draws(), 1e-6
@@ -87,7 +88,7 @@ def test_slopes_are_the_derivatives_of_the_regressors(kind, channel):
         assert_allclose(found[..., k], rise / (2 * h), atol=1e-8)
 
 
-@pytest.mark.parametrize(("kind", "channel"), EVERY)
+@for_each(("kind", "channel"), EVERY)
 def test_terms_and_linear_coefficients_are_inverse_to_each_other(kind, channel):
     model = channel_model(kind, channel)
     values = values_of(model, np.random.default_rng(4))

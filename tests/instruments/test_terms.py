@@ -2,10 +2,9 @@
 
 import re
 
-import pytest
-
 from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD, TERMS
+from rows import for_each
 
 
 def test_names_of_the_contract():
@@ -39,7 +38,7 @@ def test_the_names_of_the_terms_are_told_apart():
     assert len({term.name for term in TERMS.values()}) == len(TERMS)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("symbol", "output", "unit"),
     [
         ("K0_x", "m/s^2", "m/s^2"),

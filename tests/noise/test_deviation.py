@@ -9,6 +9,7 @@ from inercal.errors import InputError, RecordError
 from inercal.instruments.noise import NoiseModel
 from inercal.noise.deviation import PRESENT, allan_deviation, regular
 from inercal.noise.dwell_means import overlapping_variance, running_sums
+from rows import for_each
 
 
 def plain(x, m):
@@ -131,7 +132,7 @@ def test_limits_widen_with_the_level_and_enclose_the_deviation():
 # What cannot be.
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("x", "interval", "tau", "says"),
     [
         ([1.0, 2.0], 1.0, None, "expected three samples"),

@@ -8,7 +8,7 @@ from paper_study import study
 from inercal.estimate.factor import EIGEN, root
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import quaternion
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import Filter
 
@@ -37,18 +37,12 @@ def test_as_filterpy(factor, theirs, limit):
     told = problem(settings)
     recording = simulate(experiment(settings), np.random.default_rng(20261121)).recording
     x, P, nis = plain_filterpy.run(told, recording, STEPS, theirs)
-    state, trace = quaternion.advance(
-        quaternion.initial(told, recording.th[0]),
-        told,
-        recording.dt[:STEPS],
-        recording.rate[:STEPS],
-        recording.acc[1 : STEPS + 1],
-        recording.th[1 : STEPS + 1],
-    )
+    steps = recording.steps.part(slice(STEPS))
+    state, trace = quaternion.advance(quaternion.initial(told, recording.th[0]), told, steps)
     u = np.sqrt(np.diagonal(P[:, 4:, 4:], axis1=1, axis2=2))
-    assert np.max(np.abs(trace.coefficients - x[:, 4:]) / u) < limit
-    assert np.max(np.abs(trace.u / u - 1.0)) < limit
-    assert np.max(np.abs(trace.attitude - x[:, :4]) / trace.attitude_u.min()) < limit
-    np.testing.assert_allclose(trace.nis, nis, atol=100.0 * limit)
+    assert np.max(np.abs(trace.estimates.coefficients - x[:, 4:]) / u) < limit
+    assert np.max(np.abs(trace.estimates.u / u - 1.0)) < limit
+    assert np.max(np.abs(trace.estimates.attitude - x[:, :4]) / trace.estimates.attitude_u.min()) < limit
+    np.testing.assert_allclose(trace.estimates.nis, nis, atol=100.0 * limit)
     scale = np.sqrt(np.diag(P[-1]))
     assert np.max(np.abs(state.covariance - P[-1])[4:, 4:] / np.outer(scale, scale)[4:, 4:]) < limit

@@ -25,6 +25,7 @@ def analysed():
     return allan_deviation(np.diff(PHASE), 1.0, TAU)
 
 
+@pytest.mark.slow
 def test_deviations_to_the_printed_digits():
     found = analysed()
     assert np.all(np.abs(found.deviation[:, 0] - SIGMA) <= PRINTED * 1.001)

@@ -15,7 +15,7 @@ from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import quaternion
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.monte_carlo import campaign
 from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
@@ -101,6 +101,7 @@ def estimates(runs):
 # Table 1
 
 
+@pytest.mark.slow
 def test_one_run_of_all_estimators(estimates):
     """The table of the page, and errors that the bounds allow: seed 1 is the record that ships with inercal."""
     bound = 100.0 * bound_of(study()).u / SIZE
@@ -190,6 +191,7 @@ def test_printed_attitude_errors_are_of_another_kind(two_turns):
 # Quaternion or gimbal angles
 
 
+@pytest.mark.slow
 def test_the_quaternion_model_is_not_more_accurate(runs, estimates):
     """The same coefficients to 0.004 standard deviations, the same attitude to four digits (figure 2)."""
     for run, q, gimbal in zip(runs, estimates["svd-qukf"], estimates["gimbal-ukf"], strict=True):
@@ -198,6 +200,7 @@ def test_the_quaternion_model_is_not_more_accurate(runs, estimates):
         np.testing.assert_allclose(rms[1], rms[0], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_euler_steps_bias_the_gimbal_model(runs, estimates):
     """8.4 standard deviations at nominal noise, where NIS shows nothing; in proportion to the step; not in ka0."""
     euler = Filter("gimbal-ukf", integration="euler")
@@ -305,8 +308,7 @@ def test_an_indefinite_covariance():
     recording, given, row = run.recording, replace(given, filter=Filter("svd-qukf")), 900
 
     def advanced(state, rows):
-        parts = recording.dt, recording.rate, recording.acc[1:], recording.th[1:]
-        return quaternion.advance(state, given, *(part[rows] for part in parts), history=False)
+        return quaternion.advance(state, given, recording.steps.part(rows), history=False)
 
     state, trace = advanced(quaternion.initial(given, recording.th[0]), slice(0, row))
     assert trace.lowest_eigenvalue > 0.0
@@ -327,6 +329,7 @@ def test_an_indefinite_covariance():
 # Near-level gating
 
 
+@pytest.mark.slow
 def test_the_spike_where_the_turn_changes(runs):
     """At 180 s, from joint z to x, the attitude error grows six times within a second: by the misalignments of gyros
     that no turn before has shown. Accelerometers near level have no part in it: it is there with them all, and gone
@@ -361,6 +364,7 @@ def test_the_spike_where_the_turn_changes(runs):
     assert stopped[t > 200.0].mean() < 1.0
 
 
+@pytest.mark.slow
 def test_rules_of_gating_on_this_path(runs):
     """`any` never takes an accelerometer, `two` in 61 % of rows; of the step, `any` and `channel` take nothing."""
     taken = {}
@@ -441,7 +445,7 @@ def test_earth_rate_in_other_axes_than_gravity():
     """Printed as east-north-up beside a gravity in north-up-east: it cannot have been computed so."""
     world = study().world
     printed = np.array([0.0, world.earth[0], world.earth[1]])
-    found, nis = off(world=replace(world, earth=printed))
+    found, nis = off(world=world._replace(earth=printed))
     assert found > 1000.0
     assert nis > 1000.0
 

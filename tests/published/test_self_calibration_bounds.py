@@ -8,7 +8,7 @@ from paper_study import ARCSEC, DEG, NOISE, PER_HOUR, TRUTH, gating_costs, study
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import at_rest, with_stops
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.coefficients import DO, DS, KG0, NAMES
 from inercal.selfcal.platform.plan import motion
 

@@ -351,6 +351,7 @@ def compared(name):
 class TestWhoWins:
     """Six runs of each scenario, shorter than those of the table. Errors are mostly one draw of biases in each run."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", CALIBRATED)
     def test_in_a_calibrated_rig_a_low_pass_takes_the_papers_noise(self, name):
         """White noise of accelerometers and, by 2 r2 w dw, of the gyro; 30 of 500 Hz of it stay, and all biases."""
@@ -401,6 +402,7 @@ class TestWhoWins:
         assert rms(found[np.isfinite(found)]) / DEG == pytest.approx(0.006, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_pictures_are_drawn(tmp_path):
     folder = Path(__file__).parents[2] / "docs" / "pictures"
     subprocess.run([sys.executable, str(folder / "tan_2021.py"), str(tmp_path)], check=True, timeout=60)

@@ -251,6 +251,7 @@ def procedure():
     return true.first, found.first - true.first, found.total - true.total
 
 
+@pytest.mark.slow
 def test_noise_of_the_papers_procedure_on_null_factors(procedure):
     true, first, total = procedure
     null = true < 1e-12
@@ -258,6 +259,7 @@ def test_noise_of_the_papers_procedure_on_null_factors(procedure):
     assert np.abs(total[null]).max() < 1e-7  # the total order of the same rows is far better
 
 
+@pytest.mark.slow
 def test_noise_of_the_papers_procedure_at_a_position(procedure):
     """A linear output of uniform errors: N Var(S_i) = 2 S_i - S_i^2 with this estimator, to 5 % or so.
 
@@ -354,6 +356,7 @@ def plans():
     return planning.design(study(criterion="I", constraint=limit)).judged[:3]
 
 
+@pytest.mark.slow
 def test_a_constant_inner_error_is_the_same_in_every_plan(plans):
     """It turns the instrument, and coefficients turned with it read the same: no position tells the two apart."""
     constant = CHAIN.with_scope(Scope.RIG)
@@ -370,6 +373,7 @@ def test_a_constant_inner_error_is_the_same_in_every_plan(plans):
     assert_allclose(outer[2:, 0], [0.0060, 0.0005], atol=6e-5)
 
 
+@pytest.mark.slow
 def test_where_earth_rate_is_known_the_outer_errors_nearly_vanish(plans):
     """And the inner ones about y with them; those about x leave the rate about x as it is."""
     constant, k = CHAIN.with_scope(Scope.RIG), ("k_x", "k_y", "k_z")
@@ -388,6 +392,7 @@ def test_redrawn_errors_average_out_alike():
     assert_allclose(few / many, 2.0, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_limiting_the_indices_lowers_the_share_and_raises_the_error(plans):
     share = [sum(each.drift_shares[name] for name in INNER) for each in plans[:2]]
     assert share[0] == pytest.approx(0.25, abs=0.02)
@@ -404,6 +409,7 @@ def test_on_az_no_limit_below_an_eighth_leaves_a_position(indices):
     assert inner[:2].max() < 0.25 + 1e-5
 
 
+@pytest.mark.slow
 def test_the_pictures_are_drawn(tmp_path):
     folder = Path(__file__).parents[2] / "docs" / "pictures"
     subprocess.run([sys.executable, str(folder / "zhao_2023.py"), str(tmp_path)], check=True, timeout=60)

@@ -12,6 +12,7 @@ from inercal.records.checks.values import outliers, saturation
 from inercal.records.column import Column
 from inercal.records.places import places
 from inercal.units import parse_unit
+from rows import for_each
 
 
 def noise(count, seed=7):
@@ -119,6 +120,7 @@ def pieces(steps):
     return st.lists(stretch, min_size=1, max_size=6).map(added)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     t=pieces([0.01, 0.02, 0.0, -0.01, 1e-9, 1e300, 1e3]),
@@ -150,7 +152,7 @@ class TestSaturation:
         motion = np.clip(np.round(40_000 * np.sin(self.THETA)), -32768, 32767)
         assert len(saturation(np.r_[rest, motion, rest], "gyro_x")) == 1
 
-    @pytest.mark.parametrize(
+    @for_each(
         "signal",
         [
             np.zeros(1000),
@@ -184,7 +186,7 @@ class TestOutliers:
         signal[::7] += 1
         assert said(outliers(signal, "acc_x")) == [("outlier", "row 501")]
 
-    @pytest.mark.parametrize(
+    @for_each(
         "signal",
         [
             noise(1_000_000),

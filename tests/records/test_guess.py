@@ -13,6 +13,7 @@ from inercal.errors import InputError, RecordError
 from inercal.records.guess import guess_map
 from inercal.records.maps import read_map
 from inercal.records.read import read
+from rows import for_each
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 RNG = np.random.default_rng(3)
@@ -52,7 +53,7 @@ def test_the_xsens_files_are_read_as_counts_on_their_clock(tmp_path):
     assert record.findings == ()
 
 
-@pytest.mark.parametrize(
+@for_each(
     "header",
     [
         "time,ax,ay,az,gx,gy,gz",
@@ -66,7 +67,7 @@ def test_the_xsens_files_are_read_as_counts_on_their_clock(tmp_path):
         "",
     ],
 )
-@pytest.mark.parametrize("delimiter", [",", "\t", ";"])
+@for_each("delimiter", [",", "\t", ";"])
 def test_many_headers_mean_the_same(tmp_path, header, delimiter):
     path = table(tmp_path / "run.csv", header, np.column_stack([T, ACC, GYRO]), delimiter)
     _, record = guessed(tmp_path, [path])

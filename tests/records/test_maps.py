@@ -9,6 +9,7 @@ from inercal.errors import InputError, MapError, RecordError
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.read.table import FileOptions
+from rows import for_each
 
 
 def written(path, text):
@@ -57,7 +58,7 @@ def test_a_map_gives_channels_options_and_rate(tmp_path):
     assert (found.rate, found.ignore_time) == (100.0, False)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "message"),
     [
         ("", r"columns: missing, expected at least one \[columns.NAME\]"),

@@ -1,12 +1,12 @@
 """Channels of a model in a wind tunnel: headers, guessed maps, and what is looked at in them."""
 
 import numpy as np
-import pytest
 from nptdms import ChannelObject, TdmsWriter
 
 from inercal.records.guess import guess_map
 from inercal.records.read import read
 from inercal.records.titles import numbered, titled
+from rows import for_each
 
 RNG = np.random.default_rng(5)
 T = np.arange(400) / 1000.0
@@ -16,7 +16,7 @@ A += 1e-4 * RNG.standard_normal(A.shape)
 RATE = 10.0 * np.pi * np.cos(2.0 * np.pi * T) + 0.2 * RNG.standard_normal(len(T))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("title", "channel", "unit"),
     [
         ("A1 [g]", "a1", "g"),

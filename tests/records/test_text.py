@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from inercal.errors import InputError, RecordError
 from inercal.records.read import lines, read
+from rows import for_each
 
 HEADER = "t [s],acc_x [m/s^2],gyro_x [deg/h]"
 ROWS = [[0.0, 9.81, -0.5], [0.01, 9.79, 0.25], [0.02, 9.80, 1.0], [0.03, 9.82, -2.0]]
@@ -60,8 +61,8 @@ def test_a_canonical_header_names_quantity_and_unit(tmp_path):
     assert record.sources[0].sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", "   "])
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@for_each("delimiter", [",", ";", "\t", " ", "   "])
+@for_each("end", ["\n", "\r\n"])
 def test_delimiters_and_line_ends_are_found_out(tmp_path, delimiter, end):
     assert holds_rows(read(written(tmp_path / "a.txt", table(delimiter=delimiter, end=end))))
 
@@ -150,7 +151,7 @@ def test_unreadable_rows_stay_as_nan_and_their_lines_are_said(tmp_path):
     np.testing.assert_array_equal(record["acc_x"].t, [0.0, 0.01, np.nan, 0.03])
 
 
-@pytest.mark.parametrize("empty", ["", " ", "nan", "NaN", "NA", "null", "inf", "1e999"])
+@for_each("empty", ["", " ", "nan", "NaN", "NA", "null", "inf", "1e999"])
 def test_missing_values_are_nan_and_said_for_each_column(tmp_path, empty):
     record = read(written(tmp_path / "a.csv", table().replace("9.79", empty)))
     assert codes(record) == ["nan"]
@@ -197,7 +198,7 @@ def test_rows_of_a_test_on_a_table_are_counted_where_no_time_is_said(tmp_path, h
     assert record.findings == ()
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("content", "message"),
     [
         ("", "is empty"),

@@ -1,11 +1,10 @@
 """A title says which channel a column is and in which unit, in the spellings that loggers use."""
 
-import pytest
-
 from inercal.records.titles import fits, titled
+from rows import for_each
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("title", "channel", "unit"),
     [
         ("acc_x [m/s^2]", "acc_x", "m/s^2"),

@@ -118,6 +118,7 @@ def test_units_of_the_field_and_their_sizes(unit, texts):
         assert others[2][1] == pytest.approx(9.80665e-6 / 60.0)
 
 
+@pytest.mark.slow
 def test_one_picture_for_three_channels_of_a_sensor():
     found = noise("acc_x", "acc_y", "acc_z", "gyro_x", unit="count", n=500)
     assert [picture.title for picture in pictures(found)] == [

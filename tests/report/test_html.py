@@ -10,7 +10,7 @@ import pytest
 
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import from_json, to_json
-from inercal.estimate.result import Estimate, coverage_factor
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
 from inercal.instruments.terms import TERMS
@@ -83,7 +83,6 @@ def estimate(names=("K0_x", "K1_x", "M_xy", "D_F_x", "S_x"), **changes):
         values=rng.normal(size=p) * 1e3,
         covariance=root @ root.T,
         dof=dof,
-        k=np.array([coverage_factor(float(d)) for d in dof]),
         status=Status.OK,
         message="5 coefficients",
         findings=(Finding("saturation", "gyro_x sits at 32767", "rows 3-10"),),
@@ -93,7 +92,11 @@ def estimate(names=("K0_x", "K1_x", "M_xy", "D_F_x", "S_x"), **changes):
             BudgetItem("gravity", "B", 2e-5, "m/s^2", {names[0]: 0.75} if p else {}),
         ),
         model="y = S M x + b",
-        conditions={"temperature": "23 degC", "ranges": {"rate_hz": 100.0, "duration_s": 511.0}, "site": {}},
+        conditions={
+            "temperature": {"value": 23.0, "u": 0.5, "unit": "degC"},
+            "ranges": {"rate_hz": 100.0, "duration_s": 511.0},
+            "site": {},
+        },
         traceability={"instrument": "MTi 7", "date": "2026-11-03", "operator": "", "reference": "NMI"},
         inputs=(Source("run 1.mat", "ab" * 32),),
         provenance={"settings": {"imu": {"static_start": "50 s", "g_sensitivity": False}}},
@@ -150,7 +153,7 @@ def test_what_a_metrologist_looks_for():
     text = Page(render(estimate(), [PICTURE], "Calibration of MTi 7")).text
     for words in (
         "Calibration of MTi 7", "2026-11-03", "NMI", "not stated", "saturation : gyro_x sits at 32767 (rows 3-10)",
-        "95.45 %", "JCGM 100:2008", "y = S M x + b", "temperature 23 degC", "recorded rate 100 Hz", "A figure",
+        "95.45 %", "JCGM 100:2008", "y = S M x + b", "temperature 23.00(50) degC", "recorded rate 100 Hz", "A figure",
         "What it shows.", "pose scatter", "settings.imu.static_start 50 s", "g_sensitivity no",
         "run 1.mat", "ab" * 32, "method multiposition", "new number 2 s",
     ):  # fmt: skip

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from inercal.estimate.result import without_parameters
+from inercal.estimate.basis import Basis
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
 from inercal.records.column import Column
@@ -153,7 +154,7 @@ class Text(HTMLParser):
 
 def told(r):
     """What the command brings back of a record, without its numbers."""
-    return without_parameters("inspect", Status.OK, "", inputs=r.sources, findings=r.findings)
+    return Estimate.without(Basis("inspect", inputs=r.sources), Status.OK, "", findings=r.findings)
 
 
 def test_page():

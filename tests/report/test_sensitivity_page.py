@@ -6,16 +6,16 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from inercal.estimate.result import without_parameters
+from inercal.estimate.basis import Basis
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.site import Site
-from inercal.report.sensitivity import _even_grid, _map, interactions, maps
 from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.plans import grid, listed, named
 from inercal.rigs.tables import turntable
-from inercal.turntable.figures import sensitivity_page
+from inercal.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
+from inercal.turntable.figures.sensitivity import page as sensitivity_page
 from inercal.turntable.sensitivity.analysis import analyse
 from inercal.turntable.settings import Analysis, Design, TurntableSettings
 
@@ -65,7 +65,7 @@ def study(plan, table="two_axis_turntable", analysis=EXACT, **errors):
 
 def told(analysed):
     """What the command brings back, without its numbers."""
-    return without_parameters("sensitivity", Status.OK, analysed.message)
+    return Estimate.without(Basis("sensitivity"), Status.OK, analysed.message)
 
 
 def page_of(settings):
@@ -86,9 +86,10 @@ def paper():
     return page_of(study(grid((8, 8))))
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_analysis(paper):
     analysed, _, found = paper
-    assert found.heads[:3] == ["Findings", "Ranking", "Figures"]
+    assert found.heads[:3] == ["Which errors matter", "Findings", "Ranking"]
     order = np.argsort(-analysed.aggregate.total, kind="stable")
     rows = [row for row in found.rows if len(row) == 5 and row[0].isdigit()]
     assert [row[1].split()[0] for row in rows] == [analysed.indices.factors[k] for k in order]
@@ -108,6 +109,7 @@ def test_numbers_are_those_of_the_analysis(paper):
             assert shown[titles.index(f"{name}, {words}")] == pytest.approx(getattr(kind, key), rel=0.06)
 
 
+@pytest.mark.slow
 def test_figures_four_and_five_of_the_paper(paper):
     _, text, found = paper
     for title in ("Which errors matter", "Mean indices by output", "Maps over the positions", "Interactions"):
@@ -116,6 +118,7 @@ def test_figures_four_and_five_of_the_paper(paper):
     assert "figure 5 of Zhao" in text
 
 
+@pytest.mark.slow
 def test_factors_with_their_sizes():
     rows = page_of(
         study(grid((4, 4)), dphi_y1=normal(0.2 * ARCMIN), deps_x=uniform(90.0 * ARCMIN), d_eta=uniform(2e-5))
@@ -127,6 +130,7 @@ def test_factors_with_their_sizes():
     assert sizes["dtheta_z"] == ["uniform", "± 2 arcmin", "run"]
 
 
+@pytest.mark.slow
 def test_flagged_positions_are_counted_and_the_worst_come_first(paper):
     analysed, text, found = page_of(study(grid((8, 8), half_step=False)))
     assert len(analysed.flagged) > 12
@@ -178,10 +182,8 @@ def test_a_cell_of_a_map_holds_the_value_of_its_position(shuffle):
     if shuffle:
         order = np.random.default_rng(3).permutation(len(angles))
         angles, values = angles[order], values[order]
-    axes = Figure().subplots()
-    image = _map(axes, angles, values, 1.0)
-    left, right, low, high = image.get_extent()
-    cells = np.asarray(image.get_array())
+    image = _map(angles, values)
+    (left, right, low, high), cells = image.extent, image.values
     for (phi1, phi2), value in zip(np.degrees(angles), values, strict=True):
         column = int((phi1 - left) / (right - left) * cells.shape[1])
         row = int((phi2 - low) / (high - low) * cells.shape[0])
@@ -203,6 +205,7 @@ def test_what_is_no_even_grid_is_drawn_as_points():
     assert drawn.svg.count("<image") <= 1  # the colour bar alone
 
 
+@pytest.mark.slow
 def test_same_analysis_same_bytes():
     settings = study(grid((4, 4)))
     analysed = analyse(settings)

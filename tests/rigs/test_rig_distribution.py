@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
 from inercal.rigs.distribution import density, normal, triangular, two_point, uniform
+from rows import for_each
 
 H = np.radians(2.0 / 60.0)
 
@@ -109,8 +110,8 @@ def test_scaling(law, _):
     assert_array_equal(wide.weights, law.weights)
 
 
-@pytest.mark.parametrize("make", [uniform, normal, triangular, two_point])
-@pytest.mark.parametrize("size", [0.0, -1.0, np.nan, np.inf])
+@for_each("make", [uniform, normal, triangular, two_point])
+@for_each("size", [0.0, -1.0, np.nan, np.inf])
 def test_a_law_without_spread_is_refused(make, size):
     with pytest.raises(ValueError, match="expected a number above zero"):
         make(size)
@@ -121,7 +122,7 @@ def spike(x):
     return np.exp(-0.5 * np.square((x - 0.01) / 0.005)) + 1e-9
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("pdf", "low", "high", "message"),
     [
         (ramp, -2.0, 1.0, "negative, not finite or zero"),

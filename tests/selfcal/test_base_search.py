@@ -17,7 +17,7 @@ from inercal.geometry.earth import gravity
 from inercal.geometry.rotations import exp, to_matrix
 from inercal.geometry.site import Site
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA
@@ -86,6 +86,7 @@ def test_heading_of_a_level_base_is_beta_about_the_vertical(frame, vertical, sig
     assert u == pytest.approx((2.0, 3.0, 4.0)[vertical] * 1e-4, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [-170.0, -75.0, 20.0, 137.0])
 def test_any_heading_is_found(degrees):
     """To a few arcminutes from 9 min of turning, within 5 of its own standard deviations; coefficients too."""
@@ -101,6 +102,7 @@ def test_any_heading_is_found(degrees):
     assert np.abs((found.coefficients - made.truth)[:18] / u[:18]).max() < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 6])
 def test_coefficients_are_those_of_a_known_heading(seed):
     """What was not known at first costs nothing in the end: earth rate tells the heading to a minute of arc."""
@@ -117,6 +119,7 @@ def test_coefficients_are_those_of_a_known_heading(seed):
     assert np.abs((values - known.coefficients) / u).max() < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("frame", "axes", "tilt"),
     [
@@ -134,6 +137,7 @@ def test_in_other_frames(frame, axes, tilt):
     assert_allclose(told.base.tilt, tilt, atol=60 * ARCSEC)
 
 
+@pytest.mark.slow
 def test_at_high_latitude_errors_are_as_large_as_stated():
     """At 85 degrees earth rate has an eleventh of its north; headings all round, errors within chi-square's band."""
     values, headings = [], []
@@ -150,6 +154,7 @@ def test_at_high_latitude_errors_are_as_large_as_stated():
     assert np.abs(headings).max() < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("latitude", [-89.9, 90.0])
 def test_no_heading_is_told_at_the_poles(latitude):
     """East of the pole is everywhere: what the record can tell is said, and no heading given out."""
@@ -161,6 +166,7 @@ def test_no_heading_is_told_at_the_poles(latitude):
         with_base(recording, unknown(settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [1.0, 3.0])
 def test_a_base_far_off_is_found(degrees):
     """Prior of degrees about all axes, true beta half of it or more: all estimators have the errors that they state."""
@@ -228,6 +234,7 @@ def test_a_result_says_which_base_beta_is_relative_to():
     assert_allclose(done.truth[BETA], left, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_result_tells_the_heading_that_was_unknown():
     """Value and u in the result, words in the message, with the base to which beta is relative."""
     settings = study("best", base=Base(heading=2.0))

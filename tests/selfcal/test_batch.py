@@ -22,7 +22,7 @@ from inercal.geometry.rotations import (
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters.batch import _terms, estimate_map, inverse_diagonal
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.residuals import (
     first_reading,
     readings,
@@ -266,6 +266,7 @@ def test_other_gimbals_and_base():
     assert np.all(np.abs(found.coefficients - filtered.coefficients) < 0.02 * sigmas(found))
 
 
+@pytest.mark.slow
 def test_consistent_in_sixty_runs():
     """Truth from the prior, fresh noise: NEES is chi-square of 18 a run, NIS of 6 a row (seeds set beforehand)."""
     rng = np.random.default_rng(1905)

@@ -13,7 +13,7 @@ from inercal.geometry.rotations import boxminus, exp, multiply, rotate
 from inercal.selfcal.before.bounds import SOURCES, bounds, recorded_bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import KA0, KG0, product_slope, to_linear
 from inercal.selfcal.platform.kinematics import attitude
@@ -33,7 +33,7 @@ def at_rest(noise, prior, earth=True, time=100.0, step=0.5):
     asked = replace(asked, noise=noise, prior=prior)
     stated = problem(asked)
     if not earth:
-        stated = replace(stated, world=replace(stated.world, earth=np.zeros(3)))
+        stated = replace(stated, world=stated.world._replace(earth=np.zeros(3)))
     return motion(asked.plan, stated.world), stated
 
 

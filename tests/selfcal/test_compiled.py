@@ -20,7 +20,7 @@ from inercal.selfcal.filters import gimbal
 from inercal.selfcal.filters import multiplicative
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import Filter
@@ -72,6 +72,7 @@ def test_a_second_process_compiles_no_filter(compiled):
     assert again["found"] == compiled["found"]
 
 
+@pytest.mark.slow
 def test_kernels_say_the_same_as_plain_python(compiled):
     """Without compiling: apart by rounding alone, 1e-9 of the prior."""
     plain = ran(NUMBA_DISABLE_JIT="1")

@@ -10,7 +10,7 @@ from inercal.findings import Finding
 from inercal.geometry.rotations import exp, rotate
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.settings import Disturbances
@@ -38,6 +38,7 @@ def only(found, code, *words):
     return found[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", NOISE)
 def test_sound_recordings_are_left_alone(noise):
     """Each test keeps a risk of about 1e-3: of 6 recordings one finding is rare, two are not to be had."""
@@ -70,6 +71,7 @@ def test_a_shifted_command_log(rows, how):
     only(named(replace(made, rate=np.roll(made.rate, rows, axis=0))), "command_shift", how)
 
 
+@pytest.mark.slow
 def test_commands_that_act_late_by_one_row_or_by_a_part_of_it():
     only(named(recording(disturbances=Disturbances(command_delay=0.2))), "command_shift", "1 row earlier")
     only(named(recording(disturbances=Disturbances(command_delay=0.02))), "command_shift", "20 ms later")
@@ -145,6 +147,7 @@ def test_two_faults_at_once_are_both_named():
     assert {finding.code for finding in found} == {"channel_swap", "stuck_encoder"}
 
 
+@pytest.mark.slow
 def test_an_unmodelled_turn_of_the_base():
     truth = TRUTH.copy()
     truth[21:] = 5.0 * ARCSEC
@@ -152,12 +155,14 @@ def test_an_unmodelled_turn_of_the_base():
     assert "kg1" not in found.message
 
 
+@pytest.mark.slow
 def test_unmodelled_gyro_scale_errors():
     truth = TRUTH.copy()
     truth[18:21] = [0.0, -20.0 * PPM, 20.0 * PPM]
     only(named(recording(truth=truth)), "unmodelled", "gyros have scale errors", "kg1_y = -2", "kg1_z = ")
 
 
+@pytest.mark.slow
 def test_sensors_turned_on_the_platform():
     """The encoders tell the attitude of the joint, the accelerometers stand 5 arcsec off it about each axis."""
     made = recording()
@@ -177,16 +182,19 @@ def test_the_extended_model_has_nothing_left_to_name():
     assert named(recording(truth=truth), problem(extended)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("latitude", "seen"), [(41.0, "latitude 41.0"), (-40.0, "latitude -40.0")])
 def test_a_latitude_that_is_not_that_of_the_site(latitude, seen):
     site = replace(study().site, latitude=latitude * DEG)
     only(named(recording(site=site)), "site_suspect", seen, "stated is 40.00 deg")
 
 
+@pytest.mark.slow
 def test_a_heading_that_is_not_that_of_the_base():
     only(named(recording(base=Base(heading=1.0 * DEG))), "unmodelled", "beta_y = 3.5e+03", "heading")
 
 
+@pytest.mark.slow
 def test_an_encoder_with_a_periodic_error():
     other = Disturbances(harmonics=((0, 8, 3.0 * ARCSEC, 0.5),))
     only(named(recording(disturbances=other)), "unmodelled", "th_x errs periodically", "8 periods a turn")
@@ -206,6 +214,7 @@ def test_noise_that_is_not_what_is_stated(level, factor, code, word):
     only(named(recording(), replace(PROBLEM, noise=noise)), code, word)
 
 
+@pytest.mark.slow
 def test_gyros_that_are_much_noisier_than_stated():
     noisy = replace(PROBLEM.noise, angle_random_walk=100.0 * PROBLEM.noise.angle_random_walk)
     only(named(recording(noise_of=noisy)), "excess_scatter", "angle random walk looks about")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from paper_study import PRIOR, study
 
+from inercal.estimate.kalman import empty_row
 from inercal.geometry.rotations import (
     boxminus,
     boxplus,
@@ -19,7 +20,7 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import error_state
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform import linearised, model
 from inercal.selfcal.platform.kinematics import attitude, joint_axes
@@ -176,7 +177,8 @@ def test_the_transition_is_the_derivative_of_the_step(seed, turn):
     P = A @ A.T
     expected = F @ P @ F.T + np.diag(np.r_[np.full(3, 0.4), np.zeros(24)])
     rate, earth_e = model.platform_rate(w, c), model.on_the_base(earth, c)
-    linearised.propagate_covariance(P, c, tuple(w), rate, earth_e, tuple(base), dt, 0.4, np.empty((6, 27)))
+    taken = linearised.Step(tuple(w), rate, earth_e, tuple(base), dt)
+    linearised.propagate_covariance(P, c, taken, 0.4, np.empty((6, 27)))
     # the kernel takes the earth's turn within a step for small
     assert np.abs(P - expected).max() < 10.0 * turn * np.abs(expected).max()
     assert np.array_equal(P, P.T)
@@ -198,10 +200,9 @@ def test_accelerometer_rows_are_derivatives(seed):
     up_e = model.on_the_base(up, c)
     f = model.specific_force(tuple(q), up_e)
     for i in range(3):
-        places, row = np.empty(10, dtype=np.int64), np.empty(10)
-        count = linearised.accelerometer_row(i, f, c, up_e, tuple(q), places, row)
+        row = linearised.accelerometer_row(i, f, c, up_e, tuple(q), empty_row(linearised.WIDEST))
         whole = np.zeros(27)
-        whole[places[:count]] = row[:count]
+        whole[row.places[: row.size]] = row.values[: row.size]
         assert whole == pytest.approx(differences[i], abs=1e-8)
 
 
@@ -227,26 +228,11 @@ def test_sample_by_sample_gives_the_same_digits(short, extended):
     """What a stream computes is what a batch computes."""
     of = problem(study(filter=EXTENDED if extended else Filter()))
     recording = cut(short, np.r_[800:1000])
-    whole, _ = error_state.advance(
-        error_state.initial(of, recording.th[0]),
-        of,
-        recording.dt,
-        recording.rate,
-        recording.acc[1:],
-        recording.th[1:],
-    )
+    whole, _ = error_state.advance(error_state.initial(of, recording.th[0]), of, recording.steps)
     state = error_state.initial(of, recording.th[0])
     for k in range(199):
-        one = slice(k, k + 1)
-        state, _ = error_state.advance(
-            state,
-            of,
-            recording.dt[one],
-            recording.rate[one],
-            recording.acc[1:][one],
-            recording.th[1:][one],
-            False,
-        )
+        one = recording.steps.part(slice(k, k + 1))
+        state, _ = error_state.advance(state, of, one, history=False)
     for a, b in zip(whole, state, strict=True):
         assert np.array_equal(a, b)
 

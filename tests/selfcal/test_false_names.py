@@ -8,7 +8,7 @@ from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.settings import Disturbances, Noise
@@ -40,6 +40,7 @@ def correlated(rng, shape, along, size):
     return size * noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arcseconds", [60.0, 600.0])
 def test_noise_of_coarse_encoders_is_no_periodic_error(arcseconds):
     """At rest sin(k th) of the angles read varies with their noise alone. Of 8 recordings none has a finding, where
@@ -73,6 +74,7 @@ def test_coloured_noise_is_no_walk_of_the_gyros(sensor, along):
     assert abs(share - along) < 5.0 / np.sqrt(3 * 2700)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [4.0, 30.0, 300.0])
 def test_a_walk_larger_than_stated_is_told_with_the_range_that_fits(factor):
     restless = replace(STUDY.noise, angle_random_walk=factor * STUDY.noise.angle_random_walk)

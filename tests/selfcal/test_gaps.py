@@ -15,8 +15,8 @@ from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotat
 from inercal.records.record import Record
 from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.filter_result import problem
 from inercal.selfcal.filters.gaps import broken, held_rate, taken_anew, with_held
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.kinematics import attitude

@@ -11,13 +11,14 @@ from unscented_twins import RIGS, angle_rates, gimbal, joints
 from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import gimbal as model
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import LOCK, estimate
 from inercal.selfcal.platform.coefficients import NAMES, to_linear
 from inercal.selfcal.platform.kinematics import angles, parity
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.rig import Gimbals, World
 from inercal.selfcal.settings import Filter
+from rows import for_each
 
 EVERY_RIG = tuple(product(permutations("xyz"), product((1, -1), repeat=3)))
 EULER = Filter(integration="euler")
@@ -51,7 +52,7 @@ def paper():
     return settings, [simulate(prepared, np.random.default_rng(seed)) for seed in range(4)]
 
 
-@pytest.mark.parametrize("rig", EVERY_RIG)
+@for_each("rig", EVERY_RIG)
 def test_kinematics_are_those_of_the_inverted_joint_axes(rig):
     """th' = J^-1 (w - C_pb w_Ib), f = C_pb up, walk T T^T: orders and signs as of the chain of elementary turns."""
     rng = np.random.default_rng(31)
@@ -69,7 +70,7 @@ def test_kinematics_are_those_of_the_inverted_joint_axes(rig):
     np.testing.assert_allclose(f, rotate(conjugate(q), world.up), atol=1e-14)
 
     P = np.zeros((3, 3))
-    model._add_walk(P, th[1], 2.0, world.axes, world.signs)
+    model._add_walk(P, th[1], 2.0, world)
     T = np.linalg.inv(J)
     np.testing.assert_allclose(P, 2.0 * T @ T.T, rtol=1e-11, atol=1e-11)
 
@@ -200,26 +201,25 @@ def test_numbers_that_are_none_end_the_filter_quietly(paper):
     given, recording = problem(settings), runs[0].recording
     state = model.initial(given, recording.th[0])
     state.covariance[0, 0] = np.inf
-    rows = recording.dt[:20], recording.rate[:20], recording.acc[1:21], recording.th[1:21]
-    state, trace = model.advance(state, given, *rows)
+    state, trace = model.advance(state, given, recording.steps.part(slice(20)))
     assert np.isnan(state.coefficients).all()
-    assert np.isnan(trace.nis).all()
+    assert np.isnan(trace.estimates.nis).all()
 
 
 def test_one_row_at_a_time_gives_the_same_digits(paper):
     settings, runs = paper
     given, recording = problem(settings), runs[1].recording
     recording.th[20:] -= 2.0 * np.pi  # encoders that jump are followed
-    rows = recording.dt[:40], recording.rate[:40], recording.acc[1:41], recording.th[1:41]
-    whole, trace = model.advance(model.initial(given, recording.th[0]), given, *rows)
+    steps = recording.steps.part(slice(40))
+    whole, trace = model.advance(model.initial(given, recording.th[0]), given, steps)
     state = model.initial(given, recording.th[0])
     for k in range(40):
-        state, one = model.advance(state, given, *(part[k : k + 1] for part in rows))
+        state, one = model.advance(state, given, steps.part(slice(k, k + 1)))
         for name in ("attitude", "attitude_u", "coefficients", "u", "innovations", "nis", "dims"):
-            np.testing.assert_array_equal(getattr(one, name)[0], getattr(trace, name)[k])
+            np.testing.assert_array_equal(getattr(one.estimates, name)[0], getattr(trace.estimates, name)[k])
     for found, expected in zip(state, whole, strict=True):
         np.testing.assert_array_equal(found, expected)
-    assert np.nanmax(trace.nis) < 40.0
+    assert np.nanmax(trace.estimates.nis) < 40.0
 
 
 def test_a_start_at_another_attitude_is_taken_on_the_turn_of_the_encoders(paper):

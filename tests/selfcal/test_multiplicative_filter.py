@@ -10,7 +10,7 @@ from unscented_twins import RIGS, multiplicative
 from inercal.geometry.rotations import boxminus, boxplus, normalize
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import multiplicative as mukf
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import attitude
@@ -134,22 +134,13 @@ def test_gimbal_lock_does_not_matter():
 def test_one_row_at_a_time_gives_the_same_digits(paper):
     settings, all_runs = paper
     given, recording = problem(settings), with_gaps(all_runs[1].recording)
-    whole, trace = mukf.advance(
-        mukf.initial(given, recording.th[0]),
-        given,
-        recording.dt[:60],
-        recording.rate[:60],
-        recording.acc[1:61],
-        recording.th[1:61],
-    )
+    steps = recording.steps.part(slice(60))
+    whole, trace = mukf.advance(mukf.initial(given, recording.th[0]), given, steps)
     state = mukf.initial(given, recording.th[0])
     for k in range(60):
-        rows, after = slice(k, k + 1), slice(k + 1, k + 2)
-        state, one = mukf.advance(
-            state, given, recording.dt[rows], recording.rate[rows], recording.acc[after], recording.th[after]
-        )
+        state, one = mukf.advance(state, given, steps.part(slice(k, k + 1)))
         for name in ("attitude", "attitude_u", "coefficients", "u", "innovations", "nis", "dims"):
-            np.testing.assert_array_equal(getattr(one, name)[0], getattr(trace, name)[k])
+            np.testing.assert_array_equal(getattr(one.estimates, name)[0], getattr(trace.estimates, name)[k])
     for found, expected in zip(state, whole, strict=True):
         np.testing.assert_array_equal(found, expected)
 

@@ -14,7 +14,7 @@ from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.diagnosis.gross import implausible
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES, to_product, units
 from inercal.selfcal.platform.rig import Base

@@ -12,7 +12,7 @@ from inercal.errors import StudyError
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, design, lasting, stated_moves, with_stops
 from inercal.selfcal.before.path_search import LOCK, STARTS, criterion, search
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import Search
 
@@ -33,6 +33,7 @@ def designed():
 # the search
 
 
+@pytest.mark.slow
 def test_it_is_at_least_as_good_as_the_known_paths(designed):
     made, _ = designed
     found, *others = made.compare
@@ -118,6 +119,7 @@ def test_what_does_not_fit_is_said():
 # what is told
 
 
+@pytest.mark.slow
 def test_result_holds_what_a_study_and_a_program_need(designed):
     made, told = designed
     result = json.loads(json.dumps(made.result))

@@ -11,7 +11,7 @@ from inercal.estimate.factor import CHOLESKY, FACTORS, NEGATIVE, root
 from inercal.geometry.rotations import exp, multiply
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import error_state, quaternion
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import attitude, joint_axes
 from inercal.selfcal.platform.plan import Plan, Turn
@@ -32,14 +32,7 @@ def run(recording, told, steps=None, state=None, first=0, module=quaternion):
     """Some steps of the filter: state and trace."""
     last = len(recording.t) - 1 if steps is None else first + steps
     state = module.initial(told, recording.th[0]) if state is None else state
-    return module.advance(
-        state,
-        told,
-        recording.dt[first:last],
-        recording.rate[first:last],
-        recording.acc[first + 1 : last + 1],
-        recording.th[first + 1 : last + 1],
-    )
+    return module.advance(state, told, recording.steps.part(slice(first, last)))
 
 
 # The twin: all points of the augmented state, by the equations of the paper as they stand.
@@ -152,22 +145,22 @@ def test_all_points_in_numpy(factor, extended):
         u = np.sqrt(np.diag(P))
         xi = columns(x[:4], np.eye(3))
         about = 2.0 * np.sqrt(np.diag(xi.T @ P[:4, :4] @ xi))
-        moved = 2.0 * xi.T @ (trace.attitude[k] - x[:4])
+        moved = 2.0 * xi.T @ (trace.estimates.attitude[k] - x[:4])
         gone = np.concatenate(
             [
-                np.abs(trace.coefficients[k] - x[4:]) / u[4:],
+                np.abs(trace.estimates.coefficients[k] - x[4:]) / u[4:],
                 np.abs(moved) / about,
-                np.abs(trace.u[k] / u[4:] - 1.0),
-                np.abs(trace.attitude_u[k] / about - 1.0),
+                np.abs(trace.estimates.u[k] / u[4:] - 1.0),
+                np.abs(trace.estimates.attitude_u[k] / about - 1.0),
             ]
         )
-        worst = max(worst, gone.max(), 0.0 if math.isnan(nis) else abs(trace.nis[k] - nis))
-        assert math.isnan(trace.nis[k]) == math.isnan(nis)
+        worst = max(worst, gone.max(), 0.0 if math.isnan(nis) else abs(trace.estimates.nis[k] - nis))
+        assert math.isnan(trace.estimates.nis[k]) == math.isnan(nis)
     scale = u.copy()
     scale[:4] = 0.5 * about.max()
     assert np.max(np.abs(state.covariance - P) / np.outer(scale, scale)) < 1e-7
     assert worst < 1e-7
-    assert trace.dims[[38, 39, 40, 59, 79]].tolist() == [6, 5, 3, 3, 0]
+    assert trace.estimates.dims[[38, 39, 40, 59, 79]].tolist() == [6, 5, 3, 3, 0]
     assert trace.fallbacks == 0
     assert math.isnan(trace.lowest_eigenvalue) == (factor == "cholesky")
 
@@ -180,8 +173,8 @@ def test_step_by_step_gives_the_same_digits(factor):
     state, eigenvalues = None, []
     for k in range(60):
         state, row = run(simulation.recording, told, 1, state, k)
-        assert row.nis[0] == trace.nis[k]
-        assert np.array_equal(row.innovations[0], trace.innovations[k])
+        assert row.estimates.nis[0] == trace.estimates.nis[k]
+        assert np.array_equal(row.estimates.innovations[0], trace.estimates.innovations[k])
         eigenvalues.append(row.lowest_eigenvalue)
     assert all(np.array_equal(a, b) for a, b in zip(state, whole, strict=True))
     np.testing.assert_equal(np.min(eigenvalues), trace.lowest_eigenvalue)
@@ -200,9 +193,12 @@ def test_agreement_with_the_error_state_filter():
         u = np.sqrt(np.diag(other.covariance)[3:])
         gaps.append(np.max(np.abs(state.coefficients - other.coefficients) / u))
         np.testing.assert_allclose(np.sqrt(np.diag(state.covariance)[4:]), u, rtol=5e-3)
-        nis.append(trace.nis)
-        assert np.all(trace.dims == 6)
-        assert np.all(np.abs(trace.innovations.std(axis=0) - 1.0) < 5.0 / math.sqrt(2.0 * len(trace.nis)))
+        nis.append(trace.estimates.nis)
+        assert np.all(trace.estimates.dims == 6)
+        assert np.all(
+            np.abs(trace.estimates.innovations.std(axis=0) - 1.0)
+            < 5.0 / math.sqrt(2.0 * len(trace.estimates.nis))
+        )
     assert np.median(gaps) < 0.02
     nis = np.concatenate(nis)
     assert abs(nis.mean() - 6.0) < 5.0 * math.sqrt(12.0 / len(nis))
@@ -236,7 +232,8 @@ def test_an_encoder_triple_with_one_missing_is_left_out():
     one, three = simulation.recording, replace(simulation.recording, th=simulation.recording.th.copy())
     one.th[5:9, 1] = np.nan
     three.th[5:9] = np.nan
-    for a, b in zip(run(one, told, 20), run(three, told, 20), strict=True):
+    (state, trace), (other, expected) = run(one, told, 20), run(three, told, 20)
+    for a, b in ((state, other), (trace.estimates, expected.estimates), (trace[1:], expected[1:])):
         for x, y in zip(a, b, strict=True):
             np.testing.assert_array_equal(x, y)
 
@@ -276,8 +273,8 @@ def test_a_start_of_its_own():
     np.testing.assert_allclose(variances[1:], math.radians(5.0) ** 2, rtol=1e-6)
     assert variances[0] == pytest.approx(1e-8 * math.radians(5.0) ** 2, rel=1e-4)
     state, trace = run(simulation.recording, told, state=state)
-    miss = 2.0 * (columns(trace.attitude[-1], np.eye(3)).T @ simulation.attitude[-1])
-    assert np.all(np.abs(miss) < 4.0 * trace.attitude_u[-1])
+    miss = 2.0 * (columns(trace.estimates.attitude[-1], np.eye(3)).T @ simulation.attitude[-1])
+    assert np.all(np.abs(miss) < 4.0 * trace.estimates.attitude_u[-1])
 
 
 @pytest.mark.parametrize("degrees", [1.0, 10.0])
@@ -317,10 +314,10 @@ def test_gating_by_any_never_runs_on_this_path():
     b, _ = run(without, told, 200)
     assert np.array_equal(a.coefficients, b.coefficients)
     assert np.array_equal(a.covariance, b.covariance)
-    assert np.all(trace.dims == 3)
+    assert np.all(trace.estimates.dims == 3)
     whole = replace(told, filter=replace(told.filter, gating=Gating("any", "step")))
     _, trace = run(simulation.recording, whole, 200)
-    assert np.all(trace.dims == 0)
+    assert np.all(trace.estimates.dims == 0)
 
 
 def test_no_steps():
@@ -328,4 +325,4 @@ def test_no_steps():
     simulation, told = simulated(plan=MIXED)
     state, trace = run(simulation.recording, told, 0)
     assert np.array_equal(state.coefficients, np.zeros(18))
-    assert len(trace.nis) == 0
+    assert len(trace.estimates.nis) == 0

@@ -12,20 +12,24 @@ from hypothesis import strategies as st
 from paper_study import ARCSEC, MICRO_G, PER_HOUR, PRIOR, TRUTH, study
 
 import inercal.selfcal.figures as drawn_by
+from inercal.estimate.basis import Basis
 from inercal.estimate.budget import TypeA, combine
-from inercal.estimate.result import Estimate, without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.geometry.rotations import exp, multiply, normalize
-from inercal.report import filtering
+from inercal.report import innovations as filtering
 from inercal.report.cells import Cell
-from inercal.report.figures import dots
-from inercal.report.histories import turning
-from inercal.report.selfcal import attitude_errors
+from inercal.report.coefficients import dots
+from inercal.report.courses import turning
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import Designed, Judged
 from inercal.selfcal.display import displayed, of_field
-from inercal.selfcal.filters.filter_result import Filtered, History, Problem
+from inercal.selfcal.figures.design import page as design_page
+from inercal.selfcal.figures.filters import attitude_errors
+from inercal.selfcal.figures.monte_carlo import page as campaign_page
+from inercal.selfcal.filters.filter_result import FilterResult, History
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.monte_carlo import Campaign
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear, to_product, units
@@ -53,7 +57,7 @@ def filtered(kind="error-state", p=18, seed=1, **changes):
     history = History(multiply(q, exp(error)), np.full((n, 3), 0.5 * ARCSEC), course, u)
     innovations = rng.standard_normal((n - 1, 6))
     return replace(
-        Filtered(
+        FilterResult(
             kind=kind,
             coefficients=course[-1],
             covariance=np.diag(u[-1] ** 2),
@@ -82,7 +86,7 @@ def evidence(found=None, status=Status.OK, **changes):
         TypeA("noise", 1.0, "1", 0.7 * covariance, 900.0),
         TypeA("prior", 1.0, "1", 0.3 * covariance, 9e9),
     ]
-    total, dof, budget = combine(names(p), sources)
+    total, dof, budget, _ = combine(names(p), sources)
     estimate = Estimate(
         "selfcal",
         names(p),
@@ -90,15 +94,14 @@ def evidence(found=None, status=Status.OK, **changes):
         to_product(found.coefficients),
         total,
         dof,
-        np.full(p, 2.0),
         status,
         "as it is",
         budget=budget,
         provenance={"settings": {}},
     )
     bounds = Bounds(names(p), 0.9 * covariance, PRIOR[:p], np.zeros((0, p)))
-    of = Problem(study().world, study().noise, PRIOR[:p])
-    return replace(Calibration(estimate, of, recording, found, bounds), **changes)
+    of = FilterProblem(study().world, study().noise, PRIOR[:p])
+    return replace(Calibration(estimate, of, recording, found, bounds, study(plan=SHORT)), **changes)
 
 
 def words_of(svg):
@@ -129,16 +132,17 @@ def titles(pictures):
 
 
 def test_a_calibration_without_a_known_truth():
-    drawn = drawn_by.pictures(evidence(), study(plan=SHORT))
+    drawn = drawn_by.pictures(evidence())
     assert titles(drawn) == [
-        "The path",
+        "Uncertainties beside their bounds",
         "Convergence of the coefficients",
         "How the uncertainties fall",
+        "The path",
+        "Axes and signs of the gimbals",
         "Attitude against the encoders",
         "Change still to come of the accelerometers' coefficients, in percent",
         "Normalised innovations squared",
         "Innovations and whether they are white",
-        "Uncertainties beside their bounds",
         "Correlation of the coefficients",
         "Where the uncertainty comes from",
     ]
@@ -153,10 +157,11 @@ def test_a_calibration_without_a_known_truth():
     assert "truth" not in drawn[1].caption
 
 
+@pytest.mark.slow
 def test_a_simulation_is_set_against_its_truth():
     q, _ = gimbals(SHORT.angles(), study().world)
     found = evidence(compared={"gimbal-ukf": filtered("gimbal-ukf", seed=3)}, truth=TRUTH)
-    drawn = {picture.title: picture for picture in drawn_by.pictures(found, study(plan=SHORT), q)}
+    drawn = {picture.title: picture for picture in drawn_by.pictures(found, q)}
     assert "Red dots: the truth" in drawn["Convergence of the coefficients"].caption
     assert {"error-state", "gimbal-ukf"} <= set(texts(drawn["Error of the attitude"]))
     assert [f"q{k} [10⁻⁶]" in texts(drawn["Error of the attitude"]) for k in range(4)] == [True] * 4
@@ -181,12 +186,12 @@ def test_the_attitude_against_the_encoders_turns_from_these_to_the_estimate(monk
     monkeypatch.setattr(
         drawn_by, "attitude_correction", lambda t, rotation, u: told.update(rotation=rotation)
     )
-    none = without_parameters("selfcal", Status.NOT_CONVERGED, "")  # spares the other pictures
+    none = Estimate.without(Basis("selfcal"), Status.NOT_CONVERGED, "")  # spares the other pictures
     found = evidence(filtered("map", innovations=np.zeros((0, 6))), estimate=none)
     read, _ = gimbals(found.recording.th, study().world)
     turned = multiply(read, exp(np.array([5.0 * ARCSEC, 0.0, 0.0])))
     estimated = replace(found.filtered, history=replace(found.filtered.history, attitude=turned))
-    drawn_by.pictures(replace(found, filtered=estimated), study(plan=SHORT))
+    drawn_by.pictures(replace(found, filtered=estimated))
     assert told["rotation"] / ARCSEC == pytest.approx(np.tile([5.0, 0.0, 0.0], (len(read), 1)), abs=1e-6)
 
 
@@ -222,7 +227,7 @@ def diverged():
 
 def without_coefficients():
     """A calibration that says why it has none."""
-    none = without_parameters("selfcal", Status.NOT_CONVERGED, "diverged", provenance={"settings": {}})
+    none = Estimate.without(Basis("selfcal", provenance={"settings": {}}), Status.NOT_CONVERGED, "diverged")
     return evidence(diverged(), bounds=evidence().bounds, estimate=none)
 
 
@@ -242,7 +247,7 @@ def without_coefficients():
 )
 def test_every_case_has_a_page(found):
     found, settings = found(), study(plan=SHORT, goal={"kg0_x": 0.001 * PER_HOUR})
-    page = check(drawn_by.calibration_page(found, settings))
+    page = check(drawn_by.page(replace(found, settings=settings)))
     assert found.estimate.status.meaning in page
     assert "What the path cannot see" in page
     assert ("Filters side by side" in page) == bool(found.compared)
@@ -401,7 +406,7 @@ def judged(name, plan, size, settings):
 
 def told(found):
     """What a command brings back, without its numbers."""
-    return without_parameters("design selfcal", Status.OK, found.message)
+    return Estimate.without(Basis("design selfcal"), Status.OK, found.message)
 
 
 def test_the_page_of_a_design():
@@ -416,7 +421,7 @@ def test_the_page_of_a_design():
         "up to 5 turns",
         (),
     )
-    page = check(drawn_by.design_page(found, settings, told(found)))
+    page = check(design_page(found, settings, told(found)))
     assert page.index("Comparison of paths") < page.index("Turns") < page.index("What the path cannot see")
     for words in ("found", "ds_z", "(rest 5 s)", "up to 5 turns", "0.0005 °/√h", "10 µg", "The path found"):
         assert words in page
@@ -430,10 +435,10 @@ def test_a_design_is_set_against_its_goals():
     ratio = 0.002 * PRIOR[0] / (0.01 * PER_HOUR)
     assert table.columns[-1] == ("of goal", "")
     assert [row[-1] for row in table.rows] == [f"{ratio:.3g}", *["–"] * 17]
-    assert "Bar: the goal." in drawn_by.design_page(found, settings, told(found))
+    assert "Bar: the goal." in design_page(found, settings, told(found))
     without = Designed((judged("found", SHORT, np.full(18, 0.002), study()),), "", ())
     assert bounds_by_path(without).columns[-1] == ("prior", "")
-    assert "Bar: the goal." not in drawn_by.design_page(without, study(), told(without))
+    assert "Bar: the goal." not in design_page(without, study(), told(without))
     with_goal, plain = (
         dots("", "", ("a", "b"), ("1", "1"), {"found": np.array([2.0, 3.0])}, goal)
         for goal in (np.array([1.0, np.nan]), None)
@@ -442,12 +447,13 @@ def test_a_design_is_set_against_its_goals():
     assert "goal" not in texts(plain)
 
 
+@pytest.mark.slow
 def test_statistics_are_in_words():
     """Nothing of a self-calibration is a residual of |f|; what a row cost is there with its share of the interval."""
     statistics = {"residual_rms": 1.001, "chi2": 16220.0, "nis_mean": 6.008, "steps": 2700.0}
     calibration = evidence()
     own = replace(calibration.estimate, statistics=statistics, result={"step_us": 4.0, "sample_share": 2e-5})
-    page = drawn_by.calibration_page(replace(calibration, estimate=own), study(plan=SHORT))
+    page = drawn_by.page(replace(calibration, estimate=own))
     for words in (
         "<dt>root-mean-square normalised innovation, expected 1</dt><dd>1.001</dd>",
         "<dt>normalised innovation squared of a row (NIS), mean</dt><dd>6.008</dd>",
@@ -486,7 +492,7 @@ def test_the_page_of_a_campaign():
         )
 
     sound, poor, cautious = (
-        drawn_by.campaign_page(found, study(), told(found)) for found in map(campaign, (1.0, 2.0, 0.3))
+        campaign_page(found, study(), told(found)) for found in map(campaign, (1.0, 2.0, 0.3))
     )
     assert "the stated uncertainties hold: 200 runs" in sound
     assert "the stated uncertainties are too small" in poor

@@ -10,7 +10,7 @@ from paper_study import ARCSEC, DEG, MICRO_G, PRIOR, TRUTH, study
 from inercal.geometry.rotations import attitude_difference, boxminus, boxplus, normalize
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters.batch import estimate_map
-from inercal.selfcal.filters.filter_result import Start, problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.residuals import readings
 from inercal.selfcal.filters.start import _along, estimate_lm, wahba
 from inercal.selfcal.platform.coefficients import to_linear
@@ -92,6 +92,7 @@ def test_wahba_finds_the_attitude_from_any_start():
     assert attitude_difference(found, made.attitude[0]) < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "best", "paper two turns"])
 def test_from_a_hundred_degrees_with_accelerometers_alone(name):
     """About each axis and four directions drawn: one and the same answer, within 4.5 sigma of the truth."""
@@ -128,6 +129,7 @@ def test_the_batch_takes_it_where_encoders_are_silent():
     assert np.all(np.abs(found.coefficients - truth) < 4.5 * sigmas(found))
 
 
+@pytest.mark.slow
 def test_with_encoders_never_better_than_the_bound():
     made, given, truth = simulated(7)
     found, best = estimate_lm(made.recording, given), estimate_map(made.recording, given)
@@ -154,6 +156,7 @@ def test_extended_model_with_gaps():
     assert np.all(np.isfinite(found.innovations[299:309, [0, 2]]))
 
 
+@pytest.mark.slow
 def test_uncertainty_holds_where_gyro_noise_is_most_of_it():
     """Sixty runs of truth from the prior, gyro noise ten times the nominal: NEES of coefficients and attitudes.
 

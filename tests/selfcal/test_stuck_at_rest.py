@@ -7,7 +7,7 @@ from paper_study import ARCSEC, study
 
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 
 

@@ -14,7 +14,7 @@ from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.diagnosis.fit_quality import filtered
 from inercal.selfcal.diagnosis.small import likely, small_errors
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.result.outcome import assemble, verdict
@@ -63,6 +63,7 @@ def test_earth_rate_turns_evenly_with_the_latitude_over_the_poles_too(degrees, b
     np.testing.assert_allclose(stated.changed(by).world.earth, expected, atol=1e-14 * EARTH_RATE)
 
 
+@pytest.mark.slow
 def test_worlds_drawn_from_what_is_stated_contradict_nothing():
     """All of it wrong at once. Of 6 worlds one finding would be rare at a risk of 1e-3 a test, and there is none."""
     rng = np.random.default_rng(31)
@@ -85,6 +86,7 @@ def test_worlds_drawn_from_what_is_stated_contradict_nothing():
     assert abs(np.mean(squares) - 18.0) < 4.0 * np.sqrt(2.0 * 18.0 / 6.0)
 
 
+@pytest.mark.slow
 def test_the_limit_of_the_verdict_is_raised_by_what_a_stated_tilt_explains():
     made = recorded(with_tilt(PLAIN, 10.0, -8.0))
     sure, doubted = with_tilt(PLAIN, 0.0, 0.0, 1.0), with_tilt(PLAIN, 0.0, 0.0, 5.0)
@@ -109,6 +111,7 @@ def test_without_anything_uncertain_the_limit_is_that_of_the_contract():
     assert result.statistics["nis_limit"] == pytest.approx(PLAIN_LIMIT)
 
 
+@pytest.mark.slow
 def test_other_faults_stay_contradictions_beside_what_is_uncertain():
     made = recorded(with_tilt(PLAIN, 10.0, -8.0))
     shifted = replace(made, rate=np.roll(made.rate, 1, axis=0))

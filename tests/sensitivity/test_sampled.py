@@ -100,6 +100,7 @@ def test_rows_of_sobol_points_are_rounded_up():
     }
 
 
+@pytest.mark.slow
 def test_the_procedure_of_zhao_et_al():
     """N = 1000 random rows fresh at each position: noise of a few hundredths, unbiased, 1e-5 on null factors.
 

@@ -195,6 +195,7 @@ def test_the_zero_is_put_in_where_the_file_has_it(tmp_path):
     assert u[-1] < 0.9 * without[-1]
 
 
+@pytest.mark.slow
 def test_killed_anywhere_and_resumed(tmp_path):
     """While rows are held, in the midst, while they are held again, at the end: every line is one of the whole run."""
     settings = study(motion=SHORT, sensors=CALIBRATED, attitude=ROLLED)

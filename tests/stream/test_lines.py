@@ -11,6 +11,7 @@ from inercal.errors import InputError, MapError, RecordError
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.stream.lines import Lines
+from rows import for_each
 
 HEADER = "t [s],acc_x [g],gyro_x [deg/s]\n"
 MAP = """
@@ -80,7 +81,7 @@ def same_as_a_file(folder, data, map_text=None):
 ROWS = "0.0,1.5,2.25\n0.1,-1e-3,3\n0.2,0.3,-0.1\n"
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("data", "map_text"),
     [
         (HEADER + ROWS, None),
@@ -256,7 +257,7 @@ def test_nothing_is_read_ahead():
     assert lines.next() is None
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("data", "says"),
     [
         ("", "ended without a row"),

@@ -14,7 +14,7 @@ from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.write import write_record
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import KA1, names
 from inercal.selfcal.platform.plan import Plan, Rest, Turn

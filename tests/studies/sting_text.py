@@ -129,7 +129,5 @@ def calibrated(path, **parameters):
     values = np.array([value for value, _ in parameters.values()])
     units = tuple(unit for _, unit in parameters.values())
     n = len(names)
-    made = Estimate(
-        "calibrate imu", names, units, values, np.eye(n), np.full(n, 9.0), np.full(n, 2.0), Status.OK, ""
-    )
+    made = Estimate("calibrate imu", names, units, values, np.eye(n), np.full(n, 9.0), Status.OK, "")
     save(made, path)

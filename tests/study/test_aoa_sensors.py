@@ -15,12 +15,13 @@ from inercal.aoa.settings import Calibration
 from inercal.errors import InputError, StudyError
 from inercal.studies.schema import json_schema
 from inercal.studies.sensors import MOST
+from rows import for_each
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("sensor", "text", "scale", "per"),
     [
         ("a1", "1", 1.0, "1"),
@@ -142,6 +143,7 @@ def test_examples_in_the_schema_are_accepted():
                 assert with_sensor(name=sensor, **{key: example}), (table, key, example)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     text=st.from_regex(

@@ -30,6 +30,7 @@ from inercal.studies.load import (
     load_turntable_study,
 )
 from inercal.studies.schema import json_schema
+from rows import for_each
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -70,7 +71,7 @@ def test_what_is_absent_is_usual():
         assert getattr(found, name) == getattr(usual, name)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@for_each("name", SCENARIOS)
 def test_the_reference_scenarios_can_be_written(name):
     found, expected = study(**WRITTEN[name]), scenario(name)
     same(found.motion, expected.motion)
@@ -221,7 +222,7 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("override", "words"), REFUSED.items())
+@for_each(("override", "words"), REFUSED.items())
 def test_one_sentence_for_what_is_wrong(write, override, words):
     with pytest.raises(StudyError, match=words) as error:
         load_aoa_study(write(CONTRACT), [override])
@@ -229,7 +230,7 @@ def test_one_sentence_for_what_is_wrong(write, override, words):
     assert str(error.value).startswith(str(error.value.where))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("tables", "words"),
     [
         ({"noise": None}, "noise: missing, expected a value"),

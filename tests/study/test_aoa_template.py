@@ -20,6 +20,7 @@ from inercal.studies.aoa import aoa_study
 from inercal.studies.schema import json_schema
 from inercal.studies.sensors import MOST
 from inercal.studies.template import aoa_template
+from rows import for_each
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -85,9 +86,7 @@ def lines_with_keys():
             yield table, line
 
 
-@pytest.mark.parametrize(
-    ("table", "line"), [each for each in lines_with_keys() if each[0] not in ("motion", "zero")]
-)
+@for_each(("table", "line"), [each for each in lines_with_keys() if each[0] not in ("motion", "zero")])
 def test_every_commented_key_loads_alone(table, line, tmp_path):
     calibrated(tmp_path / "a1.json", K0_x=(0.0, "g"), K1_x=(1.0, "g/(m/s^2)"))
     calibrated(tmp_path / "gyro.json", D_F_y=(0.0, "V"), S_y=(1.0, "V/(rad/s)"))

@@ -13,6 +13,7 @@ from inercal.imu.settings import ImuSettings
 from inercal.studies.imu import imu_study
 from inercal.studies.load import load_imu_study
 from inercal.studies.template import imu_template
+from rows import for_each
 
 RELAXED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 TEMPLATE = re.sub(r"(?m)^# (\w+ = )", r"\1", imu_template()).encode()
@@ -30,7 +31,7 @@ def load(tmp_path):
     return load
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "message"),
     [
         ("", "site: neither gravity nor latitude given, expected one of them"),

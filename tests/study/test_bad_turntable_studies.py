@@ -11,6 +11,7 @@ from inercal.studies.load import load_turntable_study
 from inercal.studies.template import turntable_template
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.settings import TurntableSettings
+from rows import for_each
 
 RELAXED = settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60
@@ -38,7 +39,7 @@ def load(tmp_path):
     return load
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "message"),
     [
         ("", "rig: missing, expected a value"),

@@ -8,6 +8,7 @@ from inercal._toml import check
 from inercal.errors import StudyError
 from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings
+from rows import for_each
 
 
 def settings(**table):
@@ -31,7 +32,7 @@ def test_sections_in_time_and_in_samples():
     assert isinstance(told.sections["z_rot"][0], int)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("table", "words"),
     [
         ({"turn": "360"}, "without a unit"),

@@ -11,6 +11,7 @@ from inercal.geometry.earth import gravity
 from inercal.studies.common import GRAVITY_ANOMALY, UNSTATED_HEIGHT
 from inercal.studies.imu import imu_study
 from inercal.studies.load import load_imu_study
+from rows import for_each
 
 FULL = """
 schema = 1
@@ -131,7 +132,7 @@ def test_overrides_make_tables_that_the_file_lacks(write):
     assert load_imu_study(write(""), ["site.gravity=9.8 m/s^2"]).site.gravity == 9.8
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("override", "message"),
     [
         ("imu.static_start", "--set 'imu.static_start': found no key and value, expected key=value"),

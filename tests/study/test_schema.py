@@ -13,6 +13,7 @@ from inercal.studies.imu import imu_study
 from inercal.studies.schema import json_schema
 from inercal.studies.ways import DISTRIBUTIONS
 from inercal.units import _TABLE, parse_unit
+from rows import for_each
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -122,7 +123,7 @@ def test_every_table_and_key_has_title_and_description():
             assert node["description"]
 
 
-@pytest.mark.parametrize(
+@for_each(
     "data",
     [
         {**GOOD, "sight": {}},

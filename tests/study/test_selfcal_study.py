@@ -23,6 +23,7 @@ from inercal.studies.load import load_imu_study, load_selfcal_study, load_turnta
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
 from inercal.studies.template import selfcal_template
+from rows import for_each
 
 # The study of the interface description, to the letter.
 CONTRACT = """
@@ -267,7 +268,7 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("override", "words"), REFUSED.items())
+@for_each(("override", "words"), REFUSED.items())
 def test_one_sentence_for_what_is_wrong(write, override, words):
     with pytest.raises(StudyError, match=words) as error:
         load_selfcal_study(write(CONTRACT), [override])
@@ -275,7 +276,7 @@ def test_one_sentence_for_what_is_wrong(write, override, words):
     assert str(error.value).startswith(str(error.value.where))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("tables", "words"),
     [
         ({"noise": None}, "noise: missing, expected a value"),
@@ -338,7 +339,7 @@ def test_every_key_is_in_the_template():
     assert isinstance(selfcal_study(whole, "t.toml"), SelfcalSettings)
 
 
-@pytest.mark.parametrize("line", [line for line in TEMPLATE.splitlines() if re.match(r"# \w+ = ", line)])
+@for_each("line", [line for line in TEMPLATE.splitlines() if re.match(r"# \w+ = ", line)])
 def test_every_commented_key_loads_alone(line):
     text = TEMPLATE.replace(line, line.removeprefix("# "))
     if line.startswith("# path"):

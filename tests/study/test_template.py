@@ -14,6 +14,7 @@ from inercal.studies.schema import json_schema
 from inercal.studies.template import imu_template, turntable_template
 from inercal.studies.turntable import turntable_study
 from inercal.units import parse_unit
+from rows import for_each
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
 SCHEMA = json_schema()
@@ -122,7 +123,7 @@ def lines_with_keys():
             yield table, line
 
 
-@pytest.mark.parametrize(("table", "line"), list(lines_with_keys()))
+@for_each(("table", "line"), list(lines_with_keys()))
 def test_every_key_of_a_turntable_loads_when_uncommented(table, line, tmp_path, monkeypatch):
     text = turntable_template().replace(line, line.removeprefix("# "))
     if table == "rate_test":
@@ -155,7 +156,7 @@ def test_every_key_of_a_turntable_is_there():
     assert list(whole["rig"]["errors"]) == ["default", *factors]
 
 
-@pytest.mark.parametrize("channels", INSTRUMENTS.values(), ids=INSTRUMENTS)
+@for_each("channels", INSTRUMENTS.values())
 def test_the_instrument_is_that_of_the_record_with_examples_in_its_unit(channels):
     """Every example loads, alone and with all others; kind and unit are those of the channels."""
     text = turntable_template(channels=channels)

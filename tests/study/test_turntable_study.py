@@ -18,6 +18,7 @@ from inercal.rigs.tables import slots
 from inercal.studies.load import files_of, load_imu_study, load_turntable_study
 from inercal.studies.turntable import turntable_study
 from inercal.units import STANDARD_GRAVITY
+from rows import for_each
 
 ARCMIN = math.radians(1.0 / 60.0)
 DEG_PER_H = math.radians(1.0) / 3600.0
@@ -121,7 +122,7 @@ def test_positions_in_a_file_beside_the_study(write, tmp_path):
     assert files_of(path, load_turntable_study(write(CONTRACT)).given) == (path,)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("content", "message"),
     [
         (
@@ -149,10 +150,8 @@ def test_a_bad_file_of_positions_is_said_with_its_key(write, tmp_path, content, 
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "start", ["grid = { phi1 = 5, phi2 = 5 }", 'plan = "6-position"', 'list = [["1 deg", "2 deg"]]']
-)
-@pytest.mark.parametrize(
+@for_each("start", ["grid = { phi1 = 5, phi2 = 5 }", 'plan = "6-position"', 'list = [["1 deg", "2 deg"]]'])
+@for_each(
     ("override", "positions"),
     [
         ('positions.plan="24-position"', 24),
@@ -165,7 +164,7 @@ def test_a_way_to_give_positions_that_is_set_takes_the_place_of_the_other(
     write, tmp_path, monkeypatch, start, override, positions
 ):
     # a file that is set is one of the working folder
-    (tmp_path / "here").mkdir()
+    (tmp_path / "here").mkdir(exist_ok=True)
     monkeypatch.chdir(tmp_path / "here")
     (tmp_path / "here" / "p.csv").write_text("phi1 [deg],phi2 [deg]\n1,2\n3,4\n")
     path = write(re.sub("(?m)^grid = .*", start, CONTRACT))

@@ -20,7 +20,7 @@ from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.outputs import rate_reference
 from inercal.rigs.plans import named
 from inercal.rigs.tables import turntable
-from inercal.turntable.figures import rate_pictures
+from inercal.turntable.figures import pictures
 from inercal.turntable.rate.fit import approaches, levels
 from inercal.turntable.rate.stays import RateDwells, arc, gyro_input, sensed
 from inercal.turntable.settings import Design, Instrument, RateTest, TurntableSettings
@@ -217,10 +217,10 @@ def test_hysteresis_does_not_pass_for_curvature():
 
 def test_the_residuals_of_a_rate_test_are_drawn():
     found = run(study(instrument={"coefficients": {"S_z": 1.0}, "noise": 1e-6}))
-    drawn = rate_pictures(found)
+    drawn = pictures(found)
     assert drawn[0].title == "Residual of each rate"
     assert all(picture.svg.startswith("<svg") for picture in drawn)
-    assert rate_pictures(run(study((10,)))) == []
+    assert pictures(run(study((10,)))) == []
 
 
 def test_the_way_a_rate_was_reached_follows_from_the_order():
@@ -318,6 +318,7 @@ def test_samples_of_one_stay_carry_their_own_angles():
 # uncertainty
 
 
+@pytest.mark.slow
 def test_intervals_cover_as_they_say():
     """150 tests with noise, table errors by scope and an uncertain table rate; noise stated or not by turns."""
     runs, level, noise = 150, 0.95, 2.0 * DEG_H
@@ -339,6 +340,7 @@ def test_intervals_cover_as_they_say():
     assert all(low <= count <= high for count in hits.values()), (hits, low, high)
 
 
+@pytest.mark.slow
 def test_a_bias_is_covered_where_the_table_scatters_more_than_the_noise():
     """Noise that is not stated hides behind table errors of 30 arcmin: its few degrees of freedom must count."""
     runs, level, bias = 150, 0.95, 5.0 * DEG_H

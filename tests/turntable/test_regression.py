@@ -200,6 +200,7 @@ def monte_carlo(gain, plan, chain, axis="x", runs=RUNS, chunk=4000):
     return np.cov(np.concatenate(shifts).T), square / runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("plan", "left_out"), [(TUMBLE, K_X), (FULL_RANK, ())], ids=["tumble", "grid"])
 def test_the_covariance_of_the_table_is_that_of_a_monte_carlo(plan, left_out):
     """Jacobian covariance G S G^T against 1e5 draws of all errors, by scope, of the full chain: within 1 %.

@@ -25,7 +25,6 @@ def estimate(names, output, values):
         values=values,
         covariance=np.diag(u**2),
         dof=np.full(len(names), np.inf),
-        k=np.full(len(names), 2.0),
         status=Status.OK,
         message="",
         budget=tuple(

@@ -18,6 +18,7 @@ from inercal.validate import aoa, foundation, imu, noise, selfcal, turntable
 from inercal.validate.case import Case, Numbers, find, judge
 from inercal.validate.run import SYSTEMS, cases_of, validate
 from inercal.validate.sources import SOURCES
+from rows import for_each
 
 CASES = [case for system in SYSTEMS for case in cases_of(system)]
 
@@ -47,6 +48,7 @@ def whole():
     return estimate, found, told
 
 
+@pytest.mark.slow
 def test_all_pass(whole):
     estimate, _, told = whole
     assert [row["name"] for row in estimate.result["cases"] if not row["passed"]] == []
@@ -69,7 +71,8 @@ def test_each_says_what_it_shows_and_from_where():
     assert {case.source for case in CASES} == SOURCES.keys()
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.slow
+@for_each("case", CASES)
 def test_any_number_that_is_wrong_fails(whole, case):
     """Each expected number in turn is moved by more than twice its limit, up and down: none is without effect."""
     found = whole[1][case.name]

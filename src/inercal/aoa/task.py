@@ -13,8 +13,8 @@ from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live, smoother
-from inercal.aoa.fusion.filter_result import Filtered
-from inercal.aoa.fusion.problem import Problem, problem
+from inercal.aoa.fusion.filter_result import FilterResult
+from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.paper.delay import Delay, relative_delay
 from inercal.aoa.paper.methods import MEASURED, label, low_passed
 from inercal.aoa.reading.clock import later
@@ -46,10 +46,10 @@ class Measurement:
 
     estimate: Estimate
     settings: AoaSettings
-    problem: Problem
+    problem: FilterProblem
     recording: Recording
     angles: Angles
-    filtered: Filtered | None
+    filtered: FilterResult | None
     points: tuple[Point, ...]
     delay: Delay | None
     errors: Mapping[str, Errors] = field(default_factory=dict)
@@ -142,7 +142,7 @@ def measure(
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)
     delay = relative_delay(recording, settings.layout)
-    found: Filtered | None = None
+    found: FilterResult | None = None
     if methods is None:
         progress("smoothing" if settings.estimator.smooth else "filtering")
         found = filter_result.estimate(zeroed, of, settings.estimator.smooth)

@@ -157,9 +157,9 @@ def _handed_over(found: Measurement, how: MethodOptions, output: ReportOutput) -
     from inercal.aoa.result.tables import answer, on_terminal
 
     def page() -> str:
-        from inercal.aoa.figures import angle_page
+        from inercal.aoa import figures
 
-        return angle_page(found, found.settings)
+        return figures.page(found)
 
     def rows(path: Path) -> None:
         from inercal.aoa.result.columns import angles_record, points_record

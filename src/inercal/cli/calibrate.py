@@ -24,11 +24,7 @@ from inercal.cli.outcome import WHOLE, hand_over, printed
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.imu.aided.calibration import AidedCalibration
-    from inercal.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.imu.multiposition.calibration import MultipositionCalibration
     from inercal.records.record import Record
-    from inercal.report.html import Picture
 
 
 class Calibrated(Protocol):
@@ -79,33 +75,15 @@ def calibrate_imu(
     estimate = replace(estimate, timing={**runs[-1].timing, "solve": estimate.timing["solve"]})
 
     def page() -> str:
-        from inercal.report.figures import repeats
+        from inercal.imu import figures
+        from inercal.report.coefficients import repeats
         from inercal.report.html import render
 
-        drawn = _imu_pictures(solved[0][0]) if len(runs) == 1 else repeats(estimate)
-        return render(estimate, drawn, "Calibration of an inertial measurement unit")
+        if len(runs) == 1:
+            return figures.page(replace(solved[0][0], estimate=estimate))
+        return render(estimate, repeats(estimate), "Calibration of an inertial measurement unit")
 
     return hand_over(estimate, [printed(estimate)], page, output)
-
-
-def _imu_pictures(found: MultipositionCalibration | FerrarisCalibration | AidedCalibration) -> list[Picture]:
-    """The pictures of whichever method was used."""
-    from inercal.imu.aided.calibration import AidedCalibration
-    from inercal.imu.ferraris.calibration import FerrarisCalibration
-
-    match found:
-        case FerrarisCalibration():
-            from inercal.imu.ferraris.figures import pictures as of_ferraris
-
-            return of_ferraris(found)
-        case AidedCalibration():
-            from inercal.imu.aided.figures import pictures as of_aided
-
-            return of_aided(found)
-        case _:
-            from inercal.imu.multiposition.figures import pictures
-
-            return pictures(found)
 
 
 def calibrate_turntable(
@@ -120,7 +98,6 @@ def calibrate_turntable(
     """Calibrate an instrument that was taken through positions on a turntable."""
     from inercal.studies.load import load_turntable_study
     from inercal.turntable.display import tolerances
-    from inercal.turntable.positions.calibration import PositionCalibration
     from inercal.turntable.task import calibrate
 
     ((found, estimate),) = _solve(
@@ -135,11 +112,9 @@ def calibrate_turntable(
     shown = replace(found, estimate=estimate).shown
 
     def page() -> str:
-        from inercal.report.html import render
-        from inercal.turntable.figures import pictures, rate_pictures
+        from inercal.turntable import figures
 
-        drawn = pictures(found) if isinstance(found, PositionCalibration) else rate_pictures(found)
-        return render(shown, drawn, "Calibration on a turntable")
+        return figures.page(replace(found, estimate=estimate))
 
     return hand_over(estimate, [printed(shown), tolerances(estimate)], page, output)
 

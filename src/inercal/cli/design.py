@@ -64,7 +64,7 @@ def design_positions(
     estimate = _told("design positions", designed, timing, inputs, settings, REFERENCES)
 
     def page() -> str:
-        from inercal.turntable.figures import design_page
+        from inercal.turntable.figures.design import page as design_page
 
         return design_page(designed, settings, estimate)
 
@@ -86,7 +86,7 @@ def design_selfcal(
     from inercal._jit import compiling
     from inercal.selfcal.before.bounds import bounds
     from inercal.selfcal.before.path_design import REFERENCES, design
-    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.platform.plan import Plan, Rest, motion
     from inercal.studies.load import load_selfcal_study
 
@@ -104,7 +104,7 @@ def design_selfcal(
     estimate = _told("design selfcal", designed, timing, (study,), settings, REFERENCES)
 
     def page() -> str:
-        from inercal.selfcal.figures import design_page
+        from inercal.selfcal.figures.design import page as design_page
 
         return design_page(designed, settings, estimate)
 

@@ -34,20 +34,18 @@ def told(
 
     ``settings`` are the keys of a study as they were given, for `Estimate.provenance`.
     """
-    from inercal.estimate.result import provenance, without_parameters
+    from inercal.estimate.basis import Basis, provenance
+    from inercal.estimate.result import Estimate
     from inercal.findings import Status
 
-    return without_parameters(
+    basis = Basis(
         command,
-        Status.OK,
-        message,
-        result=result,
         inputs=tuple(inputs),
-        findings=tuple(findings),
-        timing=timing or {},
         provenance={} if settings is None else {**provenance(settings), "seed": seed},
         references=references,
     )
+    estimate = Estimate.without(basis, Status.OK, message, findings=findings, result=result)
+    return replace(estimate, timing=timing or {})
 
 
 def emit(estimate: Estimate, text: str, output: FileOutput) -> None:

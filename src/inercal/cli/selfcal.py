@@ -90,9 +90,9 @@ def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) ->
     from inercal.selfcal.task import compared
 
     def page() -> str:
-        from inercal.selfcal.figures import calibration_page
+        from inercal.selfcal import figures
 
-        return calibration_page(found, settings)
+        return figures.page(found)
 
     def histories(path: Path) -> None:
         from inercal.records.write import write_record
@@ -115,7 +115,7 @@ def _repeated(runs: Sequence[Calibration], output: ReportOutput) -> int:
     estimate = replace(estimate, timing={**of_runs[-1].timing, "solve": solve})
 
     def page() -> str:
-        from inercal.report.figures import repeats
+        from inercal.report.coefficients import repeats
         from inercal.report.html import render
 
         return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")
@@ -134,7 +134,7 @@ def _live(
 ) -> None:
     """Calibrate row by row."""
     from inercal._jit import compiling
-    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.find_base import stated_well
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
     from inercal.studies.load import load_selfcal_study

@@ -43,7 +43,7 @@ def sensitivity(
     )
 
     def page() -> str:
-        from inercal.turntable.figures import sensitivity_page
+        from inercal.turntable.figures.sensitivity import page as sensitivity_page
 
         return sensitivity_page(analysed, settings, estimate)
 

@@ -111,7 +111,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
     from inercal._jit import compiling
     from inercal.findings import Status
     from inercal.records.read import source_of
-    from inercal.selfcal.filters.filter_result import problem
+    from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.filters.run import load_kernels
     from inercal.selfcal.monte_carlo import REFERENCES, campaign
     from inercal.studies.load import load_selfcal_study
@@ -141,7 +141,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
     estimate = estimate if found.passed else replace(estimate, status=Status.INCONSISTENT)
 
     def page() -> str:
-        from inercal.selfcal.figures import campaign_page
+        from inercal.selfcal.figures.monte_carlo import page as campaign_page
 
         return campaign_page(found, settings, estimate)
 

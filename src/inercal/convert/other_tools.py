@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal._files import read_bytes
 from inercal.arrays import Array
@@ -15,7 +16,9 @@ from inercal.convert import imu_tk, imucal, kalibr, psins
 from inercal.convert.convention import Convention, Units, flat, in_si_outputs, output_unit
 from inercal.convert.correct import ImuModel, imu_model
 from inercal.errors import InputError
-from inercal.estimate.result import Estimate, coverage_factor, provenance
+from inercal.estimate.basis import Basis, provenance
+from inercal.estimate.budget import Uncertainty
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import GYRO_G_SENSITIVITY, TERMS
 from inercal.instruments.triad import TriadModel
@@ -84,6 +87,10 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
             largest = float(np.max(np.abs(model.g_sensitivity))) * STANDARD_GRAVITY
             text += f" (G is up to {largest:.2g} {model.units['gyro']} at 1 g)"
         findings.append(Finding("not_held", text))
+    said = [
+        replace(each, harm=_touched(each.harm, estimate.names, matters, [names[i] for i in rows]))
+        for each in estimate.findings
+    ]
     converted = replace(
         estimate,
         command="convert",
@@ -93,14 +100,22 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
         covariance=J @ estimate.covariance @ J.T,
         common=None if estimate.common is None else J @ estimate.common @ J.T,
         dof=dof,
-        k=np.array([coverage_factor(nu) for nu in dof]),
-        findings=(*estimate.findings, *findings),
+        findings=(*said, *findings),
         budget=(),
         model=convention.equation,
         timing={},
         result={"convention": name, "unit": dict(model.units)},
     )
     return Converted(converted, convention.render(terms, dict(model.units)))
+
+
+def _touched(
+    harm: Sequence[str], before: Sequence[str], matters: NDArray[np.bool_], after: Sequence[str]
+) -> tuple[str, ...]:
+    """Those of the terms ``after`` (m,) into which coefficients ``before`` (p,) go that a finding harms; ``matters``
+    (m, p) says which go into which."""
+    hit = np.any(matters[:, [name in harm for name in before]], axis=1, keepdims=True)[:, 0]
+    return tuple(name for name, each in zip(after, hit.tolist(), strict=True) if each)
 
 
 def _jacobian(estimate: Estimate, function: Callable[[Array], Array]) -> Array:
@@ -147,25 +162,24 @@ def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None 
         raise InputError(paths[0], error.message) from error
     outputs = _outputs(in_files, units or {}, model.gyro is not None, paths)
     values = coefficients(model)
-    findings = [Finding("not_stated", f"a file of {name} states no uncertainty: it is unknown")]
+    findings = [Finding("not_stated", f"a file of {name} states no uncertainty: it is unknown", harm=())]
     if not terms.keys() & {"b_a", "db"}:
-        findings.append(Finding("not_stated", "the file states no biases: they are taken as zero"))
+        findings.append(Finding("not_stated", "the file states no biases: they are taken as zero", harm=()))
     unknown = np.full((len(values), len(values)), math.nan)
-    estimate = Estimate(
-        command="convert",
-        names=tuple(values),
-        units=tuple(TERMS[term].unit_for(outputs["acc" if term[0] in "KM" else "gyro"]) for term in values),
-        values=np.array(list(values.values())),
-        covariance=unknown,
-        dof=np.full(len(values), math.inf),
-        k=np.full(len(values), 2.0),
-        status=Status.OK,
-        message=f"{len(values)} coefficients from {name}, their uncertainties unknown",
-        findings=tuple(findings),
-        model=MODEL,
-        conditions={"frame": f"b, as the file of {name} has it"},
-        inputs=tuple(map(source_of, paths)),
-        provenance=provenance({"convention": name}),
+    estimate = Estimate.of(
+        Basis(
+            "convert",
+            MODEL,
+            {"frame": f"b, as the file of {name} has it"},
+            inputs=tuple(map(source_of, paths)),
+            provenance=provenance({"convention": name}),
+        ),
+        tuple(values),
+        [TERMS[term].unit_for(outputs["acc" if term[0] in "KM" else "gyro"]) for term in values],
+        np.array(list(values.values())),
+        Uncertainty(unknown, np.full(len(values), math.inf)),
+        (Status.OK, f"{len(values)} coefficients from {name}, their uncertainties unknown"),
+        findings=findings,
         result={"method": name, "unit": outputs},
     )
     imu_model(estimate, paths[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,24 +63,38 @@ class BudgetItem:
     redrawn: bool = False
 
 
-def combine(
-    names: Sequence[str], sources: Sequence[TypeA | TypeB]
-) -> tuple[Array, Array, tuple[BudgetItem, ...]]:
+class Uncertainty(NamedTuple):
+    """How well p parameters are known.
+
+    ``covariance`` (p, p), degrees of freedom ``dof`` (p,), one item of the ``budget`` for each source, and of the
+    covariance the part ``common`` (p, p) that is one and the same error in repeat runs; None where it is not told
+    apart.
+    """
+
+    covariance: Array
+    dof: Array
+    budget: tuple[BudgetItem, ...] = ()
+    common: Array | None = None
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties (p,); 0 for a variance that rounding made negative."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+def combine(names: Sequence[str], sources: Sequence[TypeA | TypeB]) -> Uncertainty:
     """Add up independent sources.
 
-    Returns
-    -------
-    covariance : (p, p)
-    dof : (p,)
-        Effective degrees of freedom of each parameter (Welch-Satterthwaite, GUM G.4), at least 1; inf without
-        type A.
-    budget : tuple of `BudgetItem`
-        In the order of the sources; a parameter to which a source adds nothing has no share there.
+    The degrees of freedom are the effective ones of each parameter (Welch-Satterthwaite, GUM G.4), at least 1, and inf
+    without type A. The budget is in the order of the sources; a parameter to which a source adds nothing has no share
+    there. Repeat runs share the sources of type B that are not ``redrawn``.
     """
     p = len(names)
-    total = np.zeros((p, p))
+    total, common = np.zeros((p, p)), np.zeros((p, p))
     for source in sources:
         total += source.covariance
+        if isinstance(source, TypeB) and not source.redrawn:
+            common += source.covariance
     variance = np.diag(total)
     weight = np.zeros(p)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -87,14 +102,7 @@ def combine(
             if isinstance(source, TypeA) and np.isfinite(source.dof):
                 weight += np.square(np.diag(source.covariance) / variance) / source.dof
         dof = np.where(weight > 0, np.maximum(1.0 / weight, 1.0), np.inf)
-    budget = tuple(_item(names, source, variance) for source in sources)
-    return total, dof, budget
-
-
-def common(sources: Sequence[TypeA | TypeB], parameters: int) -> Array:
-    """(p, p) covariance by those sources that are the same error in repeat runs."""
-    alike = (s.covariance for s in sources if isinstance(s, TypeB) and not s.redrawn)
-    return sum(alike, np.zeros((parameters, parameters)))
+    return Uncertainty(total, dof, tuple(_item(names, source, variance) for source in sources), common)
 
 
 def _item(names: Sequence[str], source: TypeA | TypeB, variance: Array) -> BudgetItem:

@@ -20,10 +20,12 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import InputError, QuantityError
+from inercal.estimate.basis import Basis, provenance
+from inercal.estimate.budget import Uncertainty
 from inercal.estimate.common_sources import Taken, common_sources, other_instrument
 from inercal.estimate.identifiability import in_words
-from inercal.estimate.result import Estimate, Parameter, coverage_factor, provenance
-from inercal.findings import Finding, Status
+from inercal.estimate.result import Estimate, Parameter
+from inercal.findings import EVERYTHING, Finding, Status
 from inercal.records.places import counted_names
 from inercal.units import parse_unit
 
@@ -91,7 +93,6 @@ def compare(first: Saved, second: Saved) -> Estimate:
     covariance = 0.5 * (covariance + covariance.T)
     values = b.values - a.values
     dof = _degrees(a, b, np.diag(covariance))
-    k = np.array([coverage_factor(float(nu)) for nu in dof])
     units = tuple(first.estimate[name].unit for name in names)
     differences = [
         Parameter(*row)
@@ -99,7 +100,6 @@ def compare(first: Saved, second: Saved) -> Estimate:
             names,
             values.tolist(),
             np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(),
-            k.tolist(),
             dof.tolist(),
             units,
             strict=True,
@@ -107,32 +107,32 @@ def compare(first: Saved, second: Saved) -> Estimate:
     ]
     rows = [_row(p, a, b, i, common, len(names)) for i, p in enumerate(differences)]
     joint = _joint(values, covariance, dof)
-    status, message = _verdict(rows, joint, names)
-    return Estimate(
-        command=COMMAND,
-        names=tuple(names),
-        units=units,
-        values=values,
-        covariance=covariance,
-        dof=dof,
-        k=k,
-        status=status,
-        message=message,
-        findings=tuple(_findings(first, second, common)),
+    basis = Basis(
+        COMMAND,
+        MODEL,
+        {"first": _conditions(first.estimate), "second": _conditions(second.estimate)},
+        {
+            key: text
+            for key, text in first.estimate.traceability.items()
+            if second.estimate.traceability.get(key) == text
+        },
+        provenance=provenance({"first": first.where, "second": second.where}),
+        references=REFERENCES,
+    )
+    return Estimate.of(
+        basis,
+        names,
+        units,
+        values,
+        Uncertainty(covariance, dof),
+        _verdict(rows, joint, names),
+        findings=_findings(first, second, common),
         statistics={
             "chi2": joint.chi2,
             "dof": float(joint.rank),
             "probability": joint.probability,
             "largest_normalised_error": max(row["normalised_error"] for row in rows),
         },
-        model=MODEL,
-        conditions={"first": _conditions(first.estimate), "second": _conditions(second.estimate)},
-        traceability={
-            key: text
-            for key, text in first.estimate.traceability.items()
-            if second.estimate.traceability.get(key) == text
-        },
-        provenance=provenance({"first": first.where, "second": second.where}),
         result={
             "coefficients": rows,
             "common_sources": list(common),
@@ -140,7 +140,6 @@ def compare(first: Saved, second: Saved) -> Estimate:
             "only_in_second": [name for name in second.estimate.names if name not in names],
             "family_wise_probability": FAMILY,
         },
-        references=REFERENCES,
     )
 
 
@@ -300,6 +299,12 @@ def _verdict(rows: list[dict[str, Any]], joint: _Joint, names: list[str]) -> tup
     )
 
 
+def _harmed(estimate: Estimate) -> tuple[str, ...]:
+    """Coefficients of a calibration that its findings harm where it is suspect; everything where it ended worse."""
+    names = (name for name in estimate.names if any(name in each.harm for each in estimate.findings))
+    return tuple(names) if estimate.status is Status.SUSPECT else EVERYTHING
+
+
 def _conditions(estimate: Estimate) -> dict[str, Any]:
     """When and at which temperature a calibration was made."""
     return {key: estimate.conditions.get(key) for key in ("date", "temperature")}
@@ -313,6 +318,7 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
             "bad_verdict",
             f"the calibration ended {each.estimate.status.value}: {each.estimate.message}",
             each.where,
+            _harmed(each.estimate),
         )
         for each in (first, second)
         if each.estimate.status is not Status.OK

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +14,36 @@ Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
 
 
+class Row(NamedTuple):
+    """The derivative h of a scalar measurement by the state, zero but for ``values[:size]`` at ``places[:size]``."""
+
+    places: Indices
+    values: Array
+    size: int
+
+
 @kernel
-def innovation_variance(P: Array, places: Indices, row: Array, count: int, noise: float) -> float:
+def empty_row(size: int) -> Row:
+    """Room for a row of at most ``size`` entries."""
+    return Row(np.empty(size, dtype=np.int64), np.empty(size), 0)
+
+
+@kernel
+def innovation_variance(P: Array, row: Row, noise: float) -> float:
     """Variance ``h P h^T + r`` of one measurement; arguments as in `scalar_update`."""
     total = noise
-    for a in range(count):
-        for b in range(count):
-            total += row[a] * row[b] * P[places[a], places[b]]
+    for a in range(row.size):
+        for b in range(row.size):
+            total += row.values[a] * row.values[b] * P[row.places[a], row.places[b]]
     return total
 
 
 @kernel
-def scalar_update(
-    P: Array, x: Array, places: Indices, row: Array, count: int, z: float, noise: float, work: Array
-) -> float:
+def scalar_update(P: Array, x: Array, row: Row, z: float, noise: float, work: Array) -> float:
     """Update an error state ``x`` (n,) and its covariance ``P`` (n, n), both in place, by one measurement.
 
-    ``z = h x + v``, v of variance ``noise``; h is zero but for ``row[:count]`` at ``places[:count]``. What several
-    measurements of one time say is put in one after the other, with rows of one linearisation and ``z`` the innovation
-    before the first of them; noise that is correlated must be decorrelated first.
+    ``z = h x + v``, v of variance ``noise``. Measurements of one time are put in one after the other, with rows of one
+    linearisation and ``z`` the innovation before the first of them; correlated noise must be decorrelated first.
 
     Returns the square of the innovation over its variance; summed over the measurements of one time it is their
     normalised innovation squared. ``work`` (n,) is used up.
@@ -40,13 +51,13 @@ def scalar_update(
     n = len(x)
     for i in range(n):
         total = 0.0
-        for a in range(count):
-            total += P[i, places[a]] * row[a]
+        for a in range(row.size):
+            total += P[i, row.places[a]] * row.values[a]
         work[i] = total
     variance, innovation = noise, z
-    for a in range(count):
-        variance += row[a] * work[places[a]]
-        innovation -= row[a] * x[places[a]]
+    for a in range(row.size):
+        variance += row.values[a] * work[row.places[a]]
+        innovation -= row.values[a] * x[row.places[a]]
     gain, root = innovation / variance, 1.0 / math.sqrt(variance)
     for i in range(n):
         x[i] += gain * work[i]

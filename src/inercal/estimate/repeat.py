@@ -21,9 +21,10 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import InputError
-from inercal.estimate.budget import BudgetItem
+from inercal.estimate.basis import Basis
+from inercal.estimate.budget import BudgetItem, Uncertainty
 from inercal.estimate.files import plain_objects
-from inercal.estimate.result import Estimate, coverage_factor, rounded
+from inercal.estimate.result import Estimate, rounded
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
 from inercal.records.places import counted
@@ -90,7 +91,7 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     Parameters
     ----------
     runs : sequence of Estimate, at least two
-        Runs whose status is not ok are left out and give the status of the whole.
+        Runs whose status is neither ok nor suspect are left out and give the status of the whole.
 
     Returns
     -------
@@ -104,8 +105,8 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     InputError
         The runs have other coefficients or units than the first.
     """
-    sound = [run for run in runs if run.status is Status.OK]
-    bad = next((run for run in runs if run.status is not Status.OK), None)
+    sound = [run for run in runs if run.status.done]
+    bad = next((run for run in runs if not run.status.done), None)
     if len(sound) < 2:
         assert bad is not None
         return replace(
@@ -142,21 +143,24 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     if bad is not None:
         status = bad.status
         message += f"; {_where(runs, bad)} is left out: {bad.message}"
-    return replace(
-        first,
-        values=np.sum(weights * x, axis=0),
-        covariance=covariance,
-        common=known,
-        dof=dof,
-        k=np.array([coverage_factor(float(value)) for value in dof]),
-        status=status,
-        message=message,
-        findings=tuple(findings),
+    basis = Basis(
+        first.command,
+        first.model,
+        _same([run.conditions for run in sound]),
+        first.traceability,
+        _inputs(runs),
+        first.provenance,
+        (*first.references, *(() if REFERENCE in first.references else (REFERENCE,))),
+    )
+    combined = Estimate.of(
+        basis,
+        names,
+        first.units,
+        np.sum(weights * x, axis=0),
+        Uncertainty(covariance, dof, _budget(sound, np.diag(within), between, np.diag(covariance)), known),
+        (status, message),
+        findings=findings,
         statistics={"runs": float(len(sound)), "dof": float(len(sound) - 1)},
-        budget=_budget(sound, np.diag(within), between, np.diag(covariance)),
-        conditions=_same([run.conditions for run in sound]),
-        inputs=_inputs(runs),
-        timing={"solve": sum(run.timing.get("solve", 0.0) for run in runs)},
         result={
             **_same([run.result for run in sound]),
             "runs": [_row(run) for run in runs],
@@ -169,8 +173,8 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
                 for name, part in zip(names, parts, strict=True)
             },
         },
-        references=(*first.references, *(() if REFERENCE in first.references else (REFERENCE,))),
     )
+    return replace(combined, timing={"solve": sum(run.timing.get("solve", 0.0) for run in runs)})
 
 
 def _own_dof(runs: Sequence[Estimate], spread: Array) -> Array:
@@ -260,17 +264,15 @@ def _row(run: Estimate) -> dict[str, Any]:
 
 def _findings(runs: Sequence[Estimate]) -> tuple[Finding, ...]:
     """The findings of all runs, each with its run; what every run says alike is said once."""
-    said: dict[tuple[str, str, str], list[int]] = {}
+    said: dict[Finding, list[int]] = {}
     for number, run in enumerate(runs, start=1):
         for finding in run.findings:
-            said.setdefault((finding.code, finding.message, finding.where), []).append(number)
+            said.setdefault(finding, []).append(number)
     return tuple(
-        Finding(
-            code,
-            message,
-            where if len(numbers) == len(runs) else ", ".join([run_words(numbers), *filter(None, [where])]),
-        )
-        for (code, message, where), numbers in said.items()
+        finding
+        if len(numbers) == len(runs)
+        else replace(finding, where=", ".join([run_words(numbers), *filter(None, [finding.where])]))
+        for finding, numbers in said.items()
     )
 
 

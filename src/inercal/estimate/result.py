@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
@@ -13,7 +13,9 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import CalibrationError
-from inercal.estimate.budget import BudgetItem
+from inercal.estimate.basis import Basis
+from inercal.estimate.budget import BudgetItem, Uncertainty
+from inercal.estimate.suspicion import judged
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
 
@@ -28,9 +30,13 @@ class Parameter:
     name: str
     value: float
     u: float
-    k: float
     dof: float
     unit: str
+
+    @property
+    def k(self) -> float:
+        """Coverage factor for 95.45 %."""
+        return coverage_factor(self.dof)
 
     @property
     def U(self) -> float:
@@ -53,12 +59,12 @@ def coverage_factor(dof: float, level: float = COVERAGE) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Everything a calibration says.
+    """Everything a calibration says; `of` and `without` make one.
 
-    ``values`` (p,), ``covariance`` (p, p), ``dof`` and ``k`` (p,) belong to ``names`` and ``units``. The
-    other fields are the keys of the JSON result of the same names; ``result`` is the command's own part.
-    ``common`` (p, p) is the part of the covariance that is one and the same error in repeat runs (gravity, the clock, a
-    table); None where it was not told apart.
+    ``values`` (p,), ``covariance`` (p, p) and ``dof`` (p,) belong to ``names`` and ``units``. The other fields are the
+    keys of the JSON result of the same names; ``result`` is the command's own part. ``common`` (p, p) is the part of
+    the covariance that is one and the same error in repeat runs (gravity, the clock, a table); None where it was not
+    told apart.
     """
 
     command: str
@@ -67,7 +73,6 @@ class Estimate:
     values: Array
     covariance: Array
     dof: Array
-    k: Array
     status: Status
     message: str
     findings: tuple[Finding, ...] = ()
@@ -83,18 +88,86 @@ class Estimate:
     references: tuple[str, ...] = ()
     common: Array | None = None
 
+    @classmethod
+    def of(
+        cls,
+        basis: Basis,
+        names: Sequence[str],
+        units: Sequence[str],
+        values: Array,
+        known: Uncertainty,
+        verdict: tuple[Status, str],
+        *,
+        findings: Iterable[Finding] = (),
+        statistics: Mapping[str, float] | None = None,
+        result: Mapping[str, Any] | None = None,
+        beside: tuple[str, ...] = (),
+    ) -> Estimate:
+        """The estimate of p parameters.
+
+        Parameters
+        ----------
+        basis : Basis
+            What it rests on.
+        names, units : sequences of str, length p
+        values : (p,)
+        known : Uncertainty
+            `inercal.estimate.budget.combine` makes it of all sources.
+        verdict : Status and str
+            Becomes ``suspect`` where it is ``ok`` and a finding does harm.
+        findings : iterable of Finding
+        statistics, result : mapping
+        beside : tuple of str
+            What the result states beside its parameters, and findings may harm: ``theta``.
+        """
+        said, (status, message) = judged(verdict, findings, (*names, *beside))
+        return cls(
+            names=tuple(names),
+            units=tuple(units),
+            values=values,
+            **known._asdict(),
+            status=status,
+            message=message,
+            findings=said,
+            statistics=statistics or {},
+            result=result or {},
+            **vars(basis),
+        )
+
+    @classmethod
+    def without(
+        cls,
+        basis: Basis,
+        status: Status,
+        message: str,
+        *,
+        findings: Iterable[Finding] = (),
+        statistics: Mapping[str, float] | None = None,
+        result: Mapping[str, Any] | None = None,
+        beside: tuple[str, ...] = (),
+    ) -> Estimate:
+        """An estimate without parameters: of a command that has none, or one that says why there are none."""
+        nothing = Uncertainty(np.zeros((0, 0)), np.zeros(0))
+        more: dict[str, Any] = {"statistics": statistics, "result": result, "beside": beside}
+        return cls.of(basis, (), (), np.zeros(0), nothing, (status, message), findings=findings, **more)
+
     @property
     def u(self) -> Array:
         """Standard uncertainties (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def k(self) -> Array:
+        """Coverage factors (p,) for 95.45 %."""
+        return np.array([coverage_factor(each) for each in self.dof.tolist()])
+
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
         """The coefficients by name, in order."""
-        rows = zip(self.names, self.values, self.u, self.k, self.dof, self.units, strict=True)
+        rows = zip(self.names, self.values, self.u, self.dof, self.units, strict=True)
         return {
-            name: Parameter(name, float(value), float(u), float(k), float(dof), unit)
-            for name, value, u, k, dof, unit in rows
+            name: Parameter(name, float(value), float(u), float(dof), unit)
+            for name, value, u, dof, unit in rows
         }
 
     def __getitem__(self, name: str) -> Parameter:
@@ -121,11 +194,14 @@ class Estimate:
             common=None if self.common is None else self.common / square,
         )
 
-    def raise_for_status(self) -> Estimate:
-        """Return the estimate itself if its status is ok, else raise `CalibrationError` with the message."""
-        if self.status is not Status.OK:
-            raise CalibrationError(f"{self.status.value}: {self.message}", self)
-        return self
+    def raise_for_status(self, *, suspect: bool = False) -> Estimate:
+        """Return the estimate itself if its status is ok, else raise `CalibrationError` with the message.
+
+        ``suspect``: that status is good enough too.
+        """
+        if self.status is Status.OK or (suspect and self.status is Status.SUSPECT):
+            return self
+        raise CalibrationError(f"{self.status.value}: {self.message}", self)
 
     def citations(self) -> str:
         """The publications and standards behind the methods used, one a line."""
@@ -153,27 +229,11 @@ class Estimate:
         )
 
 
-def provenance(given: Mapping[str, Any]) -> dict[str, Any]:
-    """What a repetition of a calibration needs beside its inputs: the keys ``given``; nothing in it is random."""
-    import platform
-
-    import scipy
-
-    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
-    return {"settings": given, "seed": None, "versions": versions}
-
-
 def timed(estimate: Estimate, begun: float) -> Estimate:
     """The estimate with the time since ``begun`` (`time.perf_counter`) as that of its solution."""
     import time
 
     return replace(estimate, timing={"solve": time.perf_counter() - begun})
-
-
-def without_parameters(command: str, status: Status, message: str, **other: Any) -> Estimate:
-    """An estimate that says why nothing was estimated; ``other`` fields of `Estimate` by name."""
-    none = np.zeros(0)
-    return Estimate(command, (), (), none, np.zeros((0, 0)), none, none, status, message, **other)
 
 
 def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:

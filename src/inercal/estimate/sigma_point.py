@@ -10,7 +10,7 @@ Wan and van der Merwe (2000) for alpha and beta.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,51 +70,75 @@ def covariance(a: Array, centre: float, other: float, out: Array) -> None:
             out[j, i] = out[i, j]
 
 
-@kernel
-def draw(P: Array, kind: int, spread: float, A: Array, work: Array, columns: Array, told: Array) -> None:
-    """Draw the points of a state whose noise is added to covariances.
+class Points(NamedTuple):
+    """Sigma points of n states, whose noise is added to covariances.
 
-    Parameters
-    ----------
-    P, kind, A, work
-        As of `inercal.estimate.factor.root`, ``A`` for the root.
-    columns : (n, n) receives, row by row, the columns of the root times ``spread``
-    told : (2,) lowest eigenvalue so far, number of steps so far at which Cholesky failed; brought up to date
+    ``columns`` (n, n) holds, row by row, the columns of the root times the spread; ``root`` and ``work`` (n, n) are
+    used up; ``health`` (2,) is the lowest eigenvalue of all draws (NaN while there is none), and the number of draws at
+    which Cholesky's factor failed.
     """
-    fell, lowest = root(P, kind, A, work)
-    if fell:
-        told[1] += 1.0
-    if not lowest >= told[0] and not math.isnan(lowest):
-        told[0] = lowest
-    for i in range(len(A)):
-        for j in range(len(A)):
-            columns[j, i] = spread * A[i, j]
+
+    columns: Array
+    root: Array
+    work: Array
+    health: Array
 
 
 @kernel
-def moments(
-    z: Array, columns: Array, other: float, middle: Array, odd: Array, Pzz: Array, Pxz: Array
-) -> None:
-    """Mean, covariance and covariance with the state of what all points read, where the centre weighs nothing.
+def empty_points(n: int) -> Points:
+    """Room for the points of ``n`` states."""
+    return Points(np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.array([math.nan, 0.0]))
+
+
+@kernel
+def draw(P: Array, factor: int, spread: float, points: Points) -> None:
+    """Draw the points of a state of covariance ``P`` (n, n), by a ``factor`` of `inercal.estimate.factor.root`."""
+    fell, lowest = root(P, factor, points.root, points.work)
+    if fell:
+        points.health[1] += 1.0
+    if not lowest >= points.health[0] and not math.isnan(lowest):
+        points.health[0] = lowest
+    for i in range(len(P)):
+        for j in range(len(P)):
+            points.columns[j, i] = spread * points.root[i, j]
+
+
+class Moments(NamedTuple):
+    """Moments of m readings at all points of n states: their ``mean`` (m,) and ``covariance`` (m, m), the ``cross``
+    covariance (n, m) with the state; ``odd`` (n, m), the half of each pair that a change of sign turns, is used up."""
+
+    mean: Array
+    covariance: Array
+    cross: Array
+    odd: Array
+
+
+@kernel
+def empty_moments(n: int, m: int) -> Moments:
+    """Room for the moments of ``m`` readings and ``n`` states."""
+    return Moments(np.empty(m), np.empty((m, m)), np.empty((n, m)), np.empty((n, m)))
+
+
+@kernel
+def moments(z: Array, columns: Array, other: float, out: Moments) -> None:
+    """Moments of the readings at all points, where the centre weighs nothing.
 
     Parameters
     ----------
     z : (2 n + 1, m) read at the centre, which is not used, at + and at - of each column; becomes deviations
     columns : (n, n) of `draw`
     other : weight
-    middle : (m,) receives the mean
-    odd : (n, m) overwritten
-    Pzz, Pxz : (m, m), (n, m) receive the covariances
+    out : receives the moments
     """
-    n, m = odd.shape
-    mean(z, 0.0, other, middle)
+    n, m = out.odd.shape
+    mean(z, 0.0, other, out.mean)
     for k in range(n):
         for i in range(m):
-            odd[k, i] = z[1 + k, i] - z[1 + n + k, i]
-            z[1 + k, i] -= middle[i]
-            z[1 + n + k, i] -= middle[i]
-    covariance(z, 0.0, other, Pzz)
-    cross(columns, odd, other, other, Pxz)
+            out.odd[k, i] = z[1 + k, i] - z[1 + n + k, i]
+            z[1 + k, i] -= out.mean[i]
+            z[1 + n + k, i] -= out.mean[i]
+    covariance(z, 0.0, other, out.covariance)
+    cross(columns, out.odd, other, other, out.cross)
 
 
 @kernel

@@ -12,6 +12,9 @@ from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.keys import RELATIVE_U, TIME, option, quantity
 from inercal.units import Quantity
 
+MASKED = ("saturation",)
+"""Codes of a recording's findings whose samples no fit uses: turns in which a sensor saturates are left out."""
+
 COMMAND = "calibrate imu"
 """The command behind every method of this room, as its results have it."""
 

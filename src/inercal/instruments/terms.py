@@ -7,6 +7,7 @@ in a result; ``output`` stands for the unit of the instrument's output (m/s^2, d
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 
@@ -273,3 +274,21 @@ def term(name: str) -> Term | None:
 def _output(channel: str) -> Term | None:
     """The output of a channel at rest, as of a temperature model; None if there is no such channel."""
     return Term(channel, f"{channel}: output at rest", "output") if re.fullmatch(_CHANNEL, channel) else None
+
+
+def resting_on(channel: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Those of ``names`` that the output of a channel leads to; all where the table does not tell, as for angles.
+
+    Examples
+    --------
+    >>> resting_on("gyro_x", ("K0_x", "D_F_x", "S_y"))
+    ('D_F_x', 'S_y')
+    """
+    kind, _, axis = channel.partition("_")
+    of_kind = {
+        "acc": {term.symbol for term in (*_ACCELEROMETER, *_ACCELEROMETER_BY_ANGLE)},
+        "gyro": {term.symbol for term in (*_GYRO, *_RATE_TEST)},
+        "y": {name for name in TERMS if name.startswith(("DX_", "k_") if axis == "x" else ("DY_", "kY_"))},
+    }
+    by_name = [n for n in names if n == channel or n.startswith(f"{channel}_") or n.endswith(f"_{channel}")]
+    return tuple(by_name or [n for n in names if n in of_kind.get(kind, ())] or names)

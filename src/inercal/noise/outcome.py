@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.errors import InputError, RecordError
-from inercal.estimate.result import Estimate, coverage_factor, provenance
+from inercal.estimate.basis import Basis, provenance
+from inercal.estimate.budget import Uncertainty
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.noise import SYMBOLS
 from inercal.instruments.terms import noise_term
@@ -120,7 +122,8 @@ def noise_of(record: Record, given: Mapping[str, Any] | None = None) -> Noise:
             found = unrest(samples[:, at], interval)
             if found is not None:
                 where = f"{found.first:.1f} s to {found.last:.1f} s from the start"
-                findings.append(Finding("not_at_rest", f"{column.name} {found.words}", where))
+                harm = (column.name,) if found.felt else ()
+                findings.append(Finding("not_at_rest", f"{column.name} {found.words}", where, harm))
                 disturbed[column.name] = found
     of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in said.items()]
     estimate = _assemble(record, channels, [*of_fits, *findings], disturbed, given or {})
@@ -249,29 +252,21 @@ def _assemble(
                 values.append(0.0)
                 dof.append(np.inf)
         blocks.append(block)
-    status, message = _verdict(channels, disturbed)
     longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
-    return Estimate(
-        command=COMMAND,
-        names=tuple(names),
-        units=tuple(units),
-        values=np.array(values),
-        covariance=block_diag(np.zeros((0, 0)), *blocks),
-        dof=np.array(dof),
-        k=np.array([coverage_factor(nu) for nu in dof]),
-        status=status,
-        message=message,
+    return Estimate.of(
+        Basis(COMMAND, MODEL, inputs=record.sources, provenance=provenance(given), references=REFERENCES),
+        names,
+        units,
+        np.array(values),
+        Uncertainty(block_diag(np.zeros((0, 0)), *blocks), np.array(dof)),
+        _verdict(channels, disturbed),
         findings=(*record.findings, *findings),
         statistics={
             "samples": float(longest.samples),
             "rate_hz": 1.0 / longest.interval,
             "duration_s": longest.samples * longest.interval,
         },
-        model=MODEL,
-        inputs=record.sources,
-        provenance=provenance(given),
         result={"level": LEVEL, "channels": {channel.name: _curve(channel) for channel in channels}},
-        references=REFERENCES,
     )
 
 

@@ -48,11 +48,16 @@ class Unrest:
         return self.pieces > MOST * self.of or not self.factor <= LARGEST
 
     @property
+    def felt(self) -> bool:
+        """True where it changes the deviation, not only a few samples."""
+        return not self.factor <= 1.05
+
+    @property
     def words(self) -> str:
         """A sentence of it, without the channel."""
         effect = (
             f"; without them the deviation at {self.tau:.3g} s would be {self.factor:.2g} times smaller"
-            if np.isfinite(self.factor) and self.factor > 1.05
+            if np.isfinite(self.factor) and self.felt
             else ""
         )
         return (

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.records.record import Record
+from inercal.units import Quantity, parse_unit
 
 
-def recorded_temperature(record: Record) -> str | None:
-    """The mean of the temperature that was recorded, in words; None where there is none."""
+def recorded_temperature(record: Record) -> Quantity | None:
+    """The mean of the temperature channel [degC], with the standard deviation as its u; None without such a channel."""
     column = record.columns.get("temperature")
     if column is None or column.unit.dimension != "temperature" or not np.isfinite(column.values).any():
         return None
-    return f"{np.nanmean(column.si()):.1f} degC"
+    known = column.si()
+    mean, u = float(np.nanmean(known)), float(np.nanstd(known))
+    return Quantity(mean, u, parse_unit("degC"), f"{mean:.1f} degC")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,10 @@ from inercal.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.noise.outcome import ChannelNoise, Noise
 from inercal.report.html import Picture
 from inercal.report.html import page as template
-from inercal.report.style import COLOURS, INK, QUIET, WIDTH, figure, plain_unit, powers_of_ten, svg
+from inercal.report.marks import Axis, Band, Dots, Level, Line, Mark, Note, Panel
+from inercal.report.panels import draw
+from inercal.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.units import parse_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 #: symbol -> averaging time [s] at which it is read off its slope, the slope in words, the slope's colour
 _SLOPES = {
@@ -36,7 +34,7 @@ _ABREAST = 3
 """Channels side by side in a picture."""
 
 _LEGEND = ("measured", "fit", *SYMBOLS)
-"""Entries of the legend, in its order, by what they begin with."""
+"""Entries of the legend."""
 
 
 def shown_units(unit: str) -> tuple[tuple[str, float], tuple[tuple[str, float], ...]]:
@@ -128,77 +126,70 @@ def pictures(noise: Noise) -> list[Picture]:
 def _picture(sensor: str, channels: Sequence[ChannelNoise], noise: Noise) -> Picture:
     """Up to three channels of a sensor side by side, the residuals below."""
     text, _ = shown_units(channels[0].unit)[0]
-    with figure(WIDTH, 3.9) as page:
-        panels = page.subplots(
-            2, len(channels), sharex=True, sharey="row", squeeze=False, height_ratios=(3.2, 1.0)
-        )
-        for axes, below, channel in zip(panels[0], panels[1], channels, strict=True):
-            _curve(axes, channel, noise)
-            _residuals(below, channel)
-            below.set_xlabel("averaging time [s]")
-        _common_limits(panels[0, 0], panels[1, 0], channels)
-        panels[0, 0].set_ylabel(f"Allan deviation [{plain_unit(text)}]")
-        panels[1, 0].set_ylabel("off the fit [%]")
-        # one legend for all panels: what any of them shows, once
-        shown = {
-            label: handle
-            for axes in panels[0]
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
-        labels = sorted(shown, key=lambda label: _LEGEND.index(label.partition(",")[0]))
-        handles = [shown[label] for label in labels]
-        page.legend(handles, labels, loc="outside upper center", ncols=len(_LEGEND))
-        drawn = svg(page)
+    above, below = _common_limits(channels)
+    rows = [
+        [
+            _curve(channel, noise, Axis(f"Allan deviation [{plain_unit(text)}]", "log", above))
+            for channel in channels
+        ],
+        [_residuals(channel, Axis("off the fit [%]", limits=below)) for channel in channels],
+    ]
     words = {"acc": "Accelerometers", "gyro": "Gyro", "a": "Accelerometers"}
-    return Picture(
+    return draw(
         f"{words.get(sensor, sensor)}: {', '.join(channel.name for channel in channels)}",
         f"Overlapping Allan deviation with its {100.0 * noise.estimate.result['level']:.1f} % limits, the fitted "
         "model, and the slope of each noise process that was seen; a ring marks where a coefficient is read off its "
         "slope (N at 1 s, K at 3 s, R at √2 s, Q at √3 s). Below: deviation over fit, less one; grey: averaging "
         "times left out of the fit.",
-        drawn,
+        rows,
+        3.9,
+        len(_LEGEND),
+        "center",
+        heights=(3.2, 1.0),
+        share_y="row",
     )
 
 
-def _curve(axes: Axes, channel: ChannelNoise, noise: Noise) -> None:
+def _curve(channel: ChannelNoise, noise: Noise, up: Axis) -> Panel:
     """Deviation, limits, fit and slopes of one channel, on logarithmic axes."""
     (_, size), coefficients = shown_units(channel.unit)
     tau, deviation = channel.curve.tau, channel.deviation / size
     lower, upper = (limit / size for limit in channel.limits)
-    axes.set_title(channel.name)
-    axes.set_xscale("log")
+    across = Axis(scale="log")
     if not np.nanmax(deviation, initial=0.0) > 0:
-        axes.text(0.5, 0.5, "no noise", transform=axes.transAxes, ha="center")
-        return
-    axes.set_yscale("log", nonpositive="clip")
-    axes.fill_between(tau, lower, upper, color=COLOURS[0], alpha=0.25, lw=0)
-    axes.plot(tau, deviation, "o-", color=COLOURS[0], ms=2.2, lw=0.7, label="measured")
+        none = Note((0.5, 0.5), "no noise", ha="center", of_panel="xy", size=8.0)
+        return Panel([none], across, replace(up, scale="linear", limits=None), channel.name)
+    marks: list[Mark] = [
+        Band(tau, lower, upper, alpha=0.25),
+        Line(tau, deviation, width=0.7),
+        Dots(tau, deviation, "measured", size=2.2),
+    ]
     if channel.fit is not None:
         used = _used(channel)
-        axes.plot(tau[used], channel.fitted[used] / size, color=INK, lw=1.0, label="fit")
+        marks.append(Line(tau[used], channel.fitted[used] / size, "fit", INK, 1.0))
         falls = deviation[-1] <= deviation[0]  # then the upper right is free, else the upper left
         for k, symbol in enumerate(channel.fit.names):
             p = noise.estimate[f"{symbol}_{channel.name}"]
-            _slope(axes, symbol, p.value / size, tau)
+            marks += _slope(symbol, p.value / size, tau)
             text, of_coefficient = coefficients[SYMBOLS.index(symbol)]
             value, _ = rounded(p.value / of_coefficient, p.u / of_coefficient)
-            axes.text(
-                0.97 if falls else 0.03,
-                0.97 - 0.075 * k,
-                f"{symbol} {value} {plain_unit(text)}",
-                transform=axes.transAxes,
-                ha="right" if falls else "left",
-                va="top",
-                fontsize=6.5,
-                color=_SLOPES[symbol][2],
-                bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.8},
+            place, words = (0.97 if falls else 0.03, 0.97 - 0.075 * k), f"{symbol} {value} {plain_unit(text)}"
+            marks.append(
+                Note(
+                    place,
+                    words,
+                    _SLOPES[symbol][2],
+                    6.5,
+                    "right" if falls else "left",
+                    "top",
+                    of_panel="xy",
+                    ground=True,
+                )
             )
-    powers_of_ten(axes.xaxis)
-    powers_of_ten(axes.yaxis)
-    axes.grid(which="major")
+    return Panel(marks, across, up, channel.name, grid="both")
 
 
-def _slope(axes: Axes, symbol: str, value: float, tau: Array) -> None:
+def _slope(symbol: str, value: float, tau: Array) -> list[Mark]:
     """The line of one process, in the unit of the curve, marked where its coefficient is read off."""
     at, slope, colour = _SLOPES[symbol]
     laws = {
@@ -208,22 +199,22 @@ def _slope(axes: Axes, symbol: str, value: float, tau: Array) -> None:
         "R": value * tau / np.sqrt(2.0),
         "Q": np.sqrt(3.0) * value / tau,
     }
-    axes.plot(tau, laws[symbol], "--", color=colour, lw=0.9, label=f"{symbol}, slope {slope}")
+    marks: list[Mark] = [Line(tau, laws[symbol], f"{symbol}, slope {slope}", colour, 0.9, "--")]
     if at is not None and tau[0] <= at <= tau[-1]:
-        axes.plot([at], [value], "o", color=colour, mfc="none", ms=5.0, mew=1.0)
+        marks.append(Dots([at], [value], "", colour, size=5.0, filled=False))
+    return marks
 
 
-def _residuals(axes: Axes, channel: ChannelNoise) -> None:
+def _residuals(channel: ChannelNoise, up: Axis) -> Panel:
     """Deviation over fit, less one, in percent, with the limits."""
-    axes.axhline(0.0, color=QUIET, lw=0.6)
-    axes.grid(axis="x", which="major")
-    if channel.fit is None:
-        return
-    tau, used = channel.curve.tau, _used(channel)
-    off, lower, upper = _off(channel)
-    axes.fill_between(tau, lower, upper, color=COLOURS[0], alpha=0.25, lw=0)
-    axes.plot(tau[used], off[used], "o", color=COLOURS[0], ms=2.2)
-    axes.plot(tau[~used], off[~used], "o", color=QUIET, ms=2.2)
+    marks: list[Mark] = [Level(0.0)]
+    if channel.fit is not None:
+        tau, used = channel.curve.tau, _used(channel)
+        off, lower, upper = _off(channel)
+        marks.append(Band(tau, lower, upper, alpha=0.25))
+        for chosen, colour in ((used, COLOURS[0]), (~used, QUIET)):
+            marks.append(Dots(tau[chosen], off[chosen], colour=colour, size=2.2))
+    return Panel(marks, Axis("averaging time [s]", "log"), up, grid="x")
 
 
 def _used(channel: ChannelNoise) -> NDArray[np.bool_]:
@@ -243,16 +234,17 @@ def _off(channel: ChannelNoise) -> tuple[Array, Array, Array]:
     return off, lower, upper
 
 
-def _common_limits(above: Axes, below: Axes, channels: Sequence[ChannelNoise]) -> None:
+def _common_limits(
+    channels: Sequence[ChannelNoise],
+) -> tuple[tuple[float, float] | None, tuple[float, float]]:
     """Limits of the vertical axes that show every channel's curve, and the residuals of what was fitted."""
     size = shown_units(channels[0].unit)[0][1]
     curves = np.concatenate([channel.deviation for channel in channels]) / size
     known = curves[np.isfinite(curves) & (curves > 0)]
-    if known.size:
-        above.set_ylim(0.5 * known.min(), 3.0 * known.max())
+    above = (0.5 * float(known.min()), 3.0 * float(known.max())) if known.size else None
     off = [_off(channel)[0][_used(channel)] for channel in channels if channel.fit is not None]
     largest = 1.3 * float(np.nanmax(np.abs(np.concatenate(off)), initial=10.0)) if off else 10.0
-    below.set_ylim(max(-largest, -100.0), largest)
+    return above, (max(-largest, -100.0), largest)
 
 
 def page(noise: Noise) -> str:

@@ -13,7 +13,9 @@ from inercal.findings import Status
 from inercal.instruments.terms import term
 from inercal.report.html import Picture
 from inercal.report.html import page as template
-from inercal.report.style import ALARM, COLOURS, QUIET, WIDTH, figure, svg
+from inercal.report.marks import Axis, Bars, Dots, Level, Mark, Panel, Strips
+from inercal.report.panels import draw
+from inercal.report.style import ALARM, COLOURS
 
 _FAR = 4.0
 """Normalised error beyond which the axis of the picture becomes logarithmic."""
@@ -54,39 +56,32 @@ def _mark(row: Mapping[str, Any]) -> str:
 
 def picture(estimate: Estimate) -> Picture:
     """Differences over their expanded uncertainties, with the band in which they are explained."""
-    rows = estimate.result["coefficients"]
-    names = [row["name"] for row in rows]
-    over_U = np.array([np.copysign(row["normalised_error"], row["difference"]) for row in rows])
+    compared = estimate.result["coefficients"]
+    names = [row["name"] for row in compared]
+    over_U = np.array([np.copysign(row["normalised_error"], row["difference"]) for row in compared])
     over_U = np.clip(over_U, -1e6, 1e6)  # a coefficient without uncertainty
-    moved = np.array([row["moved"] for row in rows])
+    moved = np.array([row["moved"] for row in compared])
     far = max(1.5, 1.15 * float(np.abs(over_U).max()))
-    with figure(WIDTH, 0.7 + 0.16 * len(names)) as page:
-        axes = page.subplots()
-        axes.axvspan(-1.0, 1.0, color=COLOURS[0], alpha=0.15, lw=0)
-        axes.axvline(0.0, color=QUIET, lw=0.6)
-        places = np.arange(len(names))
-        for chosen, colour in ((~moved, COLOURS[0]), (moved, ALARM)):
-            axes.hlines(places[chosen], 0.0, over_U[chosen], color=colour, lw=1.0)
-            axes.plot(over_U[chosen], places[chosen], "o", color=colour)
-        if far > _FAR:
-            axes.set_xscale("symlog", linthresh=2.0, linscale=1.5)
-            powers = 10 ** np.arange(1, int(np.log10(far)) + 1)
-            ticks = np.concatenate([-powers[::-1], [-1, 0, 1], powers])
-            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
-            axes.set_xticks([], minor=True)
-        axes.set_xlim(-far, far)
-        axes.set_ylim(len(names) - 0.4, -0.6)
-        axes.set_yticks(places, names, fontsize=7)
-        axes.tick_params(axis="y", length=0)
-        axes.set_xlabel("difference / U")
-        axes.grid(axis="x")
-        drawn = svg(page)
+    rows = np.arange(len(names))
+    marks: list[Mark] = [Strips((-1.0, 1.0)), Level(0.0, upright=True)]
+    for chosen, colour in ((~moved, COLOURS[0]), (moved, ALARM)):
+        marks.append(Bars(rows[chosen], np.zeros(chosen.sum()), over_U[chosen], "", colour, 0.08))
+        marks.append(Dots(over_U[chosen], rows[chosen], colour=colour))
+    powers = (10.0 ** np.arange(1, int(np.log10(far)) + 1)).tolist()
+    across = Axis(
+        "difference / U",
+        "symlog" if far > _FAR else "linear",
+        (-far, far),
+        ticks=[*(-power for power in powers[::-1]), -1.0, 0.0, 1.0, *powers] if far > _FAR else None,
+        linear=2.0,
+    )
     outside = " Logarithmic beyond ±2." if far > _FAR else ""
-    return Picture(
+    return draw(
         "Differences over their uncertainties",
         "Second minus first over the expanded uncertainty of the difference; band: |E_n| ≤ 1. Red: moved by more than "
         f"chance explains among {len(names)} coefficients.{outside}",
-        drawn,
+        [[Panel(marks, across, Axis(names=names), grid="x")]],
+        0.7 + 0.16 * len(names),
     )
 
 

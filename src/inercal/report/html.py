@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import plain_objects
@@ -17,17 +17,21 @@ from inercal.instruments.terms import term
 from inercal.report.mathml import clauses
 from inercal.report.style import plain_unit
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _INFINITE = 1e6
 """Degrees of freedom from which they are shown as infinite: k is that of the normal distribution to six digits."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of a page: its ``title``, what it shows in words, and the drawing itself."""
+    """A figure of a page: its ``title``, what it shows in words, and the drawing itself, as text and as a figure."""
 
     title: str
     caption: str
     svg: str
+    figure: Figure | None = field(default=None, compare=False, repr=False)
 
     @property
     def uri(self) -> str:

@@ -17,7 +17,9 @@ from inercal.records.clocks import counted_rows
 from inercal.records.column import Column
 from inercal.records.record import Record
 from inercal.report.html import Picture, page
-from inercal.report.style import ALARM, COLOURS, WIDTH, envelope, figure, plain_unit, svg
+from inercal.report.marks import Axis, Line, Mark, Note, Panel, Strips
+from inercal.report.panels import draw
+from inercal.report.style import ALARM, COLOURS, envelope, plain_unit
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _ROWS = re.compile(r"(?:.*, )?rows? ((?:\d+(?:-\d+)?(?:, )?)+)")
@@ -154,25 +156,20 @@ def inspection_pictures(record: Record) -> list[Picture]:
 
 def _picture(sensor: str, columns: Sequence[Column], findings: Sequence[Finding], axis: str) -> Picture:
     """The channels of one sensor above each other, over an ``axis`` of that title."""
-    with figure(WIDTH, 0.5 + 1.15 * len(columns)) as page:
-        panels = page.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
-        for k, (axes, column) in enumerate(zip(panels, columns, strict=True)):
-            axes.plot(*envelope(column.t, column.values), color=COLOURS[k % len(COLOURS)], lw=0.6)
-            axes.set_ylabel(f"{column.name}\n[{plain_unit(column.unit.symbol)}]")
-            axes.margins(x=0.005)
-            for number, (begin, end) in _marks(column, findings):
-                axes.axvspan(begin, end, color=ALARM, alpha=0.25, lw=0.8)
-                axes.annotate(
-                    f"{number}", (begin, 1.0), xycoords=axes.get_xaxis_transform(), color=ALARM, fontsize=6.5,
-                    ha="center", va="bottom",
-                )  # fmt: skip
-        panels[-1].set_xlabel(axis)
-        drawn = svg(page)
-    return Picture(
+    panels = []
+    for k, column in enumerate(columns):
+        marks: list[Mark] = [Line(*envelope(column.t, column.values), "", COLOURS[k % len(COLOURS)], 0.6)]
+        for number, (begin, end) in _marks(column, findings):
+            marks.append(Strips((begin, end), ALARM, 0.25, edge=0.8))
+            marks.append(Note((begin, 1.0), f"{number}", ALARM, ha="center", va="bottom", of_panel="y"))
+        across = Axis(axis if k == len(columns) - 1 else "", margin=0.005)
+        panels.append([Panel(marks, across, Axis(f"{column.name}\n[{plain_unit(column.unit.symbol)}]"))])
+    return draw(
         sensor,
         "Channels as they were read; where there are more samples than fit, the least and greatest values of "
         "pieces of the recording. Red: findings, by their number.",
-        drawn,
+        panels,
+        0.5 + 1.15 * len(columns),
     )
 
 

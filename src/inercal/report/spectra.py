@@ -8,7 +8,9 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.report.html import Picture
-from inercal.report.style import COLOURS, INK, QUIET, WIDTH, few_powers, figure, svg
+from inercal.report.marks import Axis, Level, Line, Mark, Note, Panel
+from inercal.report.panels import draw
+from inercal.report.style import COLOURS, INK, QUIET
 
 LONGEST = 16384
 """Samples of a segment, at most."""
@@ -111,34 +113,20 @@ def spectra(
 ) -> Picture:
     """Spectra side by side: by the label of their axis, and by name, frequencies (f,) [Hz] and densities (f,) per Hz,
     drawn as their roots. ``mark`` [Hz] across all; ``levels``, by label of the axis, the root of a flat one."""
-    with figure(WIDTH, 2.7) as page:
-        for axes, (label, lines) in zip(
-            page.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True
-        ):
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            for k, (name, (frequency, density)) in enumerate(lines.items()):
-                f, root = _few(frequency, np.sqrt(density))
-                axes.plot(f, root, color=COLOURS[k % len(COLOURS)], lw=0.9, label=name)
-            if label in (levels or {}):
-                axes.axhline((levels or {})[label], color=INK, lw=0.7, ls=(0, (4, 3)), label="white")
-            if mark is not None:
-                axes.axvline(mark, color=QUIET, lw=0.8, ls=":", zorder=1)
-                axes.annotate(
-                    f"{mark:.3g} Hz", (mark, 1.0), (2, -1), ("data", "axes fraction"), "offset points",
-                    fontsize=6.5, va="top", color=INK,
-                )  # fmt: skip
-            axes.set_xlabel("frequency [Hz]")
-            axes.set_ylabel(label)
-            axes.grid(axis="both")
-            few_powers(axes.xaxis)
-            few_powers(axes.yaxis)
-            axes.minorticks_off()
-            axes.margins(x=0.01)
-            if lines:
-                axes.legend(loc="lower left", ncols=2)
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
+    row = []
+    for label, lines in panels.items():
+        marks: list[Mark] = []
+        for k, (name, (frequency, density)) in enumerate(lines.items()):
+            marks.append(Line(*_few(frequency, np.sqrt(density)), name, COLOURS[k % len(COLOURS)], 0.9))
+        if label in (levels or {}):
+            marks.append(Level((levels or {})[label], "white", INK, 0.7, (0, (4, 3))))
+        if mark is not None:
+            text = f"{mark:.3g} Hz"
+            marks.append(Level(mark, "", QUIET, 0.8, ":", upright=True))
+            marks.append(Note((mark, 1.0), text, va="top", shift=(2.0, -1.0), of_panel="y"))
+        across, up = Axis("frequency [Hz]", "log", margin=0.01), Axis(label, "log")
+        row.append(Panel(marks, across, up, grid="both", legend="inside" if lines else ""))
+    return draw(title, caption, [row], 2.7)
 
 
 def _few(f: Array, values: Array) -> tuple[Array, Array]:

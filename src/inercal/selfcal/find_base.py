@@ -17,7 +17,8 @@ from inercal.errors import StudyError
 from inercal.geometry.rotations import exp, from_matrix, log, multiply
 from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.observability import singular
-from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
@@ -116,17 +117,17 @@ def relative(beta: Array, stated: Base, found: Base) -> Array:
     return log(multiply(exp(beta), from_matrix(between)))
 
 
-def _batch(recording: Recording, settings: SelfcalSettings) -> Filtered:
+def _batch(recording: Recording, settings: SelfcalSettings) -> FilterResult:
     """The batch estimator."""
     return estimate(recording, problem(settings), "map")
 
 
-def _misfit(found: Filtered) -> float:
+def _misfit(found: FilterResult) -> float:
     """Sum of squares that the batch estimator made smallest; infinite where it did not end."""
     return float(np.nansum(found.nis)) if found.converged else math.inf
 
 
-def _bound(recording: Recording, settings: SelfcalSettings, found: Filtered) -> Array:
+def _bound(recording: Recording, settings: SelfcalSettings, found: FilterResult) -> Array:
     """(3, 3) covariance of beta about the base of ``settings`` [rad^2], along the path found."""
     assert found.history is not None
     coefficients = found.coefficients.copy()

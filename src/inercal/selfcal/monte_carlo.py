@@ -17,7 +17,8 @@ from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
-from inercal.selfcal.filters.filter_result import Filtered, Problem, problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.filters.run import estimate, load_kernels
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.platform.coefficients import names, product_slope, to_product
@@ -233,7 +234,7 @@ def campaign(
     )
 
 
-def expected_nis(experiment: Experiment, problem: Problem, kind: FilterKind, dims: float) -> float:
+def expected_nis(experiment: Experiment, problem: FilterProblem, kind: FilterKind, dims: float) -> float:
     """Expectation of the mean NIS of a filter whose rows have ``dims`` scalars, which is a little less than that.
 
     The truth is the same in all runs, and not drawn from the prior: the sum over a run is smaller by the number of
@@ -254,7 +255,7 @@ def expected_nis(experiment: Experiment, problem: Problem, kind: FilterKind, dim
 
 
 def one_run(
-    experiment: Experiment, problem: Problem, kind: FilterKind, rng: np.random.Generator
+    experiment: Experiment, problem: FilterProblem, kind: FilterKind, rng: np.random.Generator
 ) -> Mapping[str, Array | float]:
     """Simulate once, estimate, and compare with the truth; fields of `Campaign` by name."""
     simulated = simulate(experiment, rng)
@@ -277,7 +278,7 @@ def one_run(
     }
 
 
-def _joint(found: Filtered, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
+def _joint(found: FilterResult, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
     """Errors of attitude and coefficients together, and their covariance; coefficients alone without an attitude."""
     if found.state is None or len(found.state.attitude) != 4:
         return error, slope @ found.covariance @ slope.T

@@ -18,9 +18,9 @@ from inercal.records.record import Record
 from inercal.selfcal.before.bounds import Bounds, recorded_bounds
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.filters import run as filtering
-from inercal.selfcal.filters.filter_result import Filtered, Problem, problem
-from inercal.selfcal.filters.filter_result import found as found_by
+from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.filters.gaps import taken_anew
+from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA, names
 from inercal.selfcal.platform.recording import Recording
@@ -35,16 +35,17 @@ from inercal.selfcal.settings import KINDS, SelfcalSettings
 class Calibration:
     """An ``estimate``, and the evidence behind it for pictures and tests.
 
-    ``compared`` holds what the other estimators found, by kind, where a comparison was asked for; ``truth`` (p,) are
-    the coefficients in the product form where the study states them.
+    ``settings`` are those of the study; ``compared`` holds what the other estimators found, by kind, where a comparison
+    was asked for; ``truth`` (p,) are the coefficients in the product form where the study states them.
     """
 
     estimate: Estimate
-    problem: Problem
+    problem: FilterProblem
     recording: Recording
-    filtered: Filtered
+    filtered: FilterResult
     bounds: Bounds
-    compared: Mapping[str, Filtered] = field(default_factory=dict)
+    settings: SelfcalSettings
+    compared: Mapping[str, FilterResult] = field(default_factory=dict)
     truth: Array | None = None
 
 
@@ -105,7 +106,7 @@ def calibrate(
     bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=found.restarts)
     progress("looking for faults")
     faults = [*diagnose(recording, of, found, stated_errors(settings)), *taken_anew(recording, found)]
-    compared: dict[str, Filtered] = {}
+    compared: dict[str, FilterResult] = {}
     for kind in KINDS if compare else ():
         if kind != found.kind:
             progress(f"filtering ({kind})")
@@ -123,12 +124,12 @@ def calibrate(
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated, settings.base)
-    return Calibration(timed, of, recording, found, bounds, compared, truth)
+    return Calibration(timed, of, recording, found, bounds, settings, compared, truth)
 
 
-def _beside(other: Filtered, status: Status) -> dict[str, Any]:
+def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
     """What a comparison tells of an estimator."""
-    values, u = found_by(other)
+    values, u = product_form(other)
     each = zip(names(len(values)), values, u, strict=True)
     return {
         "parameters": {name: {"value": value, "u": own} for name, value, own in each},

@@ -30,7 +30,7 @@ from inercal.aoa.result.columns import columns, rows
 from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.records.column import Column
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
@@ -277,7 +277,8 @@ class Aoa:
         """The state with an alarm given, once."""
         if state.said & 1 << bit:
             return state
-        self._say(Finding(code, text, f"t = {t:.10g} s"))
+        harm = () if CODES[code].harm is Harm.NEVER else EVERYTHING
+        self._say(Finding(code, text, f"t = {t:.10g} s", harm))
         return state._replace(said=state.said | 1 << bit)
 
     def _lines(

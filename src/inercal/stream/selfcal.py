@@ -17,12 +17,14 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
-from inercal.findings import Finding
-from inercal.selfcal.filters.filter_result import History, Problem, State, Trace, known_in
+from inercal.findings import EVERYTHING, Finding
+from inercal.selfcal.filters.filter_result import Estimates, History, State, Trace, estimate_of
 from inercal.selfcal.filters.gaps import LONG, RECENT, advance, held_rate, usual
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.run import LOCK, recursive
 from inercal.selfcal.filters.run import load_kernels as load_filter
 from inercal.selfcal.platform.coefficients import KA1
+from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.result.columns import columns, rows
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
@@ -77,7 +79,7 @@ class Selfcal:
     ----------
     lines : Lines
         With the columns of a recording: rates ``wc`` (else ``gyro``), angles ``th``, accelerometers ``acc``.
-    problem : Problem
+    problem : FilterProblem
         Its filter must be a recursive one.
     every : float
         Interval [s] of the lines, in the time of the record; 0 for a line each row.
@@ -98,7 +100,7 @@ class Selfcal:
     def __init__(
         self,
         lines: Lines,
-        problem: Problem,
+        problem: FilterProblem,
         every: float = 0.0,
         say: Callable[[Finding], None] = lambda _: None,
     ) -> None:
@@ -156,20 +158,23 @@ class Selfcal:
         state, over, guessed = self._rate(state, sample.t, over)
         doubt, seen = guessed or state.doubt, bool(np.isfinite(th).all())
         filter_, trace = advance(
-            self._module, state.filter, self._problem, np.array([dt]), over[None], acc[None], th[None],
+            self._module,
+            state.filter,
+            self._problem,
+            Steps(np.array([dt]), over[None], acc[None], th[None]),
             (0,) if doubt else (),
-        )  # fmt: skip
+        )
         if trace.restarts:
             text = "the platform did not turn on as before: its attitude is taken anew from the encoders"
             state = self._gap(state, sample.t, text)
-        nis, dims = float(trace.nis[0]), int(trace.dims[0])
+        nis, dims = float(trace.estimates.nis[0]), int(trace.estimates.dims[0])
         state = state._replace(
             filter=filter_, next=following, t=sample.t, late=0, doubt=doubt and not seen,
             read=sample.t if seen else state.read,
         )  # fmt: skip
         if math.isfinite(nis):
             state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
-        return self._line(self._alarmed(state, trace), trace, nis)
+        return self._line(self._alarmed(state, trace), trace.estimates, nis)
 
     def finish(self, state: SelfcalState) -> Sequence[Output]:
         """Nothing."""
@@ -184,7 +189,7 @@ class Selfcal:
             return state._replace(begun=False), ()
         filter_ = self._module.initial(self._problem, th)
         state = state._replace(begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th)
-        return self._line(state, known_in(filter_, self._problem), math.nan)
+        return self._line(state, estimate_of(filter_, self._problem), math.nan)
 
     def _late(self, state: SelfcalState, t: float) -> SelfcalState:
         """A row left out, which is not later than the one before."""
@@ -228,8 +233,8 @@ class Selfcal:
     def _alarmed(self, state: SelfcalState, trace: Trace) -> SelfcalState:
         """The state with the alarms that were due now."""
         above = state.nis - state.dims > _BAND * math.sqrt(2.0 * state.dims)
-        told = trace.coefficients, trace.u, trace.attitude_u
-        without_scale = bool((trace.coefficients[:, KA1] == -1.0).any())
+        out = trace.estimates
+        without_scale = bool((out.coefficients[:, KA1] == -1.0).any())
         alarms = (
             (
                 state.rows >= _SETTLED and above,
@@ -238,7 +243,8 @@ class Selfcal:
                 f"{state.dims / max(state.rows, 1):.4g}: the rows contradict the model or the stated noise",
             ),
             (
-                without_scale or not all(np.isfinite(each).all() for each in told),
+                without_scale
+                or not all(np.isfinite(each).all() for each in (out.coefficients, out.u, out.attitude_u)),
                 "filter_fails",
                 "the filter diverged: its coefficients or their uncertainties are no numbers any more",
             ),
@@ -250,16 +256,21 @@ class Selfcal:
         )
         for k, (due, code, text) in enumerate(alarms):
             if due and not state.said & 1 << k:
-                self._say(Finding(code, text, f"t = {state.t:.10g} s"))
+                self._say(Finding(code, text, f"t = {state.t:.10g} s", EVERYTHING))
                 state = state._replace(said=state.said | 1 << k)
         return state
 
     def _line(
-        self, state: SelfcalState, known: History | Trace, nis: float
+        self, state: SelfcalState, estimate: History | Estimates, nis: float
     ) -> tuple[SelfcalState, Sequence[Output]]:
         """The state with its angles, and the line where one is due."""
         (row,) = rows(
-            known.attitude, known.attitude_u, known.coefficients, known.u, state.angles, self._problem.world
+            estimate.attitude,
+            estimate.attitude_u,
+            estimate.coefficients,
+            estimate.u,
+            state.angles,
+            self._problem.world,
         )
         state = state._replace(angles=row[:3].copy())
         slots = state.slots.at(state.t, self._every)
@@ -269,7 +280,7 @@ class Selfcal:
         return state._replace(slots=slots), [[state.t, *row.tolist(), nis, mean]]
 
 
-def filter_of(problem: Problem) -> ModuleType:
+def filter_of(problem: FilterProblem) -> ModuleType:
     """The module of the filter of a problem; raises `StudyError` for one that works on whole recordings only."""
     module = recursive(problem.filter.kind)
     if module is None:
@@ -281,7 +292,7 @@ def filter_of(problem: Problem) -> ModuleType:
     return module
 
 
-def load_kernels(problem: Problem) -> None:
+def load_kernels(problem: FilterProblem) -> None:
     """Load, or compile, the kernels of a live calibration."""
     load_filter(problem.filter.kind, problem)
     p = len(problem.prior)

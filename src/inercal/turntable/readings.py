@@ -98,7 +98,7 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
         )
         starts = [int(rows[0]) + 1 for rows in short]
         means = replace(
-            means, findings=(*means.findings, Finding("poor_section", text, places("row", starts)))
+            means, findings=(*means.findings, Finding("poor_section", text, places("row", starts), ()))
         )
     nowhere = np.flatnonzero(~np.isfinite(_places(record, angles)) & np.isfinite(values).any(axis=1)) + 1
     if not len(nowhere):

@@ -17,7 +17,8 @@ from typing import Any, cast
 
 from inercal import __version__
 from inercal._jit import source_hash
-from inercal.estimate.result import Estimate, without_parameters
+from inercal.estimate.basis import Basis
+from inercal.estimate.result import Estimate, timed
 from inercal.estimate.runs import Executor, Processes, Serial
 from inercal.examples import EXAMPLES, shipped
 from inercal.findings import Finding, Status
@@ -86,21 +87,24 @@ def validate(executor: Executor, progress: Callable[[int, int], None] | None = N
     ]
     failed = [row["name"] for row in rows if not row["passed"]]
     sources = {row["source"]: SOURCES[row["source"]] for row in rows}
-    return without_parameters(
+    basis = Basis(
         "validate",
+        "a case passes where every number found is within its limit of the number expected",
+        traceability={"date": datetime.now(UTC).isoformat(timespec="seconds")},
+        inputs=tuple(shipped(file) for name in USED for file in EXAMPLES[name].records),
+        provenance={"versions": _versions(), "machine": _machine(), "sources_sha256": source_hash()},
+        references=tuple(f"{short}: {full}" for short, full in sources.items()),
+    )
+    estimate = Estimate.without(
+        basis,
         Status.INCONSISTENT if failed else Status.OK,
         f"{len(failed)} of {total} cases failed: {', '.join(failed)}"
         if failed
         else f"all {total} cases passed",
         findings=tuple(_finding(row) for row in rows if not row["passed"]),
-        model="a case passes where every number found is within its limit of the number expected",
-        traceability={"date": datetime.now(UTC).isoformat(timespec="seconds")},
-        inputs=tuple(shipped(file) for name in USED for file in EXAMPLES[name].records),
-        provenance={"versions": _versions(), "machine": _machine(), "sources_sha256": source_hash()},
-        timing={"solve": time.perf_counter() - began},
         result={"cases": rows, "systems": dict(SYSTEMS), "sources": sources},
-        references=tuple(f"{short}: {full}" for short, full in sources.items()),
     )
+    return timed(estimate, began)
 
 
 def _find_all(numbers: Iterable[int]) -> list[Numbers]:

@@ -10,7 +10,8 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis
 from inercal.selfcal.before.bounds import Bounds, bounds
-from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import KA0, KG0, NAMES, to_linear
 from inercal.selfcal.platform.plan import Plan, Rest, motion, path
@@ -34,7 +35,7 @@ def _at_rest(noise: Noise, prior: Array) -> Bounds:
     """Bounds of a platform that rests for 100 s, rows every 0.5 s, on an earth that does not turn."""
     asked = replace(_study(), plan=Plan((Rest(100.0),), step=0.5), noise=noise, prior=prior)
     posed = problem(asked)
-    posed = replace(posed, world=replace(posed.world, earth=np.zeros(3)))
+    posed = replace(posed, world=posed.world._replace(earth=np.zeros(3)))
     return bounds(motion(Plan((Rest(100.0),), step=0.5), posed.world), posed)
 
 
@@ -71,7 +72,7 @@ def _level_axis() -> list[float]:
 
 
 @cache
-def _found(kind: FilterKind) -> Filtered:
+def _found(kind: FilterKind) -> FilterResult:
     """Result of an estimator on the recording that ships."""
     settings = _study()
     return estimate(recording_of(record_of("selfcal"), settings), problem(settings), kind, history=False)

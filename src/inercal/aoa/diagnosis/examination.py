@@ -29,9 +29,7 @@ from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import STATES, AoaSettings
 from inercal.estimate.hypotheses import Fitted, tried
-from inercal.findings import Finding
-
-THETA = ("theta",)
+from inercal.findings import EVERYTHING, Finding
 
 #: number of states -> what those with so many have beside the ones with fewer
 _BESIDE = {
@@ -148,7 +146,7 @@ def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
         f"theta is about {middle:.0f} deg, the model on its back: exchange or reverse the accelerometers across it, or "
         'state roll = "180 deg" under [model] if it was mounted so'
     )
-    return [Finding("not_stated", text)]
+    return [Finding("not_stated", text, harm=("theta",))]
 
 
 def diagnose(
@@ -193,7 +191,9 @@ def _livelier(settings: AoaSettings, snap: float) -> AoaSettings:
 def _of_snap(settings: AoaSettings, snap: float) -> Finding:
     """``unmodelled``: a larger snap makes a recording fit."""
     text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
-    return Finding("unmodelled", f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]', harm=THETA)
+    return Finding(
+        "unmodelled", f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]', harm=EVERYTHING
+    )
 
 
 def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
@@ -212,7 +212,7 @@ def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
         f"the recording shows {_BESIDE[enough]}, which {stated} states leave out: their angle is wrong by more than it "
         f"claims, write states = 19{at_least} under [estimator]"
     )
-    return [Finding("unmodelled", text, harm=THETA)]
+    return [Finding("unmodelled", text, harm=EVERYTHING)]
 
 
 def _errors(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
@@ -234,11 +234,11 @@ def _contradiction(part: Recording, settings: AoaSettings, now: FitQuality) -> F
             acc[:, k] = np.nan
             if fit_quality(replace(part, acc=acc), settings).fits:
                 text = f"{name} contradicts the others, which fit without it: check its channel, axis and position"
-                return Finding("contradiction", text, harm=THETA)
+                return Finding("contradiction", text, harm=EVERYTHING)
     worst = (*names, "gyro")[int(np.argmax(now.by_sensor))]
     motion = "" if part.spatial else ", or the model rolls or yaws, which only gyro_roll and gyro_yaw tell"
     text = (
         f"the sensors contradict each other, {worst} most, and no single error explains it: check the study's axes, "
         f"positions and noise{motion}"
     )
-    return Finding("contradiction", text, harm=THETA)
+    return Finding("contradiction", text, harm=EVERYTHING)

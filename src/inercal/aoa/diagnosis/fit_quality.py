@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.fusion.loop import OUTPUTS
-from inercal.aoa.fusion.problem import Problem, problem
+from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import State, advance, initial
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
@@ -41,7 +41,7 @@ class FitQuality:
     theta: Array
     rate: Array
     off: dict[str, float]
-    problem: Problem
+    problem: FilterProblem
 
     @property
     def by_sensor(self) -> Array:
@@ -133,7 +133,7 @@ def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19
     return FitQuality(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)
 
 
-def _followed(posed: Problem, t: Array, rows: Array) -> tuple[State, Array]:
+def _followed(posed: FilterProblem, t: Array, rows: Array) -> tuple[State, Array]:
     """The state after rows, and what the fusion says of each (m, OUTPUTS + N + 1); NaN from where on it is given up, as
     it loses the angle every few rows and starting anew takes the time of a hundred steps."""
     state, done, starts = initial(posed), 0, 0

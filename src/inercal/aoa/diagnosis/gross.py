@@ -23,6 +23,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import Hypothesis
+from inercal.findings import EVERYTHING
 from inercal.units import STANDARD_GRAVITY
 
 Change = Callable[[Recording, AoaSettings], Case]
@@ -80,7 +81,7 @@ def gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
 
 def _fault(code: str, text: str, change: Change) -> Hypothesis[Case]:
     """A fault that a change of the recording or its study takes out."""
-    return Hypothesis(text.split(":")[0], code, text, lambda case, _: change(*case), harm=("theta",))
+    return Hypothesis(text.split(":")[0], code, text, lambda case, _: change(*case), harm=EVERYTHING)
 
 
 def _shown(recording: Recording, settings: AoaSettings) -> Array:

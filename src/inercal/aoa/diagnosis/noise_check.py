@@ -11,7 +11,7 @@ from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
 
@@ -87,6 +87,6 @@ def _finding(code: str, key: str, names: list[str], ratio: float, stated: float)
     """Noise in words."""
     unit, size = ("g", STANDARD_GRAVITY) if key == "accelerometer" else ("deg/s", math.pi / 180.0)
     now, then = f"{stated / size:.3g} {unit}", f"{ratio * stated / size:.2g} {unit}"
-    harm = ("theta",) if code == "excess_scatter" else ()
+    harm = EVERYTHING if code == "excess_scatter" else ()
     text = f"{', '.join(names)}: noise is {ratio:.2g} times the {now} that the study states: write {key} = "
     return Finding(code, f'{text}"{then}" under [noise], unless its unit is wrong', harm=harm)

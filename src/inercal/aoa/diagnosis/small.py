@@ -21,6 +21,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, search
+from inercal.findings import EVERYTHING
 from inercal.units import STANDARD_GRAVITY, Quantity, parse_unit
 
 
@@ -99,7 +100,7 @@ def _error(
     def corrected(case: Case, values: Array) -> Case:
         return without(*case, float(values[0]))
 
-    return Hypothesis(name, code, sentence, corrected, (name,), step, bounds, harm=("theta",))
+    return Hypothesis(name, code, sentence, corrected, (name,), step, bounds, harm=EVERYTHING)
 
 
 def _axis(settings: AoaSettings, k: int) -> Hypothesis[Case]:

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.arrays import Array
 
 MEMORY = 60.0
@@ -47,7 +47,7 @@ def next_due(t: Array, at: int, since: float) -> int:
     return k
 
 
-def fade(x: Array, P: Array, problem: Problem, steps: int) -> Array:
+def fade(x: Array, P: Array, problem: FilterProblem, steps: int) -> Array:
     """Let the constants of the state ``x`` (n,), ``P`` (n, n) fade by so many steps, in place.
 
     Returns F (n, n) of x' = F x + what the prior tells. States that move stay as they are.

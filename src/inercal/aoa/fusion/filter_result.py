@@ -10,7 +10,7 @@ import numpy as np
 from inercal.aoa.angles import Angles
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.model import ROLL
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, State, Trace, advance, initial
 from inercal.aoa.fusion.smoother import smooth
 from inercal.aoa.reading.clock import later
@@ -29,7 +29,7 @@ _BLOCK = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
+class FilterResult:
     """What the fusion found.
 
     Attributes
@@ -76,7 +76,9 @@ class Filtered:
     roll_u: Array | None = None
 
 
-def estimate(recording: Recording, problem: Problem, smoothed: bool = False, where: object = "t") -> Filtered:
+def estimate(
+    recording: Recording, problem: FilterProblem, smoothed: bool = False, where: object = "t"
+) -> FilterResult:
     """Angles of a recording, causal or from all of it.
 
     Raises
@@ -108,7 +110,7 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
     judged = innovations[taken][t - t[0] >= min(SETTLED, (t[-1] - t[0]) / 2.0)] if len(t) else innovations
     squared = np.square(judged[np.isfinite(judged)])
     m = problem.size
-    return Filtered(
+    return FilterResult(
         theta=told[:, 0],
         u=told[:, 1],
         rate=told[:, 2],
@@ -129,13 +131,15 @@ def estimate(recording: Recording, problem: Problem, smoothed: bool = False, whe
     )
 
 
-def roll_of(problem: Problem, kept: Array) -> Array:
+def roll_of(problem: FilterProblem, kept: Array) -> Array:
     """Roll, in (-pi, pi], and its standard uncertainty (k, 2) [rad] from kept states (k, 2 m)."""
     k = int(problem.places[ROLL])
     return np.column_stack([principal(kept[:, k]), kept[:, problem.size + k]])
 
 
-def _with_roll(problem: Problem, t: Array, rows: Array, every: int) -> tuple[State, Trace, Array, Array]:
+def _with_roll(
+    problem: FilterProblem, t: Array, rows: Array, every: int
+) -> tuple[State, Trace, Array, Array]:
     """The causal filter's state and trace, states kept at each ``every``-th row, and roll (n, 2) at each.
 
     All states of all rows would be many: they are there for some rows at a time.
@@ -155,7 +159,7 @@ def _with_roll(problem: Problem, t: Array, rows: Array, every: int) -> tuple[Sta
     return state, Trace(out, tuple(starts)), kept, rolls
 
 
-def of_fusion(filtered: Filtered, states: int) -> Angles:
+def of_fusion(filtered: FilterResult, states: int) -> Angles:
     """The angles of the fusion with so many ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
     way = "smoothed" if filtered.smoothed else "fusion"
     return Angles(f"{way} {states}", filtered.theta, filtered.u, filtered.rate, filtered.rate_u)

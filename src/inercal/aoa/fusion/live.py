@@ -17,7 +17,7 @@ from inercal.aoa.fusion import fading, loop
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import roll_of
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.clock import PATIENCE, later
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
@@ -87,7 +87,7 @@ class Live:
 
     Parameters
     ----------
-    problem : Problem
+    problem : FilterProblem
     state : LiveState, optional
         Where an earlier one was left, of the same problem; from nothing if absent.
     where : object
@@ -100,7 +100,7 @@ class Live:
     ...     told = live.feed(t, acceleration, gyro)
     """
 
-    def __init__(self, problem: Problem, state: LiveState | None = None, where: object = "t") -> None:
+    def __init__(self, problem: FilterProblem, state: LiveState | None = None, where: object = "t") -> None:
         self._problem, self._where = problem, where
         known = LiveState(fusion.initial(problem), np.empty(0), 0) if state is None else state
         self._fusion, self._waiting, self._late = _apart(known.fusion), known.waiting, known.late
@@ -212,7 +212,7 @@ class Live:
         return rest
 
 
-def load_kernels(problem: Problem) -> None:
+def load_kernels(problem: FilterProblem) -> None:
     """Load, or compile, the kernels of the causal fusion."""
     none = np.empty(0)
     rows = np.empty((0, problem.count + BESIDE))

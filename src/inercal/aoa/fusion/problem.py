@@ -25,7 +25,7 @@ _ROLL_U = math.radians(0.1)
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class FilterProblem:
     """All that the fusion is told beside the recording.
 
     ``names`` (n,) of the states; ``mean`` (n,) and ``covariance`` (n, n) of all but the four of motion, which have none
@@ -72,7 +72,7 @@ def problem(
     settings: AoaSettings,
     spatial: bool = False,
     posterior: tuple[Mapping[str, float], Mapping[tuple[str, str], float]] | None = None,
-) -> Problem:
+) -> FilterProblem:
     """The problem that a study states.
 
     ``spatial``: the recording has gyros for roll and yaw. ``posterior``: values of coefficients by name, and their
@@ -120,7 +120,9 @@ def problem(
     places[model.ROWS : model.ROWS + len(moving)] = moving
     if posterior is not None:
         _known_before(names, mean, covariance, posterior)
-    return Problem(layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry)
+    return FilterProblem(
+        layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry
+    )
 
 
 def _stationary(of: Resonance) -> tuple[float, float]:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from inercal.aoa.fusion.filter_result import Filtered
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.filter_result import FilterResult
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
@@ -23,7 +23,9 @@ _STEEP = 50.0
 """Largest tangent of theta: near 90 deg roll and yaw are one, and the roll is what the fusion says."""
 
 
-def tracked(recording: Recording, problem: Problem, filtered: Filtered) -> tuple[Array, Array] | None:
+def tracked(
+    recording: Recording, problem: FilterProblem, filtered: FilterResult
+) -> tuple[Array, Array] | None:
     """Roll (n,) and its standard uncertainty (n,) [rad] at each row, NaN where theta is; None where it is not tracked.
 
     Of smoothed angles the uncertainty is interpolated between the kept times.

@@ -17,7 +17,7 @@ import numpy as np
 from inercal.aoa.fusion import fading, loop
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS
 from inercal.aoa.fusion.model import GRAVITY, GYRO_BIAS, RESONATORS, ROLL, ROLL_COSINE
-from inercal.aoa.fusion.problem import START, Problem
+from inercal.aoa.fusion.problem import START, FilterProblem
 from inercal.aoa.reading.clock import HELD
 from inercal.arrays import Array
 
@@ -66,7 +66,7 @@ class Trace(NamedTuple):
     starts: tuple[Start, ...]
 
 
-def initial(problem: Problem) -> State:
+def initial(problem: FilterProblem) -> State:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
     return State(
@@ -82,7 +82,7 @@ def initial(problem: Problem) -> State:
 
 def advance(
     state: State,
-    problem: Problem,
+    problem: FilterProblem,
     t: Array,
     rows: Array,
     kept: Array | None = None,
@@ -144,7 +144,7 @@ def advance(
     return State(x, P, turns, before, running, held, since), Trace(out[:at], tuple(starts))
 
 
-def unknown(problem: Problem) -> list[int]:
+def unknown(problem: FilterProblem) -> list[int]:
     """Places of the states that a start does not know from before: motion, flexure of the sting, and roll, of which a
     gap tells as little."""
     flexure, roll = problem.places[RESONATORS], problem.places[ROLL]
@@ -152,7 +152,7 @@ def unknown(problem: Problem) -> list[int]:
     return [0, 1, 2, 3, *of_flexure, *((int(roll),) if roll >= 0 else ())]
 
 
-def start(x: Array, P: Array, turns: Array, problem: Problem, t: Array, rows: Array) -> bool:
+def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, rows: Array) -> bool:
     """Put motion into ``x`` and ``P`` as a few rows tell it at the first of them; False where they tell no angle.
 
     Theta is that which fits the medians of the accelerometers best, the rate the gyro's or, without one, that at which
@@ -207,7 +207,7 @@ def _medians(rows: Array) -> Array:
     return np.asarray(0.5 * (middle[0] + middle[1]))
 
 
-def _angle(force: Array, level: float, problem: Problem) -> float:
+def _angle(force: Array, level: float, problem: FilterProblem) -> float:
     """Theta that forward and upward specific force (2,) show at rest; NaN where they are."""
     forward, up = force.tolist()
     if abs(level) > _ACROSS:

@@ -24,7 +24,7 @@ from inercal._jit import kernel
 from inercal.aoa.fusion import fading, loop
 from inercal.aoa.fusion.loop import OUTPUTS, congruent, root, write
 from inercal.aoa.fusion.model import COUNT, MOVING, ROWS, STATES
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, unknown
 
 Array: TypeAlias = NDArray[np.float64]
@@ -35,7 +35,7 @@ BLOCK = 256
 
 
 def smooth(
-    problem: Problem,
+    problem: FilterProblem,
     t: Array,
     rows: Array,
     starts: tuple[Start, ...],
@@ -48,7 +48,7 @@ def smooth(
 
     Parameters
     ----------
-    problem : Problem
+    problem : FilterProblem
     t, rows
         As `inercal.aoa.fusion.run.advance` took them.
     starts : tuple of Start
@@ -73,7 +73,7 @@ def smooth(
     return out
 
 
-def load_kernels(problem: Problem) -> None:
+def load_kernels(problem: FilterProblem) -> None:
     """Load, or compile, the kernels."""
     x, P = problem.mean.copy(), problem.covariance.copy()
     start = Start(0, x, P, np.zeros(problem.count + 3), True, 0.0)
@@ -81,7 +81,8 @@ def load_kernels(problem: Problem) -> None:
 
 
 def _stretch(
-    problem: Problem, begin: Start, t: Array, rows: Array, lam: Array, Lam: Array, out: Array, kept: Array, every: int
+    problem: FilterProblem, begin: Start, t: Array, rows: Array, lam: Array, Lam: Array, out: Array, kept: Array,
+    every: int,
 ) -> None:  # fmt: skip
     """Smooth from one start on; ``lam`` and ``Lam`` go from the end of the stretch to its beginning."""
     given = (problem.geometry, problem.places, problem.constants)

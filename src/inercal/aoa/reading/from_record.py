@@ -12,7 +12,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.arrays import Array
 from inercal.errors import RecordError
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.records.checks.samples import plateaus
 from inercal.records.checks.values import is_dead, saturated
 from inercal.records.clocks import usable_interval
@@ -131,7 +131,7 @@ class _Rows:
         """Temperature [degC] at the stamps of a sensor; None where none was recorded."""
         if "temperature" not in self.record or not np.isfinite(self.record["temperature"].values).any():
             text = f"{name}: its temperature terms are left out, the record has no temperature"
-            self.findings.append(Finding("not_stated", text))
+            self.findings.append(Finding("not_stated", text, harm=EVERYTHING))
             return None
         column = self.record["temperature"]
         known = later(column.t, where=self.where)
@@ -226,12 +226,12 @@ def _said(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding
     if rows := np.flatnonzero(out).tolist():
         where = "flat at an extreme" if how.range is None else "at or beyond the range, or flat at an extreme"
         text = f"{name}: {counted(len(rows), 'sample')} {where}, left out"
-        findings.append(Finding("saturation", text, places("row", np.array(rows) + 1)))
+        findings.append(Finding("saturation", text, places("row", np.array(rows) + 1), harm=()))
     if rows := np.flatnonzero(stuck).tolist():
         text = (
             f"{name}: {counted(len(rows), 'sample')} of one number while the others go on, left out as stuck"
         )
-        findings.append(Finding("dead_channel", text, places("row", np.array(rows) + 1)))
+        findings.append(Finding("dead_channel", text, places("row", np.array(rows) + 1), harm=()))
     return findings
 
 
@@ -250,7 +250,7 @@ def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding
         backward = bool((np.diff(t[np.isfinite(t)]) < 0.0).any())
         text = f"t: {counted(left.size, 'row')} not later than those before, left out"
         code = "backward_time" if backward else "duplicate_time"
-        findings.append(Finding(code, text, places("row", left + 1)))
+        findings.append(Finding(code, text, places("row", left + 1), harm=()))
     return findings
 
 
@@ -267,7 +267,7 @@ def of_sensors(there: list[str], gyros: list[str], record: Record, settings: Aoa
             if name in record and np.isfinite(record[name].values).any():
                 why = "never changes"
             code = "dead_channel" if why == "never changes" else "nan"
-            findings.append(Finding(code, f"{name} {why}: angles are found without it"))
+            findings.append(Finding(code, f"{name} {why}: angles are found without it", harm=()))
     if GYROS[0] not in gyros:
         why = "is not in the record" if GYROS[0] not in record else "never changes or holds no number"
         text = f"gyro {why}: angles are found from accelerometers alone, less well where the model moves fast"
@@ -278,5 +278,5 @@ def of_sensors(there: list[str], gyros: list[str], record: Record, settings: Aoa
     unknown = [name for name in record.columns if name not in settings.layout.names and name[1:].isdigit()]
     if unknown:
         text = f"{', '.join(unknown)}: not under [sensors] of the study, not used"
-        findings.append(Finding("not_stated", text))
+        findings.append(Finding("not_stated", text, harm=()))
     return findings

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.inputs import Source
+from inercal.units import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +34,8 @@ class Recording:
         of a turn.
     masked : (n, N + 1) bool or None
         Samples of accelerometers and gyro that were saturated.
-    temperature : str or None
-        That was recorded, its mean in words.
+    temperature : Quantity or None
+        That was recorded: its mean and standard deviation.
     """
 
     t: Array
@@ -48,7 +49,7 @@ class Recording:
     masked: NDArray[np.bool_] | None = None
     findings: tuple[Finding, ...] = ()
     sources: tuple[Source, ...] = ()
-    temperature: str | None = None
+    temperature: Quantity | None = None
 
     @property
     def rows(self) -> Array:

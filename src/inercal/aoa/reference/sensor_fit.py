@@ -92,7 +92,7 @@ class Verified:
     def __getitem__(self, name: str) -> Parameter:
         """The coefficient of that name."""
         k = self.names.index(name)
-        return Parameter(name, float(self.values[k]), float(self.u[k]), 2.0, math.inf, self.units[k])
+        return Parameter(name, float(self.values[k]), float(self.u[k]), math.inf, self.units[k])
 
 
 def fit(recording: Recording, settings: AoaSettings) -> Verified:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.fusion import model
 from inercal.aoa.fusion.filter_result import SETTLED
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as stated_problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.fusion.smoother import smooth
@@ -81,7 +81,7 @@ class Parts:
 
 
 def parts(
-    recording: Recording, problem: Problem, settings: AoaSettings, smoothed: bool, known: Mask
+    recording: Recording, problem: FilterProblem, settings: AoaSettings, smoothed: bool, known: Mask
 ) -> Parts:
     """Split what the fusion says of its uncertainty by where it comes from.
 
@@ -129,7 +129,7 @@ def parts(
     return Parts(_items(found, (ANGLE, *problem.nuisances)), common, by_gravity)
 
 
-def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:
+def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]:
     """All sources that a problem has, but for gravity and a stated roll."""
     noise, prior, timing = settings.noise, settings.prior, settings.timing
     before = _known_before(problem, settings)
@@ -165,7 +165,7 @@ def sources(problem: Problem, settings: AoaSettings) -> tuple[Source, ...]:
     )  # fmt: skip
 
 
-def _known_before(problem: Problem, settings: AoaSettings) -> tuple[str, ...]:
+def _known_before(problem: FilterProblem, settings: AoaSettings) -> tuple[str, ...]:
     """States whose prior is not that of the study."""
     usual = stated_problem(settings, problem.spatial).covariance
     return tuple(
@@ -176,7 +176,7 @@ def _known_before(problem: Problem, settings: AoaSettings) -> tuple[str, ...]:
 
 
 def _run(
-    problem: Problem, t: Array, rows: Array, smoothed: bool, judged: Mask
+    problem: FilterProblem, t: Array, rows: Array, smoothed: bool, judged: Mask
 ) -> tuple[float, Array, Array, Array]:
     """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are ``judged`` (n,)."""
     state, trace = advance(initial(problem), problem, t, rows, last=True)
@@ -185,7 +185,7 @@ def _run(
     return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
 
 
-def _enlarged(problem: Problem, rows: Array, source: Source) -> tuple[Problem, Array]:
+def _enlarged(problem: FilterProblem, rows: Array, source: Source) -> tuple[FilterProblem, Array]:
     """The problem and its rows with the variance of a source larger by `_STEP`."""
     by = 1.0 + _STEP
     constants, covariance = problem.constants.copy(), problem.covariance.copy()

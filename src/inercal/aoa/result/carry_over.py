@@ -20,7 +20,6 @@ from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
-from inercal.findings import Status
 
 WHERE = "estimator.prior"
 
@@ -105,7 +104,7 @@ def _usable(path: str | Path, settings: AoaSettings) -> Estimate:
     if earlier.command != COMMAND:
         raise StudyError(WHERE, f"{path} is a result of {earlier.command}, expected one of {COMMAND}")
     if not is_verified(earlier):
-        if earlier.status is not Status.OK:
+        if not earlier.status.done:
             raise StudyError(
                 WHERE,
                 f"{path} ended {earlier.status.value} ({earlier.message}), expected a run that ended ok",

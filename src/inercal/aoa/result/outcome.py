@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, Filtered
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reference.corrections import as_stated, told
 from inercal.aoa.result import verdict
-from inercal.aoa.result.budget import parts
+from inercal.aoa.result.budget import ANGLE, parts
 from inercal.aoa.result.systematic import by_fusion, gravity_u
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.arrays import Array
-from inercal.estimate.conditions import conditions
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.estimate.basis import Basis, conditions_of, studied
+from inercal.estimate.budget import Uncertainty
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ _OF_FUSION = (
 def assemble(
     recording: Recording,
     settings: AoaSettings,
-    problem: Problem,
-    filtered: Filtered,
+    problem: FilterProblem,
+    filtered: FilterResult,
     findings: Sequence[Finding],
     delay: Delay | None,
     points: Iterable[Point] = (),
@@ -95,8 +96,8 @@ def assemble(
     recording : Recording
         As it was filtered.
     settings : AoaSettings
-    problem : Problem
-    filtered : Filtered
+    problem : FilterProblem
+    filtered : FilterResult
     findings : sequence of Finding
         Of plausibility and diagnosis, beside those of the recording.
     delay : Delay or None
@@ -124,10 +125,10 @@ def assemble(
     said = _said(recording, [*findings, *([] if of_sting is None else [of_sting])])
     result = _result(recording, settings, angles, delay, points, errors, compared)
     result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
-    fields = _fields(recording, settings, angles, SPATIAL if problem.spatial else MODEL + FLAT)
-    fields["references"] = REFERENCES + _OF_FUSION
+    model = SPATIAL if problem.spatial else MODEL + FLAT
+    basis = _basis(recording, settings, angles, model, REFERENCES + _OF_FUSION)
     dof = float(max(int(np.isfinite(filtered.innovations).sum()) - len(names), 1))
-    fields["statistics"] |= {
+    statistics = _statistics(recording, angles) | {
         "dof": dof,
         "residual_rms": _rms(filtered.innovations),
         "nis_mean": filtered.nis_mean,
@@ -135,7 +136,9 @@ def assemble(
     }
     status, message = verdict.of_fusion(recording, filtered, angles, said)
     if status is Status.NOT_CONVERGED:
-        return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
+        return Estimate.without(
+            basis, status, message, findings=said, statistics=statistics, result=result, beside=(ANGLE,)
+        )
     split = parts(recording, problem, settings, filtered.smoothed, np.isfinite(filtered.theta))
     covariance = P + split.common
     u = np.sqrt(np.diag(covariance))
@@ -148,21 +151,17 @@ def assemble(
         result["gravity"] = {"value": settings.site.gravity, "u": gravity_u(settings), "slopes": slopes}
     # of numbers that are not to be used, more would be noise
     at_prior = verdict.left_at_prior(names, np.sqrt(np.diag(P)) / before) if status is Status.OK else None
-    return Estimate(
-        command=COMMAND,
-        names=names,
-        units=tuple(unit_of(name) for name in names),
-        values=values,
-        covariance=covariance,
-        dof=np.full(len(names), dof),
-        k=np.full(len(names), coverage_factor(dof)),
-        status=status,
-        message=message,
+    return Estimate.of(
+        basis,
+        names,
+        [unit_of(name) for name in names],
+        values,
+        Uncertainty(covariance, np.full(len(names), dof), split.budget, split.common),
+        (status, message),
         findings=said if at_prior is None else (*said, at_prior),
-        budget=split.budget,
+        statistics=statistics,
         result=result,
-        common=split.common,
-        **fields,
+        beside=(ANGLE,),
     )
 
 
@@ -182,9 +181,16 @@ def assemble_paper(
     result = _result(recording, settings, angles, delay, points, errors, compared)
     result |= _of_sensors(settings, verified) | {"nis_mean": None, "posterior": {}}
     status, message = verdict.of_method(angles, said)
-    fields = _fields(recording, settings, angles, FLAT.removeprefix("; "))
-    fields["model"] = f"{angles.method}; {fields['model']}"
-    return without_parameters(COMMAND, status, message, findings=said, result=result, **fields)
+    model = f"{angles.method}; {FLAT.removeprefix('; ')}"
+    return Estimate.without(
+        _basis(recording, settings, angles, model, REFERENCES),
+        status,
+        message,
+        findings=said,
+        statistics=_statistics(recording, angles),
+        result=result,
+        beside=(ANGLE,),
+    )
 
 
 def _said(recording: Recording, findings: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -220,34 +226,30 @@ def _of_sensors(settings: AoaSettings, verified: Verified | None) -> dict[str, A
     }
 
 
-def _fields(recording: Recording, settings: AoaSettings, angles: Angles, model: str) -> dict[str, Any]:
-    """What estimates of all methods hold."""
+def _statistics(recording: Recording, angles: Angles) -> dict[str, float]:
+    """Figures of all methods."""
     t = recording.t[later(recording.t)]
     step = float(np.median(np.diff(t))) if len(t) > 1 else math.nan
-    known = angles.theta[np.isfinite(angles.theta)]
-    rate = angles.rate[np.isfinite(angles.rate)]
     return {
-        "model": model,
-        "statistics": {
-            "samples": float(len(recording.t)),
-            "rate_hz": 1.0 / step,
-            "angles": float(len(known)),
-        },
-        "conditions": conditions(
-            settings,
-            recording.temperature,
-            {
-                "duration_s": float(t[-1] - t[0]) if len(t) else 0.0,
-                "theta_rad": _span(known),
-                "rate_rad_s": float(np.abs(rate).max()) if len(rate) else None,
-            },
-            sensors=geometry(settings),
-        ),
-        "traceability": settings.traceability,
-        "inputs": recording.sources,
-        "provenance": provenance(settings.given),
-        "references": REFERENCES,
+        "samples": float(len(recording.t)),
+        "rate_hz": 1.0 / step,
+        "angles": float(np.isfinite(angles.theta).sum()),
     }
+
+
+def _basis(
+    recording: Recording, settings: AoaSettings, angles: Angles, model: str, references: tuple[str, ...]
+) -> Basis:
+    """What an estimate by any method rests on."""
+    t = recording.t[later(recording.t)]
+    rate = angles.rate[np.isfinite(angles.rate)]
+    ranges = {
+        "duration_s": float(t[-1] - t[0]) if len(t) else 0.0,
+        "theta_rad": _span(angles.theta[np.isfinite(angles.theta)]),
+        "rate_rad_s": float(np.abs(rate).max()) if len(rate) else None,
+    }
+    conditions = conditions_of(settings, recording.temperature, ranges, sensors=geometry(settings))
+    return studied(COMMAND, settings, recording.sources, model, references, conditions)
 
 
 def _result(

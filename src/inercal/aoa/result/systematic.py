@@ -17,8 +17,8 @@ import numpy as np
 
 from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.fusion import model
-from inercal.aoa.fusion.filter_result import Filtered, estimate, of_fusion
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.roll import tracked
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
@@ -59,7 +59,7 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     return tuple(found)
 
 
-def leaning(problem: Problem, lean: Lean, settings: AoaSettings) -> Problem:
+def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> FilterProblem:
     """The problem of the fusion under a change, which moves also what an earlier run found."""
     constants, mean = problem.constants.copy(), problem.mean.copy()
     constants[[model.GRAVITY, model.ROLL_COSINE]] = lean.gravity, math.cos(lean.roll)
@@ -84,7 +84,9 @@ def carried(earlier: Estimate, settings: AoaSettings) -> dict[str, float]:
     return dict(known["slopes"]) if all(math.isclose(a, b, rel_tol=1e-9) for a, b in same) else {}
 
 
-def by_fusion(recording: Recording, settings: AoaSettings, problem: Problem, filtered: Filtered) -> Angles:
+def by_fusion(
+    recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
+) -> Angles:
     """The angles of the fusion, with the roll where gyros track it, and with what is stated in their uncertainty."""
     angles, turned = of_fusion(filtered, settings.estimator.states), tracked(recording, problem, filtered)
     if turned is not None:

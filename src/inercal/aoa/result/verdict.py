@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, Filtered
-from inercal.aoa.fusion.problem import Problem
+from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.estimate.factor import NEGATIVE
-from inercal.findings import Finding, Status
+from inercal.findings import CODES, Finding, Status, causes
 from inercal.records.places import counted, counted_names
 from inercal.units import STANDARD_GRAVITY
 
@@ -37,23 +37,9 @@ _LOSSES = 3
 _BLIND = 0.1
 """Time [s] without accelerometers after which no filter has the angle."""
 
-_CAUSES = (
-    "unit_suspect", "channel_swap", "sign_suspect", "command_shift", "dead_channel", "rate_change", "saturation",
-    "unmodelled", "site_suspect", "prior_suspect", "excess_scatter", "contradiction", "outlier", "gap",
-)  # fmt: skip
-"""Findings that explain innovations too large, the likeliest first."""
-
-_GROSS = frozenset(("unit_suspect", "channel_swap", "sign_suspect", "command_shift"))
-"""Faults for which the angle is another one."""
-
-_HARMLESS = frozenset(
-    ("gap", "nan", "bad_row", "outlier", "saturation", "low_scatter", "at_prior", "gyro_missing")
-)
-"""Findings that leave an angle good, or say so by themselves."""
-
 
 def of_fusion(
-    recording: Recording, filtered: Filtered, angles: Angles, said: Sequence[Finding]
+    recording: Recording, filtered: FilterResult, angles: Angles, said: Sequence[Finding]
 ) -> tuple[Status, str]:
     """Status and sentence of what the fusion found; ``said`` all findings.
 
@@ -70,14 +56,14 @@ def of_fusion(
     if mean > limit:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {limit:.3g}"
         return Status.INCONSISTENT, _because(text, said)
-    gross = [each for each in said if each.code in _GROSS and each not in recording.findings]
+    gross = [each for each in said if CODES[each.code].gross and each not in recording.findings]
     if gross:
         return Status.INCONSISTENT, _because("the sensors contradict each other or the study", gross)
     lost = _lost(recording, filtered)
     if lost is not None:
         return Status.NOT_CONVERGED, _because(lost, said)
     judged = f"mean NIS {mean:.3g}" if math.isfinite(mean) else "too few readings for a NIS"
-    return Status.OK, _doubted(f"{_words(angles)}, {judged}", said)
+    return Status.OK, f"{_words(angles)}, {judged}"
 
 
 def nis_limit(count: int) -> float:
@@ -96,7 +82,7 @@ def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:
     known = np.isfinite(angles.theta)
     if 2 * known.sum() <= len(known):
         return Status.NOT_CONVERGED, _because(_missing(known), said)
-    return Status.OK, _doubted(f"{angles.method}: {_words(angles)}", said)
+    return Status.OK, f"{angles.method}: {_words(angles)}"
 
 
 def is_covariance(P: Array) -> bool:
@@ -110,7 +96,7 @@ def is_covariance(P: Array) -> bool:
     return bool(np.isfinite(correlation).all() and np.linalg.eigvalsh(correlation)[0] >= NEGATIVE)
 
 
-def _lost(recording: Recording, filtered: Filtered) -> str | None:
+def _lost(recording: Recording, filtered: FilterResult) -> str | None:
     """That a filter lost the angle too often, in words; None where it did not."""
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
     losses = [
@@ -143,7 +129,7 @@ def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
     return Finding("at_prior", text)
 
 
-def shaken(problem: Problem, filtered: Filtered, settings: AoaSettings) -> Finding | None:
+def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings) -> Finding | None:
     """That the sting shakes the model, where it does."""
     at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
     if not at or not len(filtered.kept_t):
@@ -160,22 +146,14 @@ def shaken(problem: Problem, filtered: Filtered, settings: AoaSettings) -> Findi
         f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms, {rms / noise:.2g} times their noise: u "
         "of the angle may be too small, by some 20 %"
     )
-    return Finding("flexure", text)
+    return Finding("flexure", text, harm=("theta",))
 
 
 def _because(text: str, said: Sequence[Finding]) -> str:
     """A bad verdict with the finding that explains it best."""
-    ranked = sorted(
-        (each for each in said if each.code in _CAUSES), key=lambda each: _CAUSES.index(each.code)
-    )
+    ranked = causes(said)
     cause = ranked[0].message if ranked else "check signs, units, positions, noise and gravity"
     return f"{text}; {cause}"
-
-
-def _doubted(text: str, said: Sequence[Finding]) -> str:
-    """A good verdict with the findings for which angles may be wrong all the same."""
-    codes = dict.fromkeys(each.code for each in said if each.code not in _HARMLESS)
-    return f"{text}; but see {', '.join(codes)}: angles may be off by more than u" if codes else text
 
 
 def _words(angles: Angles) -> str:

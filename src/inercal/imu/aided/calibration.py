@@ -145,6 +145,7 @@ def _knocked(blocks: Blocks, wrong: NDArray[np.bool_]) -> Finding:
         "outlier",
         f"{counted(int(wrong.sum()), 'block')} of {float(np.median(blocks.length)):.2g} s of {blocks.triad.sensor} far "
         f"from the fit, knocks or wrong readings, at t {at} s: left out",
+        harm=(),
     )
 
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.imu.aided.coefficients import of_triad
-from inercal.report.figures import budget, correlation
+from inercal.report.coefficients import budget, correlation, values
 from inercal.report.html import Picture
-from inercal.report.style import COLOURS, QUIET, WIDTH, envelope, figure, plain_unit, svg
+from inercal.report.marks import Axis, Dots, Level, Line, Mark, Panel, Strips
+from inercal.report.panels import draw
+from inercal.report.style import COLOURS, envelope, plain_unit
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.aided.fit import Fit
 
@@ -24,37 +24,26 @@ _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 
 def pictures(calibration: AidedCalibration) -> list[Picture]:
     """Draw what there is to see of a calibration, of any status; without a fit there is only the table."""
-    drawn = [_test(calibration)]
+    names = calibration.estimate.names
+    drawn = [*([values(calibration.estimate)] if names else []), _test(calibration)]
     if calibration.fit is not None:
         drawn += [_biases(calibration.fit, calibration.rests, triad) for triad in calibration.fit.identified]
-    if calibration.estimate.names:
+    if names:
         drawn += [correlation(calibration.estimate), budget(calibration.estimate)]
     return drawn
-
-
-def _shade(axes: Axes, rests: Array) -> None:
-    """Mark the rests."""
-    spans = [(start, end - start) for start, end in rests]
-    axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), color=COLOURS[2], alpha=0.2, lw=0)
 
 
 def _test(calibration: AidedCalibration) -> Picture:
     """Angles of the table over time."""
     motion, rests = calibration.motion, calibration.rests
-    with figure(WIDTH, 2.0) as page:
-        axes = page.subplots()
-        _shade(axes, rests)
-        for k, (name, angle) in enumerate(zip(motion.chain.joints, motion.angles.T, strict=True)):
-            axes.plot(*envelope(motion.t, np.degrees(angle)), color=COLOURS[k], label=name)
-        axes.set_ylabel("angle [deg]")
-        axes.set_xlabel("time [s]")
-        axes.margins(x=0.005)
-        page.legend(loc="outside upper right", ncols=3)
-        drawn = svg(page)
-    return Picture(
+    marks: list[Mark] = [Strips(rests, COLOURS[2], 0.2)]
+    for k, (name, angle) in enumerate(zip(motion.chain.joints, motion.angles.T, strict=True)):
+        marks.append(Line(*envelope(motion.t, np.degrees(angle)), name, COLOURS[k]))
+    return draw(
         "The table",
         f"Angles of the table over the test, whole turns counted. Shaded: the {len(rests)} rests.",
-        drawn,
+        [[Panel(marks, Axis("time [s]", margin=0.005), Axis("angle [deg]"))]],
+        2.0,
     )
 
 
@@ -64,33 +53,28 @@ def _biases(fit: Fit, rests: Array, triad: str) -> Picture:
     blocks = sensors[0].side.blocks
     ends = np.concatenate([[blocks.nodes[0, 0]], rests.ravel(), [blocks.nodes[-1, -1]]])
     part = np.searchsorted(ends, blocks.middle)
-    with figure(WIDTH, 4.2) as page:
-        panels = page.subplots(3, 1, sharex=True)
-        for axes, axis, sensor in zip(panels, "xyz", sensors, strict=True):
-            _shade(axes, rests)
-            axes.axhline(0.0, color=QUIET, lw=0.6)
-            for number in np.unique(part):
-                inside = part == number
-                length = blocks.length[inside].sum()
-                noise = sensor.noise.resting if blocks.resting[inside].mean() > 0.5 else sensor.noise.moving
-                axes.errorbar(
-                    np.average(blocks.middle[inside]),
-                    np.average(sensor.residual[inside], weights=blocks.length[inside]),
-                    noise / np.sqrt(length),
-                    fmt="o",
-                    color=COLOURS[0] if number % 2 == 0 else COLOURS[1],
-                    elinewidth=0.8,
-                )
-            axes.set_ylabel(f"{triad}_{axis}")
-            axes.margins(x=0.005)
-        panels[-1].set_xlabel("time [s]")
-        page.align_ylabels(panels)
-        page.supylabel(f"residual [{plain_unit(blocks.triad.unit.symbol)}]", fontsize=8)
-        drawn = svg(page)
-    return Picture(
+    numbers = np.unique(part)
+    blocks_of = [part == number for number in numbers]
+    middle = np.array([np.average(blocks.middle[inside]) for inside in blocks_of])
+    length = np.array([blocks.length[inside].sum() for inside in blocks_of])
+    resting = np.array([blocks.resting[inside].mean() > 0.5 for inside in blocks_of])
+    panels = []
+    for axis, sensor in zip("xyz", sensors, strict=True):
+        means = np.array(
+            [np.average(sensor.residual[inside], weights=blocks.length[inside]) for inside in blocks_of]
+        )
+        noise = np.where(resting, sensor.noise.resting, sensor.noise.moving) / np.sqrt(length)
+        marks: list[Mark] = [Strips(rests, COLOURS[2], 0.2), Level(0.0)]
+        for chosen, colour in ((numbers % 2 == 0, COLOURS[0]), (numbers % 2 == 1, COLOURS[1])):
+            marks.append(Dots(middle[chosen], means[chosen], colour=colour, up=noise[chosen]))
+        unit = f"\n[{plain_unit(blocks.triad.unit.symbol)}]"
+        across = Axis("time [s]" if axis == "z" else "", margin=0.005)
+        panels.append([Panel(marks, across, Axis(f"{triad}_{axis}{unit}"))])
+    return draw(
         f"Residuals of the {_WORDS[triad]}",
         "Output less what the calibration and the table make of it, averaged over each rest (blue) and each turn "
         "(orange). Bars: ± one standard uncertainty by white noise alone. What they do not explain is the wander of "
         "the bias, about its mean over the test; a pattern that goes with the position is something else.",
-        drawn,
+        panels,
+        4.2,
     )

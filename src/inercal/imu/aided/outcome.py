@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.budget import TypeB, combine, common
-from inercal.estimate.conditions import conditions
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.findings import Finding, Status
+from inercal.estimate.basis import Basis, conditions_of, studied
+from inercal.estimate.budget import TypeB, combine
+from inercal.estimate.result import Estimate
+from inercal.findings import Finding, Status, settled
 from inercal.imu.aided.coefficients import (
     coefficients,
     names_of,
@@ -25,7 +25,7 @@ from inercal.imu.aided.fit import Fit
 from inercal.imu.aided.misfit import misfits
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
-from inercal.imu.settings import COMMAND, ImuSettings
+from inercal.imu.settings import COMMAND, MASKED, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
@@ -71,33 +71,23 @@ def assemble(
         sources_b.append(
             TypeB("shifts with each turn", tilt, "rad", np.eye(len(names))[:, crossed], redrawn=True)
         )
-    plain, *_ = combine(names, [*sources_a, *sources_b])
-    u = dict(zip(names, np.sqrt(np.diag(plain)).tolist(), strict=True))
-    status, message = verdict(fit, dict(zip(names, values.tolist(), strict=True)), u, len(rests), faulty)
+    plain = combine(names, [*sources_a, *sources_b])
+    u = dict(zip(names, plain.u.tolist(), strict=True))
+    judged = verdict(fit, dict(zip(names, values.tolist(), strict=True)), u, len(rests), faulty)
     sources_b += [TypeB(f"misfit ({each.code})", 1.0, "1", each.shift, redrawn=True) for each in faulty]
-    covariance, dof, budget = combine(names, [*sources_a, *sources_b])
     symbols = {triad: of_triad(fit, triad)[0].side.blocks.triad.unit.symbol for triad in triads}
     units = [
         TERMS[name].unit_for(symbols["acc" if name.startswith(("K", "M")) else "gyro"]) for name in names
     ]
-    return Estimate(
-        command=COMMAND,
-        names=names,
-        units=tuple(units),
-        values=values,
-        covariance=covariance,
-        dof=dof,
-        k=np.array([coverage_factor(float(value)) for value in dof]),
-        status=status,
-        message=message,
-        findings=(*record.findings, *said, *motion.findings, *findings(fit, lag, faulty)),
+    return Estimate.of(
+        _basis(record, settings, _conditions(record, fit, settings)),
+        names,
+        units,
+        values,
+        combine(names, [*sources_a, *sources_b]),
+        judged,
+        findings=(*settled(record.findings, *MASKED), *said, *motion.findings, *findings(fit, lag, faulty)),
         statistics=_statistics(fit, rests),
-        budget=budget,
-        model=MODEL,
-        conditions=_conditions(record, fit, settings),
-        traceability=settings.traceability,
-        inputs=record.sources,
-        provenance=provenance(settings.given),
         result={
             "method": "aided",
             "rests": rest_table(fit, motion, rests),
@@ -106,26 +96,24 @@ def assemble(
             "noise": {triad: _noise(fit, triad) for triad in triads},
             "unit": symbols,
         },
-        references=REFERENCES,
-        common=common(sources_b, len(names)),
     )
+
+
+def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
+    """What the estimate rests on."""
+    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
 
 
 def without_fit(
     record: Record, settings: ImuSettings, status: Status, message: str, said: Sequence[Finding] = ()
 ) -> Estimate:
     """The estimate of a test that cannot be fitted: no parameters, but why."""
-    return without_parameters(
-        COMMAND,
+    return Estimate.without(
+        _basis(record, settings),
         status,
         message,
-        findings=(*record.findings, *said),
-        model=MODEL,
-        traceability=settings.traceability,
-        inputs=record.sources,
-        provenance=provenance(settings.given),
+        findings=(*settled(record.findings, *MASKED), *said),
         result={"method": "aided", "rests": []},
-        references=REFERENCES,
     )
 
 
@@ -189,4 +177,4 @@ def _conditions(record: Record, fit: Fit, settings: ImuSettings) -> dict[str, An
     if "gyro" in fit.identified:
         rate = fit.references["gyro"].rate
         ranges["rate_about_an_axis_rad_s"] = [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()]
-    return conditions(settings, recorded_temperature(record), ranges, frame=FRAME)
+    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)

@@ -104,6 +104,7 @@ def motion_of(record: Record, chain: Chain) -> Motion:
         Finding(
             "outlier",
             f"{counted(len(rows), 'reading')} of {joint} far from both neighbours, at t {times(t[rows])} s: left out",
+            harm=(),
         )
         for joint, rows in zip(chain.joints, wrong, strict=True)
         if len(rows)

@@ -156,7 +156,7 @@ def _unit_words(fit: Fit, triad: str) -> str:
 def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding]:
     """Findings about clocks and biases, saturation, and faults found in the residuals."""
     for fault in faults:
-        yield Finding(fault.code, f"{fault.message}; the uncertainties allow for it")
+        yield Finding(fault.code, f"{fault.message}; the uncertainties allow for it", harm=())
     for triad in fit.identified:
         blocks = of_triad(fit, triad)[0].side.blocks
         if blocks.clipped:
@@ -165,6 +165,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
                 "saturation",
                 f"blocks of {float(np.median(blocks.length)):.2g} s in which a sensor is at an end of its range are "
                 f"left out: {lost}; {len(blocks.y)} are left",
+                harm=(),
             )
     moved = [
         f"{name} {_shift(sensor):.2g} {sensor.side.blocks.triad.unit.symbol}"
@@ -176,6 +177,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
             "excess_scatter",
             f"outputs shift with each turn of the table, and not at rest, by some {', '.join(moved)}: errors of the "
             "table that are not stated, or hysteresis; the uncertainties use it",
+            harm=(),
         )
     for triad in fit.identified:
         group = f"time shift of {triad}"
@@ -187,6 +189,7 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
                 "command_shift",
                 f"the table's angles come {value} ± {digits} ms {'late' if shift > 0 else 'early'} against the "
                 f"{_WORDS[triad]}: corrected",
+                harm=(),
             )
     for triad in fit.identified:
         sensors = of_triad(fit, triad)
@@ -202,4 +205,5 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding
                 f"the bias of the {_WORDS[triad]} wanders over the test, by about {', '.join(moved)} "
                 f"{sensors[0].side.blocks.triad.unit.symbol}; {name} is its mean, and the wander is in the "
                 "uncertainties",
+                harm=(),
             )

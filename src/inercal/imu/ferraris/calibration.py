@@ -110,7 +110,7 @@ def calibrate_ferraris(
         *(() if turns is None else turns.findings),
         *readings.findings,
         *unused_labels(sections),
-        *([] if against else sense_finding(solution, carried)),
+        *([] if against else sense_finding(solution, carried, options)),
         *scatter_findings(scatter, options),
     ]
     errors = propagation(readings, solution, scatter)

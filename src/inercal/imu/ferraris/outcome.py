@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.budget import combine, common
-from inercal.estimate.conditions import conditions
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.findings import Finding, Status
+from inercal.estimate.basis import Basis, conditions_of, studied
+from inercal.estimate.budget import combine
+from inercal.estimate.result import Estimate
+from inercal.findings import Finding, Status, settled
 from inercal.imu.ferraris.method import NAMES, coefficients
 from inercal.imu.ferraris.names import NAMES as SECTIONS
 from inercal.imu.ferraris.names import POSITIONS, TURNS, in_words
@@ -20,7 +20,7 @@ from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_covariance, type_a, type_b
 from inercal.imu.ferraris.verdict import too_few, verdict
 from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import COMMAND, ImuSettings
+from inercal.imu.settings import COMMAND, MASKED, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
 from inercal.records.record import Record
@@ -58,25 +58,21 @@ def assemble(
     acc_unit, gyro_unit = (triad.unit.symbol for triad in triads)
     values = np.asarray(coefficients(readings.inputs, readings.weights), dtype=float)
     from_data = type_a(errors, acc_unit, gyro_unit)
-    known = type_b(errors, settings.site, settings.time_base_u, options, acc_unit, gyro_unit)
+    from_outside = type_b(errors, settings.site, settings.time_base_u, options, acc_unit, gyro_unit)
     if sections.turns is not None:
-        known += doubtful_turns(errors, sections.turns.doubt)
-    covariance, dof, budget = combine(NAMES, [*from_data, *known])
+        from_outside += doubtful_turns(errors, sections.turns.doubt)
+    known = combine(NAMES, [*from_data, *from_outside])
     residual = np.sum([source.covariance for source in from_data], axis=0)
-    status, message = verdict(readings, scatter, against, options)
     gain = np.abs(np.diag(errors.solution.force_gain))
     left = scatter.left["acc"] / gain
-    return Estimate(
-        command=COMMAND,
-        names=NAMES,
-        units=tuple(_unit(name, acc_unit, gyro_unit) for name in NAMES),
-        values=values,
-        covariance=covariance,
-        dof=dof,
-        k=np.array([coverage_factor(float(value)) for value in dof]),
-        status=status,
-        message=message,
-        findings=(*record.findings, *findings),
+    return Estimate.of(
+        _basis(record, settings, _conditions(record, triads, errors, settings, options)),
+        NAMES,
+        [_unit(name, acc_unit, gyro_unit) for name in NAMES],
+        values,
+        known,
+        verdict(readings, scatter, against, options),
+        findings=(*settled(record.findings, *MASKED), *findings),
         statistics={
             "dof": float(scatter.fits["acc"].dof),
             "condition": scatter.fits["acc"].identifiability.condition,
@@ -87,25 +83,22 @@ def assemble(
             "intervals": float(len(POSITIONS)),
             "turns": float(len(TURNS)),
         },
-        budget=budget,
-        model=MODEL,
-        conditions=_conditions(record, triads, errors, settings, options),
-        traceability=settings.traceability,
-        inputs=record.sources,
-        provenance=provenance(settings.given),
         result={
             "method": "ferraris",
             "found_by": sections.found_by,
             "sections": _section_table(triads[0], sections),
             "positions": _position_table(left),
-            "least_squares": _least_squares_table(values, np.sqrt(np.diag(covariance)), errors),
+            "least_squares": _least_squares_table(values, known.u, errors),
             "u_residual": dict(zip(NAMES, np.sqrt(np.diag(residual)).tolist(), strict=True)),
             "u_noise": dict(zip(NAMES, np.sqrt(np.diag(noise_covariance(errors))).tolist(), strict=True)),
             "unit": {"acc": acc_unit, "gyro": gyro_unit},
         },
-        references=REFERENCES,
-        common=common(known, len(NAMES)),
     )
+
+
+def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
+    """What the estimate rests on."""
+    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
 
 
 def _unit(name: str, acc_unit: str, gyro_unit: str) -> str:
@@ -125,7 +118,7 @@ def _conditions(
     g = settings.site.gravity
     finite = gyro.values[np.isfinite(gyro.values).all(axis=1)]
     t = acc.t[np.isfinite(acc.t)]
-    return conditions(
+    return conditions_of(
         settings,
         recorded_temperature(record),
         {
@@ -189,23 +182,18 @@ def without_sections(
 ) -> Estimate:
     """The estimate of a recording that lacks a section, or whose sections are not what they are said to be (``wrong``):
     no parameters, but which it is, and what to do."""
-    return without_parameters(
-        COMMAND,
+    return Estimate.without(
+        _basis(record, settings),
         Status.INCONSISTENT if wrong else Status.TOO_FEW_INTERVALS,
         wrong[0].message if wrong else too_few(sections),
-        findings=(*record.findings, *wrong),
+        findings=(*settled(record.findings, *MASKED), *wrong),
         statistics={
             "intervals": float(sum(name in sections.acc for name in POSITIONS)),
             "turns": float(sum(name in sections.acc for name in TURNS)),
         },
-        model=MODEL,
-        traceability=settings.traceability,
-        inputs=record.sources,
-        provenance=provenance(settings.given),
         result={
             "method": "ferraris",
             "found_by": sections.found_by,
             "sections": _section_table(acc, sections),
         },
-        references=REFERENCES,
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Inputs
 from inercal.imu.ferraris.names import POSITIONS, TURNS
@@ -64,7 +64,9 @@ def read_sections(
         passed = np.cumsum(cells * (output[:, axis] - bias[axis]))
         angle = options.turn * passed / passed[-1] if passed[-1] else np.zeros(len(t))
         swing.append([cells @ np.cos(angle) / cells.sum(), cells @ np.sin(angle) / cells.sum()])
-        findings += _of_turn(name, t, output - bias, bool(clipped[sections.gyro[name]].any()), longest)
+        findings += _of_turn(
+            name, t, output - bias, bool(clipped[sections.gyro[name]].any()), longest, options
+        )
     inputs = Inputs(
         force=np.array([part.mean(axis=0) for part in at_rest["acc"]]),
         rate=rate,
@@ -118,21 +120,23 @@ def _moving(at_rest: dict[str, list[Array]]) -> Iterator[Finding]:
                     "poor_section",
                     f"the instrument moves in section {name}: {sensor} varies {math.sqrt(size / usual):.0f} times as "
                     "much as in the others",
+                    harm=EVERYTHING,
                 )
 
 
-def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) -> Iterator[Finding]:
+def _of_turn(
+    name: str, t: Array, rate: Array, clipped: bool, longest: float, options: FerrarisSettings
+) -> Iterator[Finding]:
     """Findings about a turn: ``rate`` (n, 3) its output less the bias, ``longest`` step of time [s] allowed."""
-    where = f"t {t[0]:.2f} to {t[-1]:.2f} s"
+    where, axis = f"t {t[0]:.2f} to {t[-1]:.2f} s", name[0]
+    gains = (f"S_{axis}", *(f"T_{i}{axis}" for i in "xyz" if i != axis))
     steps = np.diff(t)
     if not np.all((steps > 0.0) & (steps <= longest)):
-        yield Finding(
-            "poor_section", f"samples are missing in the turn {name}: its angle is not known", where
-        )
+        said = f"samples are missing in the turn {name}: its angle is not known"
+        yield Finding("poor_section", said, where, gains)
     if clipped:
-        yield Finding(
-            "saturation", f"the gyro saturates in the turn {name}: its integral is too small", where
-        )
+        said = f"the gyro saturates in the turn {name}: its integral is too small"
+        yield Finding("saturation", said, where, gains)
     largest = float(np.max(np.abs(rate)))
     edges = [float(np.max(np.abs(part.mean(axis=0)))) for part in (rate[:_EDGE], rate[-_EDGE:])]
     if max(edges) > LIMITS.cut_rate * largest:
@@ -140,4 +144,6 @@ def _of_turn(name: str, t: Array, rate: Array, clipped: bool, longest: float) ->
         code = "poor_section" if max(edges) > LIMITS.lost_rate * largest else "turn_cut"
         part = f"{100 * max(edges) / largest:.0f} % of its largest rate"
         text = f"the turn {name} is under way at the {end} of its section, at {part}: some of its angle is cut off"
-        yield Finding(code, text, where)
+        # at a steady deceleration this part of the angle is left
+        small = max(edges) ** 2 / largest**2 * abs(options.turn) < options.turn_u
+        yield Finding(code, text, where, () if code == "turn_cut" and small else gains)

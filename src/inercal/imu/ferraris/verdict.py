@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.findings import Finding, Status
+from inercal.findings import EVERYTHING, Finding, Status
 from inercal.imu.ferraris.method import Inputs, Matrices
 from inercal.imu.ferraris.names import NAMES, POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.readings import Readings
@@ -58,7 +58,7 @@ def contradictions(
     for triad, model in zip(triads, (found.accelerometer, found.gyro), strict=True):
         wrong = unit_words(triad, replace(model, scale=np.abs(model.scale)))
         if wrong:
-            yield Finding("unit_suspect", wrong)
+            yield Finding("unit_suspect", wrong, harm=EVERYTHING)
     sign = np.sign(np.diag(found.rate_gain))
     if np.ptp(sign) > 0.0:
         odd = 1.0 if np.sum(sign > 0.0) == 1 else -1.0
@@ -67,6 +67,7 @@ def contradictions(
             "sign_suspect",
             f"gyro_{axis} runs against the other two in the turns: check its sign in the map, or whether {axis}_rot "
             "was turned the other way",
+            harm=("gyro",),
         )
     elif misses is not None and misses[0] > LIMITS.vertical_miss:
         if misses[1] < min(LIMITS.vertical_miss, 0.5 * misses[0]):
@@ -74,6 +75,7 @@ def contradictions(
                 "sign_suspect",
                 f"the motion between the positions shows that the turns were made against the stated sense: state "
                 f'imu.ferraris.turn = "{-math.degrees(options.turn):g} deg"',
+                harm=("gyro",),
             )
         else:
             yield Finding(
@@ -81,6 +83,7 @@ def contradictions(
                 f"gyro and accelerometers contradict each other by {math.degrees(misses[0]):.0f} deg (rms of the "
                 "verticals carried from position to position): check the order and signs of the gyro's axes, and the "
                 "angle of the turns",
+                harm=EVERYTHING,
             )
 
 
@@ -96,24 +99,30 @@ def wrong_axes(x: Inputs, weights: Array) -> Iterator[Finding]:
             shows = "show" if sensor == "acc" else "shows"
             seen = int(np.argmax(np.abs(by_axis[:, j])))
             if abs(by_axis[seen, j]) < LIMITS.faint_response:
-                yield Finding(
-                    "contradiction", f"{what} {shows} hardly on any axis of {sensor}: check the sections"
-                )
+                said = f"{what} {shows} hardly on any axis of {sensor}: check the sections"
+                yield Finding("contradiction", said, harm=EVERYTHING)
             elif seen != j:
                 yield Finding(
                     "channel_swap",
                     f"{what} {shows} on {sensor}_{'xyz'[seen]}: check the order of the channels and the sections",
+                    harm=EVERYTHING,
                 )
             elif sensor == "acc" and by_axis[j, j] < 0.0:
                 yield Finding(
                     "sign_suspect",
                     f"acc_{axis} reads downward in {axis}_p and upward in {axis}_a: check its sign in the map, and the "
                     "sections",
+                    harm=EVERYTHING,
                 )
 
 
-def sense_finding(found: Matrices, misses: tuple[float, float] | None) -> Iterator[Finding]:
-    """A gyro that runs against the stated sense on all axes: negative scale factors, and what they may mean."""
+def sense_finding(
+    found: Matrices, misses: tuple[float, float] | None, options: FerrarisSettings
+) -> Iterator[Finding]:
+    """A gyro that runs against the stated sense on all axes: negative scale factors, and what they may mean.
+
+    A negative sense of the turns is no default: it was stated on purpose, and is believed.
+    """
     if np.any(np.diag(found.rate_gain) > 0.0):
         return
     said = "all three gyro axes run against the stated sense of the turns, so that the scale factors S are negative: "
@@ -123,9 +132,10 @@ def sense_finding(found: Matrices, misses: tuple[float, float] | None) -> Iterat
             said
             + "the gyro counts against the right-hand rule, or the turns were made the other way (then change "
             "the sign of imu.ferraris.turn); the recording lacks the motion between the positions that would tell",
+            harm=() if options.turn < 0.0 else ("gyro",),
         )
     else:
-        yield Finding("sign_suspect", said + "the gyro counts against the right-hand rule")
+        yield Finding("sign_suspect", said + "the gyro counts against the right-hand rule", harm=())
 
 
 def scatter_findings(scatter: Scatter, options: FerrarisSettings) -> Iterator[Finding]:
@@ -135,12 +145,14 @@ def scatter_findings(scatter: Scatter, options: FerrarisSettings) -> Iterator[Fi
             "excess_scatter",
             f"the positions scatter by {math.degrees(scatter.tilt):.2g} deg, more than the stated alignment of "
             f"{math.degrees(options.alignment):.2g} deg explains; the uncertainties use the scatter",
+            harm=(),
         )
     if scatter.excess["gyro"]:
         yield Finding(
             "excess_scatter",
             f"the gyro's output at rest scatters from position to position {scatter.over_expected['gyro']:.1f} times "
             "as much as its noise within them explains; the uncertainties use the scatter",
+            harm=(),
         )
 
 

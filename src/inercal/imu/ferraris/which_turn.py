@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.imu.ferraris.detection import Detected
 from inercal.imu.ferraris.gravity_transfer import Carried, carry
 from inercal.imu.ferraris.motions import Motion
@@ -75,7 +75,7 @@ def choose(acc: Triad, gyro: Triad, detected: Detected, options: FerrarisSetting
                 f"gravity, carried through the motion between the rests, says that the turn {TURNS[axis]} found was "
                 f"by {by:.1f} deg, not by {math.degrees(abs(options.turn)):g} deg: {ASK}, and check imu.ferraris.turn"
             )
-            graded.append((True, Finding("contradiction", message, where)))
+            graded.append((True, Finding("contradiction", message, where, EVERYTHING)))
         if apart > max(LIMITS.slight_turn_difference, abs(options.turn_u / options.turn)):
             message = (
                 f"which motion is the turn {TURNS[axis]} is not certain: the one taken and the one from "

@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.result import Estimate, timed
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.drivers import drivers_of
 from inercal.imu.multiposition.earth_rate import earth_rate_at
@@ -179,6 +179,6 @@ def _calibrate_gyro(
             "carried through the turns): check the gyro's signs and order of axes; it is not calibrated"
         )
         axes = axis_findings(turns, acc.directions, means[0])
-        return None, [*findings, Finding("contradiction", text), *axes]
+        return None, [*findings, Finding("contradiction", text, harm=EVERYTHING), *axes]
     findings += gyro_findings(poses, drivers, means - gyro.by_earth, recording)
     return gyro, findings

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.budget import combine, common
-from inercal.estimate.conditions import conditions
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.findings import Finding, Status
+from inercal.estimate.basis import Basis, conditions_of, studied
+from inercal.estimate.budget import combine
+from inercal.estimate.result import Estimate
+from inercal.findings import Finding, Status, settled
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
 from inercal.imu.multiposition.verdict import rms_miss, spread_words, verdict
 from inercal.imu.recording import Recording
-from inercal.imu.settings import COMMAND, ImuSettings
+from inercal.imu.settings import COMMAND, MASKED, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
 from inercal.records.places import counted
@@ -57,11 +57,10 @@ def assemble(
     gyro_unit = "" if recording.gyro is None else recording.gyro.unit.symbol
     from_scatter = type_a(joint, scatter, gyro_unit)
     resolution = recording.resolution.get("gyro", np.zeros(3))
-    known = type_b(joint, settings.site, settings.time_base_u, resolution, gyro_unit)
-    covariance, dof, budget = combine(joint.names, [*from_scatter, *known])
+    from_outside = type_b(joint, settings.site, settings.time_base_u, resolution, gyro_unit)
+    known = combine(joint.names, [*from_scatter, *from_outside])
     residual = np.sum([source.covariance for source in from_scatter], axis=0)
-    u = dict(zip(joint.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    status, message = verdict(recording, poses, joint.gyro, settings.site.gravity, u, findings)
+    u = dict(zip(joint.names, known.u.tolist(), strict=True))
     noise = noise_covariance(joint, *_noise(recording, poses, joint))
     acc, gyro = poses.accelerometer, joint.gyro
     statistics = {
@@ -80,24 +79,15 @@ def assemble(
             "gyro_residual_rms_rad": rms_miss(gyro),
             "turns": float(len(gyro.miss)),
         }
-    return Estimate(
-        command=COMMAND,
-        names=joint.names,
-        units=tuple(_unit(name, recording) for name in joint.names),
-        values=joint.values,
-        covariance=covariance,
-        dof=dof,
-        k=np.array([coverage_factor(float(value)) for value in dof]),
-        status=status,
-        message=message,
-        findings=(*record.findings, *findings),
+    return Estimate.of(
+        _basis(record, settings, _conditions(record, recording, settings)),
+        joint.names,
+        [_unit(name, recording) for name in joint.names],
+        joint.values,
+        known,
+        verdict(recording, poses, joint.gyro, settings.site.gravity, u, findings),
+        findings=(*settled(record.findings, *MASKED), *findings),
         statistics=statistics,
-        budget=budget,
-        model=MODEL,
-        conditions=_conditions(record, recording, settings),
-        traceability=settings.traceability,
-        inputs=record.sources,
-        provenance=provenance(settings.given),
         result={
             "method": "multiposition",
             "intervals": _interval_table(recording, poses),
@@ -107,9 +97,12 @@ def assemble(
             "unit": {triad.sensor: triad.unit.symbol for triad in _triads(recording)},
             "bias_time_s": float(poses.times.mean()),
         },
-        references=REFERENCES,
-        common=common(known, len(joint.names)),
     )
+
+
+def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
+    """What the estimate rests on."""
+    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
 
 
 def _triads(recording: Recording) -> list[Triad]:
@@ -151,7 +144,7 @@ def _conditions(record: Record, recording: Recording, settings: ImuSettings) -> 
     if recording.gyro is not None:
         finite = recording.gyro.values[np.isfinite(recording.gyro.values).all(axis=1)]
         ranges["gyro_output"] = [finite.min(axis=0), finite.max(axis=0)]
-    return conditions(settings, recorded_temperature(record), ranges, frame=FRAME)
+    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
 
 
 def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any]]:
@@ -200,16 +193,11 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
             f"{spread_words(np.array([dwell.of(y).mean(axis=0) for dwell in dwells]))}): hold each side up, and the "
             "edges between"
         )
-    return without_parameters(
-        COMMAND,
+    return Estimate.without(
+        _basis(record, settings),
         status,
         message,
         findings=record.findings,
         statistics={"intervals": float(len(dwells)), "threshold": best},
-        model=MODEL,
-        traceability=settings.traceability,
-        inputs=record.sources,
-        provenance=provenance(settings.given),
         result={"method": "multiposition", "intervals": [], "turns": []},
-        references=REFERENCES,
     )

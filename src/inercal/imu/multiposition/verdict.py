@@ -6,10 +6,11 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.result import rounded
-from inercal.findings import Finding, Status
+from inercal.findings import EVERYTHING, Finding, Status
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.drivers import Drivers
@@ -126,6 +127,7 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
             f"|f| scatters by {scatter.s:.2g} m/s^2 from pose to pose, {scatter.over_noise:.1f} times what the "
             "noise at rest explains (the instrument was not quite still, or the model lacks a term); the "
             "uncertainties use the scatter",
+            harm=(),
         )
 
 
@@ -149,24 +151,26 @@ def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recor
         return
     if "D_R_x" not in drivers.names:
         p, fitted = _f_test(means, drivers.at_rest, poses.times[:, None])
-        if p < LIMITS.driver_probability:
+        if np.any(drifting := p < LIMITS.driver_probability):
             total = fitted[-1] * np.ptp(poses.times)
             words = ", ".join(f"{axis} {d:+.3g}" for axis, d in zip("xyz", total, strict=True))
             yield Finding(
                 "bias_drift",
                 f"the gyro bias drifts over the recording by {words} {unit}; D_F is its mean, and the scatter of "
                 "the poses is in its uncertainty: set imu.bias_drift = true to estimate the drift",
+                harm=_of_axes(drifting),
             )
     f = poses.accelerometer.f
     if "G_xx" in drivers.names or len(f) < 8:
         return
     p, fitted = _f_test(means, drivers.at_rest, f)
-    if p < LIMITS.driver_probability:
+    if np.any(leaning := p < LIMITS.driver_probability):
         size = float(np.max(np.linalg.norm(fitted[-3:], axis=0)) * np.mean(np.linalg.norm(f, axis=1)))
         yield Finding(
             "g_sensitivity",
             f"the gyro output at rest changes with the pose by up to {size:.3g} {unit} per g: "
             "set imu.g_sensitivity = true to estimate it",
+            harm=_of_axes(leaning),
         )
 
 
@@ -186,19 +190,31 @@ def axis_findings(turns: Turns, verticals: Array, bias: Array) -> Iterator[Findi
         for name, axis, sign in zip("xyz", order, signs, strict=True)
     )
     code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
-    yield Finding(code, f"against the accelerometers {measured}: check the order and signs in the map")
+    yield Finding(
+        code, f"against the accelerometers {measured}: check the order and signs in the map", harm=EVERYTHING
+    )
 
 
-def _f_test(means: Array, base: Array, more: Array) -> tuple[float, Array]:
-    """Probability that further regressors help by chance alone, over the three axes; their coefficients."""
+def _of_axes(axes: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Coefficients of those gyro ``axes`` (3,) whose bias is not one: turns are integrated with it."""
+    return tuple(
+        name
+        for i, other in zip("xyz", axes, strict=True)
+        if other
+        for name in (f"D_F_{i}", f"S_{i}", *(f"T_{i}{j}" for j in "xyz" if j != i))
+    )
+
+
+def _f_test(means: Array, base: Array, more: Array) -> tuple[Array, Array]:
+    """Probability (3,) that further regressors help an axis by chance alone, of three; their coefficients."""
     from scipy.special import fdtrc
 
     small, large = regress_static(means, base), regress_static(means, np.hstack([base, more]))
     if large.dof < 3:
-        return 1.0, large.coefficients
+        return np.ones(3), large.coefficients
     rest = np.sum(large.residuals**2, axis=0)
     gained = np.sum(small.residuals**2, axis=0) - rest
     k = more.shape[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(rest > 0, (gained / k) / (rest / large.dof), 0.0)
-    return float(min(1.0, 3.0 * np.min(fdtrc(k, large.dof, ratio)))), large.coefficients
+    return np.minimum(1.0, 3.0 * fdtrc(k, large.dof, ratio)), large.coefficients

@@ -15,7 +15,6 @@ from inercal.imu.limits import LIMITS
 from inercal.imu.temperature.cubic import Cubic, fit_points
 from inercal.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span
 from inercal.inputs import Source
-from inercal.units import parse_quantity
 
 
 def fit_calibrations(
@@ -40,8 +39,8 @@ def fit_calibrations(
     Raises
     ------
     InputError
-        Too few, a status other than ok, a calibration without a temperature or a standard uncertainty, or one with
-        other coefficients.
+        Too few, a status other than ok and suspect, a calibration without a temperature or a standard uncertainty, or
+        one with other coefficients.
     """
     if len(estimates) < LIMITS.fewest_calibrations:
         raise InputError(
@@ -53,7 +52,7 @@ def fit_calibrations(
             raise InputError(file.path, "holds the same as a file before it, expected each calibration once")
     first = estimates[0]
     for estimate, file in zip(estimates, files, strict=True):
-        if estimate.status is not Status.OK:
+        if not estimate.status.done:
             raise InputError(file.path, f"found the status {estimate.status.value}, expected ok")
         if (estimate.names, estimate.units) != (first.names, first.units):
             raise InputError(
@@ -100,7 +99,16 @@ def fit_calibrations(
                 np.sqrt(variances),
             )
         )
-    findings = []
+    findings = [
+        Finding(
+            "bad_verdict",
+            f"the calibration ended suspect: {estimate.message}",
+            file.path,
+            tuple({name: None for each in estimate.findings for name in each.harm}),
+        )
+        for estimate, file in zip(estimates, files, strict=True)
+        if estimate.status is Status.SUSPECT
+    ]
     if terms < 4:
         text = (
             f"{distinct} temperatures carry a polynomial of degree {terms - 1} only, expected 5 for a cubic: what the "
@@ -132,11 +140,11 @@ def _apart(fit: Cubic, both: bool) -> tuple[float, bool]:
 
 def _temperature(estimate: Estimate, file: Source) -> float:
     """The temperature in the conditions of a calibration [degC]."""
-    text = estimate.conditions.get("temperature")
-    if not text:
+    found = estimate.conditions.get("temperature")
+    if not found:
         raise InputError(
             file.path,
             'conditions.temperature: missing, expected that of the instrument (temperature = "23 degC" under '
             "[conditions] in the study)",
         )
-    return parse_quantity(text, "temperature", f"{file.path}: conditions.temperature").value
+    return float(found["value"])

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.estimate.basis import Basis, provenance
+from inercal.estimate.budget import Uncertainty
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.imu.limits import LIMITS
 from inercal.imu.temperature.cubic import Cubic
@@ -116,21 +118,21 @@ def assemble(
         text = f"T0 = {reference:g} degC lies outside {low:.1f} to {high:.1f} degC: the values there are extrapolated"
         more.append(Finding("outside_range", text))
     more += [_hysteresis(curve) for curve in curves if _shows_hysteresis(curve)]
-    return Estimate(
-        command=COMMAND,
-        names=tuple(names),
-        units=tuple(units),
-        values=np.array(values),
-        covariance=block_diag(*blocks),
-        dof=np.array(dof),
-        k=np.array([coverage_factor(each) for each in dof]),
-        status=Status.OK,
-        message=f"{what} from {low:.1f} to {high:.1f} degC, about T0 = {reference:g} degC",
+    return Estimate.of(
+        Basis(
+            COMMAND,
+            MODEL,
+            {"reference_degC": reference, "ranges": {"temperature_degC": [low, high]}},
+            inputs=tuple(inputs),
+            provenance=provenance(given),
+            references=("JCGM 100:2008, Guide to the expression of uncertainty in measurement",),
+        ),
+        names,
+        units,
+        np.array(values),
+        Uncertainty(block_diag(*blocks), np.array(dof)),
+        (Status.OK, f"{what} from {low:.1f} to {high:.1f} degC, about T0 = {reference:g} degC"),
         findings=(*findings, *more),
-        model=MODEL,
-        conditions={"reference_degC": reference, "ranges": {"temperature_degC": [low, high]}},
-        inputs=tuple(inputs),
-        provenance=provenance(given),
         result={
             "reference_degC": reference,
             "curves": [
@@ -146,21 +148,17 @@ def assemble(
                 for curve in curves
             ],
         },
-        references=("JCGM 100:2008, Guide to the expression of uncertainty in measurement",),
     )
 
 
 def no_span(low: float, high: float, inputs: Sequence[Source], findings: Sequence[Finding]) -> Estimate:
     """The estimate without parameters of data at hardly more than one temperature."""
-    return without_parameters(
-        COMMAND,
-        Status.UNOBSERVABLE,
+    text = (
         f"the temperature goes from {low:.1f} to {high:.1f} degC, expected a range of at least "
-        f"{LIMITS.temperature_span:g} K",
-        findings=tuple(findings),
-        model=MODEL,
-        inputs=tuple(inputs),
+        f"{LIMITS.temperature_span:g} K"
     )
+    basis = Basis(COMMAND, MODEL, inputs=tuple(inputs))
+    return Estimate.without(basis, Status.UNOBSERVABLE, text, findings=findings)
 
 
 def _range(curves: Sequence[Curve]) -> tuple[float, float]:

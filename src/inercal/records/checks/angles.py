@@ -24,6 +24,7 @@ from inercal.records.places import counted, places
 _ANGLE = re.compile(r"phi[123]|th_[xyz]|theta_ref")
 _TURN = 2.0 * np.pi
 _DEG = np.pi / 180.0
+_GIMBALS = ("th_x", "th_y", "th_z")
 
 
 def angles(columns: Mapping[str, Column]) -> list[Finding]:
@@ -105,7 +106,9 @@ def frozen(column: Column) -> list[Finding]:
     text = (
         f"{column.name}: stands still {counted(len(standstills), 'time')} amid steady motion, then catches up"
     )
-    return [Finding("stuck_encoder", text, places("row", rows[np.concatenate(standstills)] + 1))]
+    return [
+        Finding("stuck_encoder", text, places("row", rows[np.concatenate(standstills)] + 1), (column.name,))
+    ]
 
 
 def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: bool) -> list[Finding]:
@@ -150,7 +153,7 @@ def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: boo
     at = np.concatenate([rows[turn[0] * size : (turn[-1] + 1) * size] for turn in turns_missed])
     who = "gyro" if biased else "command"
     text = f"th: no angle moves while the platform turns according to the {who}"
-    return [Finding("stuck_encoder", text, places("row", at + 1))]
+    return [Finding("stuck_encoder", text, places("row", at + 1), _GIMBALS)]
 
 
 def command_shift(t: Array, th: Array, command: Array) -> list[Finding]:
@@ -189,7 +192,8 @@ def command_shift(t: Array, th: Array, command: Array) -> list[Finding]:
     if abs(lag) < 2 or not match > 0.95 or not 1.0 - match < 0.5 * (1.0 - plain):
         return []
     how = "follow" if lag > 0 else "run ahead of"
-    return [Finding("command_shift", f"th: the angles {how} the commanded rates by {abs(lag) * dt:.4g} s")]
+    text = f"th: the angles {how} the commanded rates by {abs(lag) * dt:.4g} s"
+    return [Finding("command_shift", text, harm=_GIMBALS)]
 
 
 def _correlation(x: Array, y: Array, lag: int) -> float:

@@ -97,4 +97,4 @@ def time_unit(t: Array, subject: str = "t") -> list[Finding]:
         text = f"{subject}: an interval of {interval:.4g} s looks like s taken for a smaller unit"
     else:
         return []
-    return [Finding("unit_suspect", text)]
+    return [Finding("unit_suspect", text, harm=("t",))]

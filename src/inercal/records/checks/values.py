@@ -26,7 +26,7 @@ def saturation(values: Array, name: str) -> list[Finding]:
         return []
     at = " and ".join(f"{level:.6g}" for level in np.unique(values[rows]))
     text = f"{name}: {counted(rows.size, 'sample')} in runs at {at}"
-    return [Finding("saturation", text, places("row", rows + 1))]
+    return [Finding("saturation", text, places("row", rows + 1), (name,))]
 
 
 def saturated(values: Array) -> NDArray[np.int64]:
@@ -68,7 +68,7 @@ def outliers(values: Array, name: str) -> list[Finding]:
     if rows.size == 0:
         return []
     text = f"{name}: {counted(rows.size, 'sample')} far from both neighbours, knocks or wrong bits"
-    return [Finding("outlier", text, places("row", rows + 1))]
+    return [Finding("outlier", text, places("row", rows + 1), harm=())]
 
 
 def outlying(values: Array) -> NDArray[np.int64]:
@@ -118,7 +118,7 @@ def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
     if not fitting or given in fitting:
         return []
     text = f"acc: a median norm of {norm:.4g} {given.symbol} looks like {fitting[0].symbol}"
-    return [Finding("unit_suspect", text)]
+    return [Finding("unit_suspect", text, harm=("acc_x", "acc_y", "acc_z"))]
 
 
 def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
@@ -130,7 +130,7 @@ def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
             if 1000 * np.count_nonzero(np.abs(signal) > 100.0 / unit.factor) > signal.size:
                 looks = {"rad/s": "deg/s", "deg/s": "mdeg/s"}.get(unit.symbol, "a smaller unit")
                 text = f"{name}: rates up to {np.abs(signal).max():.6g} {unit.symbol} look like {looks}"
-                findings.append(Finding("unit_suspect", text))
+                findings.append(Finding("unit_suspect", text, harm=(name,)))
     return findings
 
 
@@ -143,7 +143,13 @@ def temperature_unit(column: Column) -> list[Finding]:
     if 1000 * np.count_nonzero((signal < low) | (signal > high)) <= signal.size:
         return []
     span = f"{signal.min():.6g} to {signal.max():.6g} {column.unit.symbol}"
-    return [Finding("unit_suspect", f"{column.name}: {span} are hardly temperatures of an instrument")]
+    return [
+        Finding(
+            "unit_suspect",
+            f"{column.name}: {span} are hardly temperatures of an instrument",
+            harm=(column.name,),
+        )
+    ]
 
 
 def dead_channel(values: Array, name: str) -> list[Finding]:
@@ -152,7 +158,7 @@ def dead_channel(values: Array, name: str) -> list[Finding]:
         return []
     signal, _ = known(values)
     text = f"{name}: all {signal.size} samples are {signal[0]:.6g}, a dead or empty channel"
-    return [Finding("dead_channel", text)]
+    return [Finding("dead_channel", text, harm=(name,))]
 
 
 def is_dead(values: Array) -> bool:

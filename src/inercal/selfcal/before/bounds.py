@@ -12,24 +12,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
-from inercal.selfcal.filters.filter_result import Problem
+from inercal.estimate.kalman import Row, empty_row
 from inercal.selfcal.filters.gaps import anew
-from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
+from inercal.selfcal.filters.gating import admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterProblem, Model
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear
-from inercal.selfcal.platform.kinematics import Axes, attitude
+from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
-    Indices,
+    WIDEST,
+    Step,
     accelerometer_row,
     encoder_roots,
     propagate_covariance,
 )
-from inercal.selfcal.platform.model import on_the_base, platform_rate, simulate_truth, specific_force
+from inercal.selfcal.platform.model import (
+    Truth,
+    on_the_base,
+    platform_rate,
+    simulate_truth,
+    specific_force,
+)
 from inercal.selfcal.platform.plan import Motion
 from inercal.selfcal.platform.recording import Recording
 
@@ -88,7 +96,7 @@ class Bounds:
 
 def bounds(
     motion: Motion,
-    problem: Problem,
+    problem: FilterProblem,
     truth: Array | None = None,
     measured: Mask | None = None,
     history: bool = False,
@@ -99,7 +107,7 @@ def bounds(
     Parameters
     ----------
     motion : Motion
-    problem : Problem
+    problem : FilterProblem
         Noise, prior and near-level gating; the other settings of its filter play no part.
     truth : (p,) or longer, optional
         True coefficients, product form: the path is the one on which they take the platform. The nominal path if
@@ -116,14 +124,14 @@ def bounds(
     q, dt = np.empty((n, 4)), np.diff(motion.t)
     first = np.array(attitude(motion.angles[0], world.axes, world.signs))
     without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
-    simulate_truth(first, rate[:, None], dt[0], without, c, world.earth, world.up, q, unused)
+    simulate_truth(first, rate[:, None], dt[0], without, c, world, Truth(q, unused))
     seen = np.ones((n, 4), dtype=np.bool_) if measured is None else measured
     return _along(q, motion.angles, dt, rate, seen, c, problem, history, contributions)
 
 
 def recorded_bounds(
     recording: Recording,
-    problem: Problem,
+    problem: FilterProblem,
     attitudes: Array,
     coefficients: Array,
     history: bool = False,
@@ -135,7 +143,7 @@ def recorded_bounds(
     Parameters
     ----------
     recording : Recording
-    problem : Problem
+    problem : FilterProblem
     attitudes : (n, 4)
         Estimated ``q_bp`` at its rows.
     coefficients : (p,)
@@ -157,13 +165,13 @@ def _along(
     rate: Array,
     seen: Mask,
     c: Array,
-    problem: Problem,
+    problem: FilterProblem,
     history: bool,
     contributions: bool,
     restarts: Sequence[int] = (),
 ) -> Bounds:
     """Bounds along attitudes (n, 4) with coefficients (p,), linear form."""
-    p, world, noise = len(c), problem.world, problem.noise
+    p, noise = len(c), problem.noise
     u = np.empty((len(q) if history else 0, p))
     start = np.zeros((2, 3 + p))
     start[0, :3], start[1, 3:] = noise.encoder**2, problem.prior**2
@@ -171,13 +179,10 @@ def _along(
     P[0] = np.diag(start[0] + start[1])
     if contributions:
         P[3], P[4] = np.diag(start[0]), np.diag(start[1])
-    sigmas = noise.levels
-    gate = gate_of(problem.filter.gating)
-    told = c, world.earth, world.up, world.axes, world.signs, sigmas, gate
     first, angles = 0, np.arange(3)
     for last in (*restarts, len(q)):
         rows, steps = slice(first, last), slice(first, max(last - 1, 0))
-        riccati(P, q[rows], th[rows], dt[steps], rate[steps], seen[rows], *told, u[rows])
+        riccati(P, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows]), c, problem.model, u[rows])
         if last < len(q):
             P[:, :3], P[:, :, :3] = 0.0, 0.0
             P[:, angles, angles] = [
@@ -191,11 +196,11 @@ def _along(
 
 
 @kernel
-def observe(P: Array, places: Indices, row: Array, count: int, r: float, source: int, work: Array) -> None:
+def observe(P: Array, row: Row, r: float, source: int, work: Array) -> None:
     """Covariance ``P[0]`` and its parts ``P[1:]`` (m, m) after a scalar measurement, in place.
 
-    ``row[:count]`` is its derivative by the states ``places[:count]``, ``r`` its variance, which belongs to the part
-    ``source``; ``work`` (2, m) is used up.
+    ``row`` is its derivative by the state, ``r`` its variance, which belongs to the part ``source``; ``work`` (2, m) is
+    used up.
     """
     m = P.shape[1]
     gain, own = work[0], work[1]
@@ -203,10 +208,10 @@ def observe(P: Array, places: Indices, row: Array, count: int, r: float, source:
         inner = r if s == 0 or s == source else 0.0
         for i in range(m):
             own[i] = 0.0
-            for k in range(count):
-                own[i] += P[s, i, places[k]] * row[k]
-        for k in range(count):
-            inner += row[k] * own[places[k]]
+            for k in range(row.size):
+                own[i] += P[s, i, row.places[k]] * row.values[k]
+        for k in range(row.size):
+            inner += row.values[k] * own[row.places[k]]
         if s == 0:
             for i in range(m):
                 gain[i] = own[i] / inner
@@ -216,68 +221,58 @@ def observe(P: Array, places: Indices, row: Array, count: int, r: float, source:
                 P[s, k, i] = P[s, i, k]
 
 
+class Path(NamedTuple):
+    """A path of n rows: attitudes ``q`` (n, 4), gimbal angles ``th`` (n, 3) [rad], steps ``dt`` (n - 1,) [s], commanded
+    ``rate`` (n - 1, 3) [rad/s], and which of accelerometers x, y, z and the encoders were ``measured`` (n, 4)."""
+
+    q: Array
+    th: Array
+    dt: Array
+    rate: Array
+    measured: Mask
+
+
 @kernel
-def riccati(
-    P: Array,
-    q: Array,
-    th: Array,
-    dt: Array,
-    w: Array,
-    seen: Mask,
-    c: Array,
-    earth: Array,
-    up: Array,
-    axes: Axes,
-    signs: Array,
-    sigmas: Array,
-    gate: Array,
-    u: Array,
-) -> None:
+def riccati(P: Array, path: Path, c: Array, model: Model, u: Array) -> None:
     """Covariance of the error state along a path, in place.
 
     Parameters
     ----------
     P : (1 or 1 + sources, 3 + p, 3 + p) at the first row; the whole, then its parts
-    q : (n, 4) attitudes
-    th : (n, 3) rad, gimbal angles
-    dt : (n - 1,) s
-    w : (n - 1, 3) rad/s, commanded
-    seen : (n, 4) whether accelerometers x, y, z and the encoders were measured
+    path : Path
     c : (p,) coefficients, linear form
-    earth, up : (3,) rad/s, m/s^2, in b
-    axes, signs : (3,) of the gimbals
-    sigmas : (3,) angle random walk [rad/sqrt(s)], accelerometer [m/s^2], encoder [rad]
-    gate : (4,) of `inercal.selfcal.filters.gating`
+    model : Model
     u : (n or 0, p) receives standard uncertainties
     """
+    q, th, dt, w, seen = path
+    world, noise, gate = model
     m, p = P.shape[1], len(c)
-    top, work, row = np.empty((6, m)), np.empty((2, m)), np.empty(10)
-    places, near = np.empty(10, dtype=np.int64), np.zeros(3, dtype=np.int64)
-    earth_e, up_e = on_the_base(earth, c), on_the_base(up, c)
+    top, work, room = np.empty((6, m)), np.empty((2, m)), empty_row(WIDEST)
+    near = np.zeros(3, dtype=np.int64)
+    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    variance = noise.accelerometer * noise.accelerometer
     for k in range(len(q)):
         at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
         if k > 0:
-            step = dt[k - 1]
-            rate_c = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
-            rate = platform_rate(rate_c, c)
-            gained = sigmas[0] * sigmas[0] * step
+            commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
+            step = Step(commanded, platform_rate(commanded, c), earth_e, at, dt[k - 1])
+            walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
             for s in range(len(P)):
-                noise = gained if s < 2 else 0.0
-                propagate_covariance(P[s], c, rate_c, rate, earth_e, at, step, noise, top)
+                propagate_covariance(P[s], c, step, walk if s < 2 else 0.0, top)
             if seen[k, 3]:
-                watch(specific_force(attitude(th[k], axes, signs), up_e), gate, near)
+                watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
             if updating(gate, near):
                 if seen[k, 3]:
-                    roots, _ = encoder_roots(th[k], axes, signs, sigmas[2])
+                    roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
                     for i in range(3):
                         for j in range(i + 1):
-                            places[j], row[j] = j, roots[i][j]
-                        observe(P, places, row, i + 1, 1.0, _PARTS[1], work)
+                            room.places[j], room.values[j] = j, roots[i][j]
+                        observe(P, Row(room.places, room.values, i + 1), 1.0, _PARTS[1], work)
                 f = specific_force(at, up_e)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
-                        count = accelerometer_row(i, f, c, up_e, at, places, row)
-                        observe(P, places, row, count, sigmas[1] * sigmas[1], _PARTS[0], work)
+                        row = accelerometer_row(i, f, c, up_e, at, room)
+                        observe(P, row, variance, _PARTS[0], work)
         if len(u) > 0:
             for i in range(p):
                 u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

@@ -13,7 +13,7 @@ from inercal.estimate.result import rounded
 from inercal.findings import Finding, Status
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.display import of_field
-from inercal.selfcal.filters.filter_result import Filtered
+from inercal.selfcal.filters.filter_result import FilterResult
 
 AT_PRIOR = 0.5
 """Part of its prior above which a coefficient counts as left at it."""
@@ -99,7 +99,7 @@ def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:
     return Seen(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
 
 
-def useless(filtered: Filtered, bounds: Bounds, by_filter: Array) -> tuple[Status, str] | None:
+def useless(filtered: FilterResult, bounds: Bounds, by_filter: Array) -> tuple[Status, str] | None:
     """Status and sentence where there are no numbers to be used, None where there are: ``by_filter`` (p, p), product
     form, and the bounds must be covariances."""
     if not filtered.converged:

@@ -14,7 +14,7 @@ from inercal.findings import Finding
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, Bounds, bounds
 from inercal.selfcal.before.observability import Seen, seen
 from inercal.selfcal.before.path_search import LOCK, criterion, search
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import SelfcalSettings
 
@@ -122,7 +122,13 @@ def design(
     judged = tuple(_judged(name, plan, settings) for name, plan in plans.items())
     lock = float(np.abs(np.cos(found.angles()[:, 1])).min())
     near = (
-        [Finding("gimbal_lock", f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found")]
+        [
+            Finding(
+                "gimbal_lock",
+                f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found",
+                harm=(),
+            )
+        ]
         if lock < LOCK
         else []
     )

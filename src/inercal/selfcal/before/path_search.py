@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import StudyError
 from inercal.selfcal.before.bounds import Bounds, bounds
-from inercal.selfcal.filters.filter_result import Problem, problem
+from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.platform.plan import MOST_ROWS, Plan, Rest, Turn, motion
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.settings import Search, SelfcalSettings
@@ -97,7 +97,7 @@ class _Ground:
     time: float
     number: int
     coarse: float
-    problem: Problem
+    problem: FilterProblem
     goal: Mapping[str, float]
 
     def plan(self, turns: Sequence) -> Plan:
@@ -155,7 +155,7 @@ def _ground(settings: SelfcalSettings) -> _Ground:
     return made
 
 
-def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float, Problem]:
+def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float, FilterProblem]:
     """Coarse step [s] for turns of ``unit`` [s], and the problem with the noise of a mean over such a step."""
     rows = min(max(1, round(unit / model.step)), max(1, math.ceil(settings.search.angle / _GRAIN)))
     coarse, exact = unit / rows, problem(settings)

@@ -12,7 +12,7 @@ from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import all_angles, attitude
-from inercal.selfcal.platform.model import simulate_truth
+from inercal.selfcal.platform.model import Truth, simulate_truth
 from inercal.selfcal.platform.plan import Motion, motion
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
@@ -77,7 +77,7 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     wander *= noise.angle_random_walk / np.sqrt(dt)
     q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
     q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
-    simulate_truth(q0, fine, dt, wander, experiment.truth, world.earth, world.up, q, acc)
+    simulate_truth(q0, fine, dt, wander, experiment.truth, world, Truth(q, acc))
     all_angles(q, commanded.angles[0], world.axes, world.signs, th)
     acc += noise.accelerometer * rng.standard_normal((n, 3))
     measured = th + noise.encoder * rng.standard_normal((n, 3))

@@ -26,7 +26,8 @@ from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
 from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
 from inercal.selfcal.display import shown_unit
-from inercal.selfcal.filters.filter_result import Filtered, Problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import names, units
 from inercal.selfcal.platform.recording import Recording
@@ -35,14 +36,16 @@ _BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
 """Findings of the reading of a recording beyond which nothing else can be told of it."""
 
 
-def diagnose(recording: Recording, problem: Problem, found: Filtered, stated: Stated = None) -> list[Finding]:
+def diagnose(
+    recording: Recording, problem: FilterProblem, found: FilterResult, stated: Stated = None
+) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
     Parameters
     ----------
     recording : Recording
-    problem : Problem
-    found : Filtered
+    problem : FilterProblem
+    found : FilterResult
         What the estimator of the study made of it; the error-state filter judges the recording itself.
     stated : Hypothesis, optional
         What the study states with an uncertainty: no error within that is named.
@@ -63,7 +66,7 @@ def diagnose(recording: Recording, problem: Problem, found: Filtered, stated: St
     return findings
 
 
-def _fair(problem: Problem, moved: Problem, found: Filtered) -> Problem:
+def _fair(problem: FilterProblem, moved: FilterProblem, found: FilterResult) -> FilterProblem:
     """The problem as it may be meant: what is stated ``moved`` to where the recording fits best, and no prior that is
     in the way of what the filter then ``found``."""
     if not found.converged:
@@ -77,7 +80,7 @@ def _fair(problem: Problem, moved: Problem, found: Filtered) -> Problem:
     return replace(moved, prior=np.where(far, 10.0 * np.maximum(np.abs(found.coefficients), prior), prior))
 
 
-def _remaining(case: Case, meant: Problem, stated: Stated) -> list[Finding]:
+def _remaining(case: Case, meant: FilterProblem, stated: Stated) -> list[Finding]:
     """What the model leaves out, a prior that is too narrow, and noise that is not what is stated; ``meant`` as of
     `_fair`."""
     recording, problem = case
@@ -93,7 +96,7 @@ def _remaining(case: Case, meant: Problem, stated: Stated) -> list[Finding]:
     return [*(each.finding for each in errors), *_beyond_prior(now, problem.prior), *rest]
 
 
-def _beyond_prior(found: Filtered, prior: Array) -> list[Finding]:
+def _beyond_prior(found: FilterResult, prior: Array) -> list[Finding]:
     """Coefficients further from 0 than their prior [SI] allows, found with a wider one."""
     if not found.converged:
         return []
@@ -115,8 +118,8 @@ def _gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
 
 
 def _without_faults(
-    recording: Recording, problem: Problem, stated: Stated
-) -> tuple[Recording, Problem, list[Finding]]:
+    recording: Recording, problem: FilterProblem, stated: Stated
+) -> tuple[Recording, FilterProblem, list[Finding]]:
     """The recording without its gross faults, the problem as it may then be meant (`_fair`), and these faults."""
     findings = list[Finding]()
     of = likely(recording, problem, stated)

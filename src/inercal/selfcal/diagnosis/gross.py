@@ -136,7 +136,7 @@ def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: s
     if misfit < LIMITS.rough_misfit:
         return []
     for other in _other_gimbals(settings.gimbals):
-        tried = replace(world, axes=other.index, signs=other.sign)
+        tried = world._replace(axes=other.index, signs=other.sign)
         if _misfit(motion.turned(tried), commanded, noise) < LIMITS.rough_fit:
             code = "sign_suspect" if other.axes == settings.gimbals.axes else "channel_swap"
             text = f"th: the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
@@ -154,6 +154,7 @@ def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: s
         Finding(
             "contradiction",
             f"th: the angles do not follow the rates {sensor}_x..z, off by {100.0 * misfit:.3g} % of the motion",
+            harm=EVERYTHING,
         )
     ]
 
@@ -200,6 +201,7 @@ def _accelerometers(
         Finding(
             "contradiction",
             f"acc: specific force does not follow the angles, off by {100.0 * misfit:.3g} % of gravity",
+            harm=EVERYTHING,
         )
     ]
 
@@ -294,5 +296,6 @@ def off_the_path(
             f"{JOINTS[joint]} leaves the study's path at {t[first]:.6g} s; the angles are up to "
             f"{math.degrees(away.max()):.3g} deg away from it"
         )
-        findings.append(Finding("contradiction", text, f"row {rows[first] + 1}"))
+        # the recorded angles count in the fit, not those of the plan
+        findings.append(Finding("contradiction", text, f"row {rows[first] + 1}", ()))
     return findings

@@ -13,16 +13,17 @@ from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, white
-from inercal.selfcal.filters.filter_result import Filtered
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 
 _SENSORS = ("accelerometers", "encoders")
 
 
-def misstated(case: Case, now: Filtered) -> list[Finding]:
+def misstated(case: Case, now: FilterResult) -> list[Finding]:
     """Innovations larger or smaller than the stated noise has them, or correlated in time."""
     if not now.converged:
-        return [Finding("contradiction", f"the error-state filter fails on this recording: {now.message}")]
+        text = f"the error-state filter fails on this recording: {now.message}"
+        return [Finding("contradiction", text, harm=EVERYTHING)]
     z = regular(case[0], now)
     findings, wide = [], False
     for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
@@ -101,7 +102,10 @@ def _unexplained(z: Array) -> Finding:
         f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1{_correlated(z)})"
     )
     return Finding(
-        "contradiction", f"{text}, and no fault that is looked for explains them", places("row", worst + 2)
+        "contradiction",
+        f"{text}, and no fault that is looked for explains them",
+        places("row", worst + 2),
+        EVERYTHING,
     )
 
 

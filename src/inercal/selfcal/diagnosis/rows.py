@@ -22,7 +22,8 @@ from inercal.findings import EVERYTHING
 from inercal.geometry.rotations import boxminus, conjugate, rotate
 from inercal.records.places import counted, places
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered
-from inercal.selfcal.filters.filter_result import Filtered, Problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
@@ -46,7 +47,7 @@ def _fault(
     def without(case: Case, _: Array) -> Case:
         return repaired, case[1]
 
-    harm = () if code in ("gap", "outlier") else EVERYTHING
+    harm = () if code == "gap" else EVERYTHING
     return Hypothesis(
         text,
         code,
@@ -82,7 +83,7 @@ class Turning:
         return np.asarray(off > LIMITS.noise_sigmas * self.noise + 0.5 * np.linalg.norm(self.told, axis=1))
 
 
-def turning(recording: Recording, problem: Problem) -> Turning:
+def turning(recording: Recording, problem: FilterProblem) -> Turning:
     """Compare encoders and commands from row to row."""
     q, joints = gimbals(recording.th, problem.world)
     dt = recording.dt[:, None]
@@ -263,7 +264,7 @@ def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Ca
     yield _fault("gap", text, repaired, alternatives, times=len(rows), where=where)
 
 
-def single_readings(case: Case, now: Filtered) -> Iterator[Hypothesis[Case]]:
+def single_readings(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     """Single readings far from what the filter expects, left out one row after the other: an early one spoils what
     follows."""
     recording, problem = case

@@ -21,7 +21,8 @@ from inercal.geometry.rotations import boxminus, exp, rotate
 from inercal.records.places import counted
 from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, regular
 from inercal.selfcal.display import shown_unit
-from inercal.selfcal.filters.filter_result import Filtered, Problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES
@@ -32,7 +33,7 @@ Stated = Hypothesis[Case] | None
 """Errors of what a study states with an uncertainty."""
 
 
-def likely(recording: Recording, problem: Problem, stated: Stated) -> Problem:
+def likely(recording: Recording, problem: FilterProblem, stated: Stated) -> FilterProblem:
     """The problem with what is ``stated`` moved, within its uncertainty, to where the recording fits best.
 
     Where one of it would have to move further than chance takes it, the recording contradicts what is stated, and
@@ -147,7 +148,7 @@ def _other_earth(case: Case, values: Array) -> Case:
     recording, problem = case
     north, up = directions(problem.world)
     earth = problem.world.earth + values[0] * north + values[1] * up
-    return recording, replace(problem, world=replace(problem.world, earth=earth))
+    return recording, replace(problem, world=problem.world._replace(earth=earth))
 
 
 def directions(world: World) -> tuple[Array, Array]:
@@ -174,7 +175,7 @@ def _other_base(case: Case, values: Array) -> Case:
     """A base turned by beta [rad]."""
     recording, problem = case
     q, world = exp(values), problem.world
-    turned = replace(world, earth=rotate(q, world.earth), up=rotate(q, world.up))
+    turned = world._replace(earth=rotate(q, world.earth), up=rotate(q, world.up))
     return recording, replace(problem, world=turned)
 
 
@@ -184,7 +185,7 @@ def _other_scale(case: Case, values: Array) -> Case:
     return replace(recording, rate=recording.rate * (1.0 + values)), problem
 
 
-def _harmonics(case: Case, now: Filtered) -> Iterator[Hypothesis[Case]]:
+def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     """Errors periodic in the angle of a joint: of each joint the order that its innovations show most."""
     angles, joints = _found_angles(case, now)
     orders_tried, z = np.arange(1, LIMITS.harmonic_orders + 1), regular(case[0], now)
@@ -201,7 +202,7 @@ def _harmonics(case: Case, now: Filtered) -> Iterator[Hypothesis[Case]]:
             yield _harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint])
 
 
-def _found_angles(case: Case, now: Filtered) -> tuple[Array, Array]:
+def _found_angles(case: Case, now: FilterResult) -> tuple[Array, Array]:
     """Gimbal angles (n, 3) [rad] that the filter found, and the axes (n, 3, 3) of the joints: at rest the angles read
     change with their noise alone, which they would explain."""
     recording, problem = case
@@ -226,5 +227,12 @@ def _harmonic(joint: int, order: int, angle: Array) -> Hypothesis[Case]:
 
     name = f"harmonic {order} of {JOINTS[joint]}"
     return Hypothesis(
-        name, "unmodelled", says, without, ("sin", "cos"), 1e-6, alternatives=LIMITS.harmonic_orders
+        name,
+        "unmodelled",
+        says,
+        without,
+        ("sin", "cos"),
+        1e-6,
+        alternatives=LIMITS.harmonic_orders,
+        harm=EVERYTHING,
     )

@@ -32,8 +32,9 @@ from inercal.geometry.rotations import (
     right_jacobian,
     to_matrix,
 )
-from inercal.selfcal.filters.filter_result import Filtered, History, Problem, Start
+from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.gaps import broken
+from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.residuals import (
     Readings,
     Sensed,
@@ -59,15 +60,15 @@ ITERATIONS = 30
 
 
 def estimate_map(
-    recording: Recording, problem: Problem, start: Start | None = None, history: bool = True
-) -> Filtered:
+    recording: Recording, problem: FilterProblem, start: Start | None = None, history: bool = True
+) -> FilterResult:
     """Maximum a posteriori over all attitudes and coefficients.
 
     Parameters
     ----------
     recording : Recording
         Missing measurements (NaN) are left out, and those that the near-level gate stops.
-    problem : Problem
+    problem : FilterProblem
     start : Start, optional
         Of the first attitude; its encoder reading if absent. The iteration begins at the encoders all the same; where
         these never read it begins at the estimate of ``lm``.
@@ -76,7 +77,7 @@ def estimate_map(
 
     Returns
     -------
-    Filtered
+    FilterResult
         ``nis`` of a row: squared normalised residuals of its measurements and of the steps since the row measured
         before, and an equal share of those of the prior. All rows sum up to the minimum of the sum of squares,
         chi-square with as many degrees of freedom as there are scalar measurements (unknowns and terms of prior and
@@ -111,7 +112,7 @@ def estimate_map(
             break
     covariance = covariance * np.outer(problem.prior, problem.prior)
     rows = [np.tile(a, (len(q), 1)) for a in (c, np.sqrt(np.diag(covariance)))]
-    return Filtered(
+    return FilterResult(
         kind="map",
         coefficients=c,
         covariance=covariance,
@@ -129,7 +130,7 @@ def estimate_map(
 
 
 def _first_guess(
-    recording: Recording, problem: Problem, measured: Readings, start: Start | None
+    recording: Recording, problem: FilterProblem, measured: Readings, start: Start | None
 ) -> tuple[Array, Array]:
     """Attitudes (n, 4) and coefficients (p,) to begin with: the encoders', carried by the commands where silent."""
     seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
@@ -168,7 +169,7 @@ def _terms(
     q: Array,
     c: Array,
     recording: Recording,
-    problem: Problem,
+    problem: FilterProblem,
     measured: Readings,
     start: Start,
     loose: Sequence[int] = (),

@@ -1,8 +1,9 @@
-"""What every estimator of self-calibration takes and gives back."""
+"""State, estimates and result of the estimators of self-calibration."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,40 +11,13 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.geometry.rotations import multiply
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.kinematics import attitude
-from inercal.selfcal.platform.rig import World
-from inercal.selfcal.settings import Filter, Noise, SelfcalSettings
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """All that an estimator is told beside the recording: ``prior`` (p,) standard deviations about 0, p 18 or 24."""
-
-    world: World
-    noise: Noise
-    prior: Array
-    filter: Filter = field(default_factory=Filter)
-
-
-def problem(settings: SelfcalSettings) -> Problem:
-    """The problem that a study states."""
-    return Problem(settings.world, settings.noise, settings.prior[: settings.size], settings.filter)
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """Where an estimator begins other than at the first encoder reading.
-
-    ``attitude`` (4,) q_bp at the first row, and its standard deviation ``sigma`` [rad] about each axis.
-    """
-
-    attitude: Array
-    sigma: float
 
 
 class State(NamedTuple):
-    """What a recursive filter knows between two rows.
+    """State of a recursive filter between two rows.
 
     ``attitude`` (4,) q_bp, or gimbal angles (3,) [rad] of the gimbal-ukf; ``coefficients`` (p,), linear form; their
     joint ``covariance`` (m, m); ``near`` (3,) which accelerometers count as near level; ``th`` (3,) [rad] the last
@@ -57,11 +31,10 @@ class State(NamedTuple):
     th: Array
 
 
-class Trace(NamedTuple):
-    """What a recursive filter says of m rows: as in `History` and `Filtered`, a row for each step.
+class Estimates(NamedTuple):
+    """Estimates after each of m steps, a row for each: as in `History` and `FilterResult`.
 
-    ``nis`` and ``dims`` are there always; the arrays before them have no rows where no history was asked for.
-    ``restarts`` are the steps after which the attitude was taken anew (`inercal.selfcal.filters.gaps`).
+    ``nis`` and ``dims`` are always there; the arrays before them have no rows where no history was asked for.
     """
 
     attitude: Array
@@ -71,16 +44,12 @@ class Trace(NamedTuple):
     innovations: Array
     nis: Array
     dims: NDArray[np.int64]
-    lowest_eigenvalue: float
-    fallbacks: int
-    gimbal_cosine: float
-    restarts: tuple[int, ...] = ()
 
 
-def empty_trace(m: int, p: int, history: bool) -> Trace:
-    """A trace to be filled, of ``m`` rows and ``p`` coefficients."""
+def empty_estimates(m: int, p: int, history: bool) -> Estimates:
+    """Room for the estimates of ``m`` steps and ``p`` coefficients."""
     rows = m if history else 0
-    return Trace(
+    return Estimates(
         attitude=np.empty((rows, 4)),
         attitude_u=np.empty((rows, 3)),
         coefficients=np.empty((rows, p)),
@@ -88,10 +57,20 @@ def empty_trace(m: int, p: int, history: bool) -> Trace:
         innovations=np.empty((rows, 6)),
         nis=np.empty(m),
         dims=np.empty(m, dtype=np.int64),
-        lowest_eigenvalue=float("nan"),
-        fallbacks=0,
-        gimbal_cosine=1.0,
     )
+
+
+class Trace(NamedTuple):
+    """Estimates of a recursive filter after each of m steps, and its health over all of them, as in `FilterResult`.
+
+    ``restarts`` are the steps after which the attitude was taken anew (`inercal.selfcal.filters.gaps`).
+    """
+
+    estimates: Estimates
+    lowest_eigenvalue: float = math.nan
+    fallbacks: int = 0
+    gimbal_cosine: float = 1.0
+    restarts: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +88,8 @@ class History:
     u: Array
 
 
-def known_in(state: State, problem: Problem) -> History:
-    """What a state knows, as the one row of a history."""
+def estimate_of(state: State, problem: FilterProblem) -> History:
+    """The estimate of a state, as the one row of a history."""
     with np.errstate(invalid="ignore"):  # NaN of a filter that fails, which is said
         u = np.sqrt(np.diag(state.covariance))
     q = attitude_of(state, problem)
@@ -127,7 +106,7 @@ def known_in(state: State, problem: Problem) -> History:
     )
 
 
-def attitude_of(state: State, problem: Problem) -> Array:
+def attitude_of(state: State, problem: FilterProblem) -> Array:
     """q_bp of a state."""
     if len(state.attitude) == 4:
         return state.attitude.copy()
@@ -135,8 +114,8 @@ def attitude_of(state: State, problem: Problem) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
-    """What an estimator found.
+class FilterResult:
+    """Result of an estimator.
 
     Attributes
     ----------
@@ -201,12 +180,12 @@ class Filtered:
     @property
     def nis_mean(self) -> float:
         """Mean of the normalised innovations squared, per row with measurements; NaN without any."""
-        known = np.isfinite(self.nis)
-        return float(self.nis[known].mean()) if known.any() else float("nan")
+        finite = np.isfinite(self.nis)
+        return float(self.nis[finite].mean()) if finite.any() else math.nan
 
 
-def found(filtered: Filtered) -> tuple[Array, Array]:
+def product_form(result: FilterResult) -> tuple[Array, Array]:
     """Coefficients (p,) of an estimator and their standard uncertainties (p,), product form."""
-    slope = product_slope(filtered.coefficients)
-    variances = np.diag(slope @ filtered.covariance @ slope.T)
-    return to_product(filtered.coefficients), np.sqrt(np.where(variances > 0.0, variances, np.nan))
+    slope = product_slope(result.coefficients)
+    variances = np.diag(slope @ result.covariance @ slope.T)
+    return to_product(result.coefficients), np.sqrt(np.where(variances > 0.0, variances, np.nan))

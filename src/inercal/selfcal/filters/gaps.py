@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +25,16 @@ from inercal.geometry.rotations import boxminus, conjugate, exp, log, multiply, 
 from inercal.records.places import counted
 from inercal.selfcal.filters import error_state
 from inercal.selfcal.filters.filter_result import (
-    Filtered,
-    Problem,
-    Start,
+    Estimates,
+    FilterResult,
     State,
     Trace,
-    empty_trace,
-    known_in,
+    empty_estimates,
+    estimate_of,
 )
+from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
-from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.recording import Recording, Steps
 from inercal.selfcal.platform.rig import World
 
 LONG = 1.5
@@ -105,13 +104,13 @@ def with_held(t: Array, rate: Array, th: Array, world: World, gained: bool) -> t
     before = np.append(np.full(RECENT - 1, np.nan), dt)
     step = usual(np.lib.stride_tricks.sliding_window_view(before, RECENT))
     long = dt > LONG * step
-    known = np.all(np.isfinite(rate), axis=1)
-    held = np.flatnonzero(long | ~known)
-    rated, read = _last(known), _last(np.all(np.isfinite(th), axis=1))
+    rated = np.all(np.isfinite(rate), axis=1)
+    held = np.flatnonzero(long | ~rated)
+    of_rate, of_angles = _last(rated), _last(np.all(np.isfinite(th), axis=1))
     rate = rate.copy()
     filled = []
     for k in held:
-        i, j = rated[k], read[k]
+        i, j = of_rate[k], of_angles[k]
         half = 0.5 * step[k]
         middle = t[i + 1] - half if gained else t[i] + half
         filled.append(held_rate(rate[i], th[j], world, middle - t[j], t[k] - t[j], dt[k]))
@@ -120,19 +119,16 @@ def with_held(t: Array, rate: Array, th: Array, world: World, gained: bool) -> t
     return rate, tuple(held.tolist())
 
 
-def _last(known: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Of each row, the last one before or at it that is known."""
-    return np.asarray(np.maximum.accumulate(np.where(known, np.arange(len(known)), 0)))
+def _last(complete: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The last complete row before or at each row."""
+    return np.asarray(np.maximum.accumulate(np.where(complete, np.arange(len(complete)), 0)))
 
 
 def advance(
     module: ModuleType,
     state: State,
-    problem: Problem,
-    dt: Array,
-    rate: Array,
-    acc: Array,
-    th: Array,
+    problem: FilterProblem,
+    steps: Steps,
     held: Sequence[int],
     history: bool = True,
 ) -> tuple[State, Trace]:
@@ -142,32 +138,28 @@ def advance(
     which the attitude was taken anew.
     """
     if not held:
-        state, trace = module.advance(state, problem, dt, rate, acc, th, history)
+        state, trace = module.advance(state, problem, steps, history)
         return state, trace
     nothing = np.full((1, 3), np.nan)
     parts, restarts, done = list[Trace](), list[int](), 0
-    seen = np.all(np.isfinite(th), axis=1)
-    for k in doubtful(held, th):
-        step = slice(k, k + 1)
+    seen = np.all(np.isfinite(steps.th), axis=1)
+    for k in doubtful(held, steps.th):
+        step = steps.part(slice(k, k + 1))
         if k > done:
-            before = slice(done, k)
-            state, trace = module.advance(
-                state, problem, dt[before], rate[before], acc[before], th[before], history
-            )
+            state, trace = module.advance(state, problem, steps.part(slice(done, k)), history)
             parts.append(trace)
-        propagated, trace = module.advance(
-            _copy(state), problem, dt[step], rate[step], nothing, nothing, history
-        )
+        unmeasured = step._replace(acc=nothing, th=nothing)
+        propagated, trace = module.advance(_copy(state), problem, unmeasured, history)
         if not seen[k]:
             state = propagated
-        elif _contradicted(propagated, problem, th[k]):
-            state, trace = _anew(module, propagated, problem, th[k], history)
+        elif _contradicted(propagated, problem, steps.th[k]):
+            state, trace = _anew(module, propagated, problem, steps.th[k], history)
             restarts.append(k)
         else:
-            state, trace = module.advance(state, problem, dt[step], rate[step], acc[step], th[step], history)
+            state, trace = module.advance(state, problem, step, history)
         parts.append(trace)
         done = k + 1
-    state, trace = module.advance(state, problem, dt[done:], rate[done:], acc[done:], th[done:], history)
+    state, trace = module.advance(state, problem, steps.part(slice(done, None)), history)
     return state, _joined([*parts, trace])._replace(restarts=tuple(restarts))
 
 
@@ -180,32 +172,22 @@ def doubtful(held: Sequence[int], th: Array) -> list[int]:
     return [int(k) for k in np.flatnonzero(doubt)]
 
 
-def broken(recording: Recording, problem: Problem, start: Start | None = None) -> list[int]:
+def broken(recording: Recording, problem: FilterProblem, start: Start | None = None) -> list[int]:
     """Steps held that the encoders contradict, as the error-state filter sees it."""
     if not recording.held:
         return []
     state = error_state.initial(problem, recording.th[0], start)
-    th = recording.th[1:]
-    _, trace = advance(
-        error_state,
-        state,
-        problem,
-        recording.dt,
-        recording.rate,
-        recording.acc[1:],
-        th,
-        recording.held,
-        False,
-    )
-    seen = np.all(np.isfinite(th), axis=1)
+    steps = recording.steps
+    _, trace = advance(error_state, state, problem, steps, recording.held, history=False)
+    seen = np.all(np.isfinite(steps.th), axis=1)
     return [
         k for k in recording.held for end in trace.restarts if k <= end and not seen[k:end].any()
     ]  # those since the encoders read last
 
 
-def taken_anew(recording: Recording, found: Filtered) -> list[Finding]:
+def taken_anew(recording: Recording, result: FilterResult) -> list[Finding]:
     """``gap``: over which the platform did something else."""
-    rows = np.array(found.restarts, dtype=np.int64)
+    rows = np.array(result.restarts, dtype=np.int64)
     if not rows.size:
         return []
     text = (
@@ -217,14 +199,14 @@ def taken_anew(recording: Recording, found: Filtered) -> list[Finding]:
     return [Finding("gap", text, f"t = {shown} s{more}")]
 
 
-def _contradicted(state: State, problem: Problem, th: Array) -> bool:
+def _contradicted(state: State, problem: FilterProblem, th: Array) -> bool:
     """Whether encoder readings (3,) [rad] are not where a state that has not seen them expects the platform."""
-    known, read = known_in(state, problem), anew(problem, th)
-    limit = CONTRADICTION * np.hypot(known.attitude_u[0], read.sigma)
-    return bool((np.abs(boxminus(read.attitude, known.attitude[0])) > limit).any())
+    expected, read = estimate_of(state, problem), anew(problem, th)
+    limit = CONTRADICTION * np.hypot(expected.attitude_u[0], read.sigma)
+    return bool((np.abs(boxminus(read.attitude, expected.attitude[0])) > limit).any())
 
 
-def anew(problem: Problem, th: Array) -> Start:
+def anew(problem: FilterProblem, th: Array) -> Start:
     """The attitude that encoders (3,) [rad] read, with the most that they leave uncertain about any axis.
 
     Outer and platform axis are at an angle of 90 deg less the inner one, so that ``J J^T`` has no larger eigenvalue
@@ -235,7 +217,7 @@ def anew(problem: Problem, th: Array) -> Start:
 
 
 def _anew(
-    module: ModuleType, state: State, problem: Problem, th: Array, history: bool
+    module: ModuleType, state: State, problem: FilterProblem, th: Array, history: bool
 ) -> tuple[State, Trace]:
     """The state with its attitude as encoders (3,) [rad] read it, and the trace of that row, without an update."""
     p = len(problem.prior)
@@ -243,13 +225,13 @@ def _anew(
     begun: State = module.initial(problem, on_turn, anew(problem, on_turn))
     begun.covariance[-p:, -p:] = state.covariance[-p:, -p:]
     state = begun._replace(coefficients=state.coefficients, near=state.near)
-    trace = empty_trace(1, p, history)
-    trace.nis[:], trace.dims[:] = math.nan, 0
+    out = empty_estimates(1, p, history)
+    out.nis[:], out.dims[:] = math.nan, 0
     if history:
-        trace.innovations[:] = math.nan
-        for name, row in vars(known_in(state, problem)).items():
-            getattr(trace, name)[:] = row
-    return state, trace._replace(gimbal_cosine=abs(math.cos(on_turn[1])))
+        out.innovations[:] = math.nan
+        for name, row in vars(estimate_of(state, problem)).items():
+            getattr(out, name)[:] = row
+    return state, Trace(out, gimbal_cosine=abs(math.cos(on_turn[1])))
 
 
 def _copy(state: State) -> State:
@@ -259,13 +241,9 @@ def _copy(state: State) -> State:
 
 def _joined(parts: Sequence[Trace]) -> Trace:
     """Traces one after the other as one."""
-    joined: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("attitude", "attitude_u", "coefficients", "u", "innovations", "nis", "dims")
-    }
     lowest = [part.lowest_eigenvalue for part in parts if not math.isnan(part.lowest_eigenvalue)]
     return Trace(
-        **joined,
+        Estimates(*map(np.concatenate, zip(*(part.estimates for part in parts), strict=True))),
         lowest_eigenvalue=min(lowest, default=math.nan),
         fallbacks=sum(part.fallbacks for part in parts),
         gimbal_cosine=min(part.gimbal_cosine for part in parts),

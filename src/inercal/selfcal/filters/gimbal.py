@@ -16,48 +16,45 @@ whatever the rig: angles a, b, c are those of the gimbals times their signs and 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.estimate.factor import FACTORS
-from inercal.estimate.sigma_point import draw, moments, update, weights
+from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Vector
-from inercal.selfcal.filters.filter_result import Problem, Start, State, Trace, empty_trace
-from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
+from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
+from inercal.selfcal.filters.gating import admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterProblem, Model, Start
 from inercal.selfcal.platform.kinematics import Axes, angles, attitude, nearest_turn, parity
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
+from inercal.selfcal.platform.recording import Steps
+from inercal.selfcal.platform.rig import World
 
 Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.int64]
 Cosines: TypeAlias = tuple[float, float, float, float, float, float]
 
 
-def initial(problem: Problem, th: Array, start: Start | None = None) -> State:
+def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> State:
     """The state before the first step: coefficients 0 with the prior, angles ``th`` (3,) or those of ``start``."""
     world, p = problem.world, len(problem.prior)
-    known = np.array(th, dtype=float)
-    sigma, at = problem.noise.encoder, known.copy()
+    read = np.array(th, dtype=float)
+    sigma, at = problem.noise.encoder, read.copy()
     if start is not None:
-        sigma, at = start.sigma, np.array(angles(start.attitude, known, world.axes, world.signs))
+        sigma, at = start.sigma, np.array(angles(start.attitude, read, world.axes, world.signs))
     covariance = np.diag(np.concatenate([np.full(3, sigma**2), problem.prior**2]))
-    return State(at, np.zeros(p), covariance, np.zeros(3, dtype=np.int64), known)
+    return State(at, np.zeros(p), covariance, np.zeros(3, dtype=np.int64), read)
 
 
-def advance(
-    state: State, problem: Problem, dt: Array, rate: Array, acc: Array, th: Array, history: bool = True
-) -> tuple[State, Trace]:
-    """Take the filter through m steps; arguments as of `inercal.selfcal.filters.error_state.advance`."""
-    world, trace = problem.world, empty_trace(len(dt), len(problem.prior), history)
-    lowest, fallbacks, cosine = _advance(
-        state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
-        world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
-        FACTORS[problem.filter.factor or "cholesky"], problem.filter.integration == "euler",
-        trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
-    )  # fmt: skip
-    return state, trace._replace(lowest_eigenvalue=lowest, fallbacks=fallbacks, gimbal_cosine=cosine)
+def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
+    """Take the filter through m steps, as `inercal.selfcal.filters.error_state.advance` does."""
+    out = empty_estimates(len(steps.dt), len(problem.prior), history)
+    factor = FACTORS[problem.filter.factor or "cholesky"]
+    euler = problem.filter.integration == "euler"
+    health = _advance(state, problem.model, factor, euler, steps, out)
+    return state, Trace(out, *health)
 
 
 @kernel
@@ -145,32 +142,39 @@ def hat(th: Vector | Array, e: float, signs: Array) -> Vector:
     return e * signs[0] * th[0], e * signs[1] * th[1], e * signs[2] * th[2]
 
 
+class Turn(NamedTuple):
+    """A step of the platform: its ``commanded`` rate (3,) [rad/s], ``dt`` [s], and true for ``euler`` integration."""
+
+    commanded: Vector
+    dt: float
+    euler: bool
+
+
 @kernel
-def _predict(
-    th: Array, c: Array, w: Vector, dt: float, euler: bool, earth: Array, axes: Axes, signs: Array,
-    columns: Array, shifted: Array, z: Array,
-) -> None:  # fmt: skip
-    """Put into ``z`` (2 n + 1, 3) where the angles of all points are after a step of ``dt`` [s], against ``th``.
+def _predict(th: Array, c: Array, turn: Turn, world: World, columns: Array, shifted: Array, z: Array) -> None:
+    """Put into ``z`` (2 n + 1, 3) the angles of all points after a step, against ``th``.
 
     ``columns`` (n, n) of the points before the step; ``shifted`` (p,) used up.
     """
+    axes, signs = world.axes, world.signs
     n, e = len(columns), parity(axes)
-    at, earth_k = cosines(hat(th, e, signs)), along(earth, axes, e)
+    at, earth_k = cosines(hat(th, e, signs)), along(world.earth, axes, e)
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)
         for j in range(len(c)):
             shifted[j] = c[j] + sign * column[3 + j]
         if len(c) > 18:
-            earth_k = along(on_the_base(earth, shifted), axes, e)
+            earth_k = along(on_the_base(world.earth, shifted), axes, e)
         d = hat((sign * column[0], sign * column[1], sign * column[2]), e, signs)
-        d = step(at, d, along(platform_rate(w, shifted), axes, e), earth_k, dt, euler)
+        d = step(at, d, along(platform_rate(turn.commanded, shifted), axes, e), earth_k, turn.dt, turn.euler)
         z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = hat(d, e, signs)
 
 
 @kernel
-def _add_walk(P: Array, thy: float, variance: float, axes: Axes, signs: Array) -> None:
+def _add_walk(P: Array, thy: float, variance: float, world: World) -> None:
     """Add ``T variance T^T`` [rad^2] to the covariance of angles: only outer and platform angle go together."""
-    b = parity(axes) * signs[1] * thy
+    signs = world.signs
+    b = parity(world.axes) * signs[1] * thy
     secant = 1.0 / math.cos(b)
     P[0, 0] += variance * secant * secant
     P[1, 1] += variance
@@ -181,21 +185,20 @@ def _add_walk(P: Array, thy: float, variance: float, axes: Axes, signs: Array) -
 
 
 @kernel
-def _read(
-    th: Array, c: Array, up: Array, axes: Axes, signs: Array, columns: Array, shifted: Array, f: Array, z: Array
-) -> None:  # fmt: skip
+def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: Array, z: Array) -> None:
     """Put into ``z`` (2 n + 1, 6) what accelerometers [m/s^2] and encoders [rad, against ``th``] read at all points.
 
     ``columns`` (n, n) of the points; ``shifted`` (p,) and ``f`` (3,) used up.
     """
+    axes, signs = world.axes, world.signs
     n, e = len(columns), parity(axes)
-    at, up_k = cosines(hat(th, e, signs)), along(up, axes, 1.0)
+    at, up_k = cosines(hat(th, e, signs)), along(world.up, axes, 1.0)
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)
         for j in range(len(c)):
             shifted[j] = c[j] + sign * column[3 + j]
         if len(c) > 18:
-            up_k = along(on_the_base(up, shifted), axes, 1.0)
+            up_k = along(on_the_base(world.up, shifted), axes, 1.0)
         d = (sign * column[0], sign * column[1], sign * column[2])
         f[axes[0]], f[axes[1]], f[axes[2]] = force(near(at, hat(d, e, signs)), up_k)
         z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = accelerometers((f[0], f[1], f[2]), shifted)
@@ -204,74 +207,71 @@ def _read(
 
 @kernel
 def _advance(
-    th: Array, c: Array, P: Array, level: Indices, known: Array,
-    dt: Array, rate: Array, acc: Array, th_m: Array,
-    earth: Array, up: Array, axes: Axes, signs: Array, levels: Array, gate: Array, kind: int, euler: bool,
-    out_attitude: Array, out_attitude_u: Array, out_coefficients: Array, out_u: Array, out_innovations: Array,
-    nis: Array, dims: Indices,
-) -> tuple[float, int, float]:  # fmt: skip
+    state: State, model: Model, factor: int, euler: bool, steps: Steps, out: Estimates
+) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
+    th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
+    world, noise, gate = model
     n, p = len(P), len(c)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
-    A, work, columns, shifted = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty(p)
-    moved, moved_odd, by, Pth, Pxth = (
-        np.zeros((2 * n + 1, 3)), np.empty((n, 3)), np.empty(3), np.empty((3, 3)), np.empty((n, 3))
-    )  # fmt: skip
-    z, odd, middle, Pzz, Pxz = (
-        np.zeros((2 * n + 1, 6)), np.empty((n, 6)), np.empty(6), np.empty((6, 6)), np.empty((n, 6))
-    )  # fmt: skip
+    points, shifted = empty_points(n), np.empty(p)
+    moved, moves = np.zeros((2 * n + 1, 3)), empty_moments(n, 3)
+    z, of_points = np.zeros((2 * n + 1, 6)), empty_moments(n, 6)
     r, f, L, x = np.empty(6), np.empty(3), np.empty((6, 6)), np.empty(n)
-    told, cosine = np.array([math.nan, 0.0]), 1.0
-    for k in range(len(dt)):
-        draw(P, kind, spread, A, work, columns, told)
-        w = (rate[k, 0], rate[k, 1], rate[k, 2])
-        _predict(th, c, w, dt[k], euler, earth, axes, signs, columns, shifted, moved)
-        moments(moved, columns, other, by, moved_odd, Pth, Pxth)
+    history, cosine = len(out.u) > 0, 1.0
+    for k in range(len(steps.dt)):
+        dt, acc, th_m = steps.dt[k], steps.acc[k], steps.th[k]
+        w = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2])
+        draw(P, factor, spread, points)
+        _predict(th, c, Turn(w, dt, euler), world, points.columns, shifted, moved)
+        moments(moved, points.columns, other, moves)
         for i in range(3):
-            th[i] += by[i]
+            th[i] += moves.mean[i]
             for j in range(3):
-                P[i, j] = Pth[i, j]
+                P[i, j] = moves.covariance[i, j]
             for j in range(3, n):
-                P[i, j], P[j, i] = Pxth[j, i], Pxth[j, i]
-        _add_walk(P, th[1], levels[0] * levels[0] * dt[k], axes, signs)
+                P[i, j], P[j, i] = moves.cross[j, i], moves.cross[j, i]
+        _add_walk(P, th[1], noise.angle_random_walk * noise.angle_random_walk * dt, world)
         if not math.isfinite(th[0] + th[1] + th[2]):
             # or else innovations that are no numbers would count as not measured, and coefficients stay as they were
             c.fill(math.nan)
             P.fill(math.nan)
         cosine = _lesser(abs(math.cos(th[1])), cosine)
-        seen = not (math.isnan(th_m[k, 0]) or math.isnan(th_m[k, 1]) or math.isnan(th_m[k, 2]))
+        seen = not (math.isnan(th_m[0]) or math.isnan(th_m[1]) or math.isnan(th_m[2]))
         if seen:
             for i in range(3):
-                known[i] = nearest_turn(th_m[k, i], known[i])
-            cosine = _lesser(abs(math.cos(known[1])), cosine)
-            watch(specific_force(attitude(known, axes, signs), on_the_base(up, c)), gate, level)
+                read[i] = nearest_turn(th_m[i], read[i])
+            cosine = _lesser(abs(math.cos(read[1])), cosine)
+            of_encoders = attitude(read, world.axes, world.signs)
+            watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, level)
         take = updating(gate, level)
         for i in range(3):
-            r[i] = acc[k, i] if take and admitted(i, gate, level) else math.nan
-            r[3 + i] = known[i] - th[i] if take and seen else math.nan
-        draw(P, kind, spread, A, work, columns, told)
-        _read(th, c, up, axes, signs, columns, shifted, f, z)
-        moments(z, columns, other, middle, odd, Pzz, Pxz)
+            r[i] = acc[i] if take and admitted(i, gate, level) else math.nan
+            r[3 + i] = read[i] - th[i] if take and seen else math.nan
+        draw(P, factor, spread, points)
+        _read(th, c, world, points.columns, shifted, f, z)
+        moments(z, points.columns, other, of_points)
         for i in range(6):
-            Pzz[i, i] += levels[1] * levels[1] if i < 3 else levels[2] * levels[2]
-            r[i] -= middle[i]
-            if len(out_u) > 0:
-                out_innovations[k, i] = r[i] / math.sqrt(Pzz[i, i])
-        nis[k], dims[k] = update(r, Pxz, Pzz, L, P, x)
+            sigma = noise.accelerometer if i < 3 else noise.encoder
+            of_points.covariance[i, i] += sigma * sigma
+            r[i] -= of_points.mean[i]
+            if history:
+                out.innovations[k, i] = r[i] / math.sqrt(of_points.covariance[i, i])
+        out.nis[k], out.dims[k] = update(r, of_points.cross, of_points.covariance, L, P, x)
         for i in range(3):
             th[i] += x[i]
         for j in range(p):
             c[j] += x[3 + j]
-        if len(out_u) > 0:
-            q = attitude(th, axes, signs)
+        if history:
+            q = attitude(th, world.axes, world.signs)
             for i in range(4):
-                out_attitude[k, i] = q[i]
+                out.attitude[k, i] = q[i]
             for i in range(3):
-                out_attitude_u[k, i] = math.sqrt(P[i, i])
+                out.attitude_u[k, i] = math.sqrt(P[i, i])
             for j in range(p):
-                out_coefficients[k, j] = c[j]
-                out_u[k, j] = math.sqrt(P[3 + j, 3 + j])
-    return told[0], int(told[1]), cosine
+                out.coefficients[k, j] = c[j]
+                out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
+    return points.health[0], int(points.health[1]), cosine
 
 
 @kernel

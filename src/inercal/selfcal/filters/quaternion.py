@@ -13,26 +13,28 @@ points of the encoders' noise are the centre but for their quaternion, and add i
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.estimate.factor import FACTORS
-from inercal.estimate.sigma_point import covariance, cross, draw, mean, update, weights
+from inercal.estimate.sigma_point import covariance, cross, draw, empty_points, mean, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
-from inercal.selfcal.filters.filter_result import Problem, Start, State, Trace, empty_trace
-from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
-from inercal.selfcal.platform.kinematics import Axes, attitude, joint_axes, nearest_turn
+from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
+from inercal.selfcal.filters.gating import admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterProblem, Model, Start
+from inercal.selfcal.platform.kinematics import attitude, joint_axes, nearest_turn
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
+from inercal.selfcal.platform.recording import Steps
+from inercal.selfcal.platform.rig import World
 
 Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.int64]
 Columns: TypeAlias = tuple[Quaternion, Quaternion, Quaternion]
 
 
-def initial(problem: Problem, th: Array, start: Start | None = None) -> State:
+def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> State:
     """The state before the first step: coefficients 0 with the prior, the attitude of angles ``th`` (3,) or ``start``.
 
     The quaternion is uncertain by sigma / 2 across, and by 1e-4 of that along itself, lest a factor fails at once.
@@ -47,31 +49,12 @@ def initial(problem: Problem, th: Array, start: Start | None = None) -> State:
     return State(q, np.zeros(p), P, np.zeros(3, dtype=np.int64), np.array(th, dtype=float))
 
 
-def advance(
-    state: State, problem: Problem, dt: Array, rate: Array, acc: Array, th: Array, history: bool = True
-) -> tuple[State, Trace]:
-    """Take the filter through m steps.
-
-    Parameters
-    ----------
-    state : State
-        Its arrays become those of the new one.
-    problem : Problem
-    dt : (m,) s
-    rate : (m, 3) rad/s, held over each step
-    acc, th : (m, 3) m/s^2, rad
-        Measured at the end of each step; NaN where not.
-    history : bool
-        Whether the trace holds more than the normalised innovations squared.
-    """
-    world, trace = problem.world, empty_trace(len(dt), len(problem.prior), history)
-    cosine, told = _advance(
-        state.attitude, state.coefficients, state.covariance, state.near, state.th, dt, rate, acc, th,
-        world.earth, world.up, world.axes, world.signs, problem.noise.levels, gate_of(problem.filter.gating),
-        FACTORS[problem.filter.factor or "eigen"],
-        trace.attitude, trace.attitude_u, trace.coefficients, trace.u, trace.innovations, trace.nis, trace.dims,
-    )  # fmt: skip
-    return state, trace._replace(lowest_eigenvalue=told[0], fallbacks=int(told[1]), gimbal_cosine=cosine)
+def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
+    """Take the filter through m steps, as `inercal.selfcal.filters.error_state.advance` does."""
+    out = empty_estimates(len(steps.dt), len(problem.prior), history)
+    factor = FACTORS[problem.filter.factor or "eigen"]
+    health = _advance(state, problem.model, factor, steps, out)
+    return state, Trace(out, *health)
 
 
 @kernel
@@ -108,9 +91,9 @@ def _put(z: Array, q: Quaternion, read: Vector, centre: Array) -> None:
 
 
 @kernel
-def _noise_of_encoders(q: Quaternion, th: Array, axes: Axes, signs: Array, sigma: float, S: Array) -> None:
+def _noise_of_encoders(q: Quaternion, th: Array, world: World, sigma: float, S: Array) -> None:
     """Add ``[sigma G, (sigma/2) q]`` times its transpose to the upper left (4, 4) of ``S``, at gimbal angles (3,)."""
-    jx, jy, jz = joint_axes(th, axes, signs)
+    jx, jy, jz = joint_axes(th, world.axes, world.signs)
     half = 0.25 * sigma * sigma
     for j in (
         multiply(q, (0.0, jx[0], jx[1], jx[2])),
@@ -123,26 +106,37 @@ def _noise_of_encoders(q: Quaternion, th: Array, axes: Axes, signs: Array, sigma
                 S[i, k] += half * j[i] * j[k]
 
 
+class Turn(NamedTuple):
+    """A step of the platform: its ``commanded`` rate (3,) [rad/s], ``dt`` [s], and ``walk``, the deviation of the
+    points of the process noise, half of an angle [rad]."""
+
+    commanded: Vector
+    dt: float
+    walk: float
+
+
+class Readings(NamedTuple):
+    """Attitudes and accelerometers of all points: ``centre`` (7,) those of the centre; ``z`` (1 + 2 n + 6, 7) those of
+    all less those of the centre: centre, + and - by turns, noise; ``odd`` (n, 7) + less - of each pair."""
+
+    centre: Array
+    z: Array
+    odd: Array
+
+
 @kernel
 def _propagate(
-    q: Quaternion, c: Array, columns: Array, w: Vector, dt: float, earth: Array, up: Array, walk: float,
-    ck: Array, centre: Array, z: Array, odd: Array,
-) -> None:  # fmt: skip
-    """Take all points through a step of ``dt`` [s] and read the accelerometers there.
+    q: Quaternion, c: Array, columns: Array, turn: Turn, world: World, ck: Array, out: Readings
+) -> None:
+    """Take all points through a step and read the accelerometers there.
 
-    Parameters
-    ----------
-    q, c : (4,), (p,) mean before
-    columns : (n, n) deviations of the points, row by row, n = 4 + p
-    w : (3,) rad/s, commanded
-    earth, up : (3,) rad/s, m/s^2, in b
-    walk : deviation of the points of the process noise, half of an angle [rad]
-    ck : (p,) used up
-    centre : (7,) receives attitude and accelerometers of the centre
-    z : (1 + 2 n + 6, 7) receives those of all points less those of the centre: centre, +, - by turns, noise
-    odd : (n, 7) receives + less - of each pair
+    ``q`` (4,) and ``c`` (p,) are the mean before; ``columns`` (n, n) the deviations of the points, row by row,
+    n = 4 + p; ``ck`` (p,) is used up.
     """
     n, p = len(columns), len(c)
+    w, dt, walk = turn
+    centre, z, odd = out
+    earth, up = world.earth, world.up
     extended = p > 18
     earth_e, up_e = on_the_base(earth, c), on_the_base(up, c)
     by_earth = exp((-earth_e[0] * dt, -earth_e[1] * dt, -earth_e[2] * dt))
@@ -178,31 +172,31 @@ def _propagate(
 
 @kernel
 def _advance(
-    attitude_: Array, c: Array, P: Array, near: Indices, angles: Array, dt: Array, rates: Array, acc: Array, th: Array,
-    earth: Array, up: Array, axes: Axes, signs: Array, levels: Array, gate: Array, kind: int,
-    out_attitude: Array, out_attitude_u: Array, out_coefficients: Array, out_u: Array, out_innovations: Array,
-    nis: Array, dims: Indices,
-) -> tuple[float, Array]:  # fmt: skip
-    """The loop; returns the least |cos thy|, and (2,) what `draw` tells of the factor."""
+    state: State, model: Model, factor: int, steps: Steps, out: Estimates
+) -> tuple[float, int, float]:
+    """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
+    c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
+    world, noise, gate = model
     n, p = len(P), len(c)
     _, _, other, spread = weights(n + 8, 1.0, 0.0, 0.0)
-    A, work, columns, told = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.array([math.nan, 0.0])
+    points, ck = empty_points(n), np.empty(p)
     z, odd, centre, shift = np.empty((1 + 2 * n + 6, 7)), np.empty((n, 7)), np.empty(7), np.empty(7)
     S, L, r = np.empty((7, 7)), np.empty((7, 7)), np.empty(7)
-    Pxz, dx, ck = np.empty((n, 7)), np.empty(n), np.empty(p)
-    history = len(out_u) > 0
+    Pxz, dx = np.empty((n, 7)), np.empty(n)
+    history = len(out.u) > 0
     cosine = 1.0
-    q = (attitude_[0], attitude_[1], attitude_[2], attitude_[3])
-    for k in range(len(dt)):
-        draw(P, kind, spread, A, work, columns, told)
-        walk = spread * 0.5 * levels[0] * math.sqrt(dt[k])
-        w = (rates[k, 0], rates[k, 1], rates[k, 2])
-        _propagate(q, c, columns, w, dt[k], earth, up, walk, ck, centre, z, odd)
+    q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
+    for k in range(len(steps.dt)):
+        dt, acc, th = steps.dt[k], steps.acc[k], steps.th[k]
+        w = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2])
+        draw(P, factor, spread, points)
+        walk = spread * 0.5 * noise.angle_random_walk * math.sqrt(dt)
+        _propagate(q, c, points.columns, Turn(w, dt, walk), world, ck, Readings(centre, z, odd))
 
         # moments: the centre has no weight, and all points that were not written lie there
         mean(z, 0.0, other, shift)
         covariance(z, 0.0, other, S)
-        cross(columns, odd, other, other, Pxz)
+        cross(points.columns, odd, other, other, Pxz)
         for i in range(7):
             for j in range(7):
                 S[i, j] -= shift[i] * shift[j]
@@ -217,13 +211,13 @@ def _advance(
 
         # innovations: quaternion (4), accelerometers (3)
         r.fill(math.nan)
-        seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
+        seen = not (math.isnan(th[0]) or math.isnan(th[1]) or math.isnan(th[2]))
         if seen:
             for i in range(3):
-                angles[i] = nearest_turn(th[k, i], angles[i])
+                angles[i] = nearest_turn(th[i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = attitude(angles, axes, signs)
-            watch(specific_force(of_encoders, on_the_base(up, c)), gate, near)
+            of_encoders = attitude(angles, world.axes, world.signs)
+            watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
         take = updating(gate, near)
         count = 0
         if take and seen:
@@ -233,36 +227,36 @@ def _advance(
             )
             for i in range(4):
                 r[i] = (of_encoders[i] if along >= 0.0 else -of_encoders[i]) - q[i]
-            _noise_of_encoders(of_encoders, angles, axes, signs, levels[2], S)
+            _noise_of_encoders(of_encoders, angles, world, noise.encoder, S)
         if take:
             for i in range(3):
-                if admitted(i, gate, near) and not math.isnan(acc[k, i]):
-                    r[4 + i] = acc[k, i] - centre[4 + i] - shift[4 + i]
+                if admitted(i, gate, near) and not math.isnan(acc[i]):
+                    r[4 + i] = acc[i] - centre[4 + i] - shift[4 + i]
                     count += 1
         for i in range(4, 7):
-            S[i, i] += levels[1] * levels[1]
+            S[i, i] += noise.accelerometer * noise.accelerometer
         if history:
             across = _across(q)
             for i in range(3):
                 xi = across[i]
                 miss = 2.0 * (xi[0] * r[0] + xi[1] * r[1] + xi[2] * r[2] + xi[3] * r[3])
-                out_innovations[k, i] = r[4 + i] / math.sqrt(S[4 + i, 4 + i])
-                out_innovations[k, 3 + i] = miss / _about_axes(xi, S)
+                out.innovations[k, i] = r[4 + i] / math.sqrt(S[4 + i, 4 + i])
+                out.innovations[k, 3 + i] = miss / _about_axes(xi, S)
 
-        nis[k], _ = update(r, Pxz, S, L, P, dx)
-        dims[k] = count
+        out.nis[k], _ = update(r, Pxz, S, L, P, dx)
+        out.dims[k] = count
         q = normalize((q[0] + dx[0], q[1] + dx[1], q[2] + dx[2], q[3] + dx[3]))
         for i in range(p):
             c[i] += dx[4 + i]
         if history:
             across = _across(q)
             for i in range(4):
-                out_attitude[k, i] = q[i]
+                out.attitude[k, i] = q[i]
             for i in range(3):
-                out_attitude_u[k, i] = _about_axes(across[i], P)
+                out.attitude_u[k, i] = _about_axes(across[i], P)
             for i in range(p):
-                out_coefficients[k, i] = c[i]
-                out_u[k, i] = math.sqrt(P[4 + i, 4 + i])
+                out.coefficients[k, i] = c[i]
+                out.u[k, i] = math.sqrt(P[4 + i, 4 + i])
     for i in range(4):
-        attitude_[i] = q[i]
-    return cosine, told
+        state.attitude[i] = q[i]
+    return points.health[0], int(points.health[1]), cosine

@@ -25,8 +25,8 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.selfcal.filters.filter_result import Problem, Start
-from inercal.selfcal.filters.gating import admitted, gate_of, updating, watch
+from inercal.selfcal.filters.gating import admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
 from inercal.selfcal.platform.linearised import FLOOR
 from inercal.selfcal.platform.recording import Recording
@@ -61,7 +61,7 @@ class Readings:
         return np.asarray(np.count_nonzero(self.used, axis=1))
 
 
-def readings(recording: Recording, problem: Problem) -> Readings:
+def readings(recording: Recording, problem: FilterProblem) -> Readings:
     """The measurements of all rows but the first."""
     acc, th = recording.acc[1:], recording.th[1:]
     seen = np.all(np.isfinite(th), axis=1)
@@ -94,9 +94,9 @@ def gimbals(th: Array, world: World) -> tuple[Array, Array]:
     return multiply(multiply(outer, inner), last), np.stack(columns, axis=-1)
 
 
-def _gate(attitude: Array, seen: NDArray[np.bool_], problem: Problem) -> NDArray[np.bool_]:
+def _gate(attitude: Array, seen: NDArray[np.bool_], problem: FilterProblem) -> NDArray[np.bool_]:
     """(m, 6) what the near-level gate lets pass; where the encoders are silent it stays as it was."""
-    gate, near = gate_of(problem.filter.gating), np.zeros(3, dtype=np.int64)
+    gate, near = problem.model.gate, np.zeros(3, dtype=np.int64)
     force = rotate(conjugate(attitude), problem.world.up)
     passed = np.ones((len(attitude), 6), dtype=np.bool_)
     for k in range(len(attitude)):
@@ -123,7 +123,7 @@ def least_cosine(recording: Recording) -> float:
     return float(np.min(cosine, where=np.isfinite(cosine), initial=1.0))
 
 
-def first_reading(recording: Recording, problem: Problem) -> Start:
+def first_reading(recording: Recording, problem: FilterProblem) -> Start:
     """The attitude of the first encoder reading."""
     return Start(gimbals(recording.th[:1], problem.world)[0][0], problem.noise.encoder)
 

@@ -1,4 +1,4 @@
-"""One door to all estimators: a recording and a problem in, what was found out."""
+"""All estimators of self-calibration behind one function."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ import numpy as np
 
 from inercal.estimate.factor import NEGATIVE
 from inercal.selfcal.filters.filter_result import (
-    Filtered,
+    FilterResult,
     History,
-    Problem,
-    Start,
     State,
     Trace,
     attitude_of,
-    known_in,
+    estimate_of,
 )
 from inercal.selfcal.filters.gaps import advance
-from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.platform.recording import Recording, Steps
 from inercal.selfcal.settings import FilterKind
 
 LOCK = 0.01
@@ -54,23 +53,23 @@ def recursive(kind: FilterKind) -> ModuleType | None:
 
 def estimate(
     recording: Recording,
-    problem: Problem,
+    problem: FilterProblem,
     kind: FilterKind | None = None,
     start: Start | None = None,
     history: bool = True,
-) -> Filtered:
-    """Find the coefficients that a recording tells.
+) -> FilterResult:
+    """Estimate the coefficients from a recording.
 
     Parameters
     ----------
     recording : Recording
-    problem : Problem
+    problem : FilterProblem
     kind : str, optional
         Of the estimator; that of the problem if absent.
     start : Start, optional
         Of the attitude; the first encoder reading if absent.
     history : bool
-        Whether to keep what is known after each row.
+        Keep the estimates after each row.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
@@ -83,19 +82,18 @@ def estimate(
     load_kernels(kind, problem)
     began = time.perf_counter()
     state: State = module.initial(problem, recording.th[0], start)
-    first = known_in(state, problem)
-    rows = recording.dt, recording.rate, recording.acc[1:], recording.th[1:]
-    state, trace = advance(module, state, problem, *rows, recording.held, history)
+    first = estimate_of(state, problem)
+    state, trace = advance(module, state, problem, recording.steps, recording.held, history)
     seconds = time.perf_counter() - began
     size = len(problem.prior)
-    found = Filtered(
+    result = FilterResult(
         kind=kind,
         coefficients=state.coefficients,
         covariance=state.covariance[-size:, -size:],
         attitude=attitude_of(state, problem),
-        nis=trace.nis,
-        dims=trace.dims,
-        innovations=trace.innovations,
+        nis=trace.estimates.nis,
+        dims=trace.estimates.dims,
+        innovations=trace.estimates.innovations,
         history=_history(first, trace) if history else None,
         seconds=seconds,
         lowest_eigenvalue=trace.lowest_eigenvalue,
@@ -104,43 +102,44 @@ def estimate(
         restarts=tuple(k + 1 for k in trace.restarts),
         state=state,
     )
-    message = _fault(found)
-    return replace(found, converged=False, message=message) if message else found
+    message = _fault(result)
+    return replace(result, converged=False, message=message) if message else result
 
 
-def load_kernels(kind: FilterKind, problem: Problem) -> None:
+def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
     """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
     module = recursive(kind)
     if module is not None and kind not in _LOADED:
         none = np.empty((0, 3))
-        module.advance(module.initial(problem, np.zeros(3)), problem, np.empty(0), none, none, none)
+        module.advance(module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none))
         _LOADED.add(kind)
 
 
 def _history(first: History, trace: Trace) -> History:
-    """The start and what followed."""
+    """The estimates of the start and of all steps."""
+    out = trace.estimates
     return History(
-        np.concatenate([first.attitude, trace.attitude]),
-        np.concatenate([first.attitude_u, trace.attitude_u]),
-        np.concatenate([first.coefficients, trace.coefficients]),
-        np.concatenate([first.u, trace.u]),
+        np.concatenate([first.attitude, out.attitude]),
+        np.concatenate([first.attitude_u, out.attitude_u]),
+        np.concatenate([first.coefficients, out.coefficients]),
+        np.concatenate([first.u, out.u]),
     )
 
 
-def _fault(found: Filtered) -> str:
-    """Why the numbers of a filter must not be used; empty if they may."""
-    variances = np.diag(found.covariance)
-    numbers = (found.coefficients, found.covariance, found.attitude)
+def _fault(result: FilterResult) -> str:
+    """The reason why the numbers of a filter must not be used; empty if there is none."""
+    variances = np.diag(result.covariance)
+    numbers = (result.coefficients, result.covariance, result.attitude)
     if not all(np.isfinite(each).all() for each in numbers):
-        at = " where the gimbals lock" if found.gimbal_cosine < LOCK else ""
+        at = " where the gimbals lock" if result.gimbal_cosine < LOCK else ""
         return f"the filter diverged{at}: coefficients or covariance are not finite"
-    if not (variances > 0.0).all() or found.lowest_eigenvalue < NEGATIVE:
+    if not (variances > 0.0).all() or result.lowest_eigenvalue < NEGATIVE:
         return (
             "the covariance lost its positive sign (lowest eigenvalue of the correlation matrix "
-            f"{found.lowest_eigenvalue:.1e}): use another filter or factor"
+            f"{result.lowest_eigenvalue:.1e}): use another filter or factor"
         )
-    if found.kind == "gimbal-ukf" and found.gimbal_cosine < LOCK:
-        angle = math.degrees(math.acos(found.gimbal_cosine))
+    if result.kind == "gimbal-ukf" and result.gimbal_cosine < LOCK:
+        angle = math.degrees(math.acos(result.gimbal_cosine))
         return (
             f"the inner gimbal came to {angle:.2f} deg, where outer and platform axis coincide and the gimbal-angle "
             "model does not hold: use a quaternion filter"

@@ -35,8 +35,9 @@ from inercal.geometry.rotations import (
     rotate,
     to_matrix,
 )
-from inercal.selfcal.filters.filter_result import Filtered, History, Problem, Start
+from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.gaps import broken
+from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.residuals import (
     Readings,
     Sensed,
@@ -54,8 +55,8 @@ from inercal.selfcal.platform.recording import Recording
 
 
 def estimate_lm(
-    recording: Recording, problem: Problem, start: Start | None = None, history: bool = True
-) -> Filtered:
+    recording: Recording, problem: FilterProblem, start: Start | None = None, history: bool = True
+) -> FilterResult:
     """Least squares over the first attitude and the coefficients, without gyro noise in the dynamics.
 
     Parameters
@@ -63,7 +64,7 @@ def estimate_lm(
     recording : Recording
         Accelerometers alone are enough. Missing measurements (NaN) are left out, and those that the near-level gate
         stops.
-    problem : Problem
+    problem : FilterProblem
     start : Start, optional
         Of the first attitude; its encoder reading if absent.
     history : bool
@@ -71,7 +72,7 @@ def estimate_lm(
 
     Returns
     -------
-    Filtered
+    FilterResult
         Uncertainties include the wander that gyro noise causes, though estimates are not weighted for it: they are
         wider than the bound. ``nis`` of a row: squared residuals over the covariance of noise and of the wander up to
         the row, and an equal share of those of the prior; its mean is somewhat below 6, as the fit takes part of the
@@ -110,7 +111,7 @@ def estimate_lm(
         over = residual.copy()
         over[:, :3] /= np.sqrt(np.diagonal(spread, axis1=1, axis2=2)[:, :3])
         innovations = normalised(over, measured, wander[:, None])
-    return Filtered(
+    return FilterResult(
         kind="lm",
         coefficients=at.c,
         covariance=covariance,
@@ -126,13 +127,13 @@ def estimate_lm(
     )
 
 
-def rough_path(recording: Recording, problem: Problem, start: Start) -> tuple[Array, Array]:
+def rough_path(recording: Recording, problem: FilterProblem, start: Start) -> tuple[Array, Array]:
     """Attitudes (n, 4) and coefficients (p,) of the fit of `estimate_lm`."""
     _, at = _fit(recording, problem, readings(recording, problem), start)
     return at.q, at.c
 
 
-def wahba(recording: Recording, problem: Problem, measured: Readings, start: Start) -> Array:
+def wahba(recording: Recording, problem: FilterProblem, measured: Readings, start: Start) -> Array:
     """First attitude (4,) from measurements as they are, in closed form.
 
     Turned back to the first row by the commanded rates, specific forces a_k are C^T u_k, with u_k the vertical as earth
@@ -178,7 +179,9 @@ class _Along(NamedTuple):
     slope: Array
 
 
-def _along(x: Array, guess: Array, recording: Recording, problem: Problem, measured: Readings) -> _Along:
+def _along(
+    x: Array, guess: Array, recording: Recording, problem: FilterProblem, measured: Readings
+) -> _Along:
     """The path of unknowns x (3 + p,): rotation vector [rad] from ``guess``, coefficients over their prior."""
     c, since = problem.prior * x[3:], recording.t - recording.t[0]
     turn, steps = turns(recording.rate, recording.dt, c)
@@ -201,7 +204,7 @@ def _along(x: Array, guess: Array, recording: Recording, problem: Problem, measu
 
 
 def _fit(
-    recording: Recording, problem: Problem, measured: Readings, start: Start
+    recording: Recording, problem: FilterProblem, measured: Readings, start: Start
 ) -> tuple[NonlinearFit, _Along]:
     """Fit the unknowns of `_along`, from those of `wahba`, to the start, the prior and the measurements."""
     guess, size = wahba(recording, problem, measured, start), 3 + len(problem.prior)

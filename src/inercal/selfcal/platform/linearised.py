@@ -12,21 +12,24 @@ With the extended model earth rate and gravity turn with beta: d(R(beta) v) = -[
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.estimate.kalman import Row
 from inercal.geometry.kernels import Quaternion, Vector, exp, right_jacobian, rotate
 from inercal.selfcal.platform.kinematics import Axes, joint_axes
 
 Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.int64]
-Rows: TypeAlias = tuple[Vector, Vector, Vector]
+Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
 FLOOR = 0.05
 """Part of the encoder noise that is taken for isotropic, against infinite information at gimbal lock."""
+
+WIDEST = 10
+"""Most entries of a row of the model."""
 
 
 @kernel
@@ -36,7 +39,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 @kernel
-def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Rows:
+def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Vectors:
     """Changes of a vector of the base, in p at attitude ``q``, per change of each component of beta.
 
     ``v`` (3,) is the vector in the frame of the encoders, turned by beta already.
@@ -50,39 +53,32 @@ def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Rows:
     )
 
 
-@kernel
-def propagate_covariance(
-    P: Array,
-    c: Array,
-    w: Vector,
-    rate: Vector,
-    earth: Vector,
-    q: Quaternion,
-    dt: float,
-    noise: float,
-    top: Array,
-) -> None:
-    """Covariance ``P`` (n, n) of the error state after a step, in place.
+class Step(NamedTuple):
+    """A step of the platform: its ``commanded`` rate and its own ``rate`` (3,) [rad/s]; ``earth`` (3,) [rad/s] in the
+    frame of the encoders; the ``attitude`` (4,) after it; ``dt`` [s]."""
 
-    Parameters
-    ----------
-    P : (3 + p, 3 + p)
-    c : (p,) coefficients
-    w, rate : (3,) rad/s, commanded rate and that of the platform
-    earth : (3,) rad/s, in the frame of the encoders
-    q : (4,) attitude after the step
-    dt : s
-    noise : rad^2, variance of the attitude gained in the step
-    top : (6, 3 + p) used up
+    commanded: Vector
+    rate: Vector
+    earth: Vector
+    attitude: Quaternion
+    dt: float
+
+
+@kernel
+def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Array) -> None:
+    """Covariance ``P`` (3 + p, 3 + p) of the error state after a step, in place.
+
+    ``c`` (p,) coefficients; ``noise`` [rad^2] the variance of the attitude gained in the step; ``top`` (6, 3 + p) is
+    used up.
     """
-    n = len(P)
+    n, w, rate, dt = len(P), step.commanded, step.rate, step.dt
     j = right_jacobian((rate[0] * dt, rate[1] * dt, rate[2] * dt))
     back = exp((-rate[0] * dt, -rate[1] * dt, -rate[2] * dt))
     a0, a1, a2 = rotate(back, (1.0, 0.0, 0.0)), rotate(back, (0.0, 1.0, 0.0)), rotate(back, (0.0, 0.0, 1.0))
     extended = n > 21
     b0 = b1 = b2 = (0.0, 0.0, 0.0)
     if extended:
-        b0, b1, b2 = turned_by_beta(earth, q, c)
+        b0, b1, b2 = turned_by_beta(step.earth, step.attitude, c)
     for m in range(n):
         # change of the platform's rate, about each axis
         x = P[3, m] + w[1] * P[9, m] - w[2] * P[12, m]
@@ -122,10 +118,8 @@ def propagate_covariance(
 
 
 @kernel
-def accelerometer_row(
-    i: int, f: Vector, c: Array, up: Vector, q: Quaternion, places: Indices, row: Array
-) -> int:
-    """Derivative of accelerometer ``i`` by the error state: its places and values; returns their number.
+def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, room: Row) -> Row:
+    """Derivative of accelerometer ``i`` by the error state, in the arrays of ``room``, at least `WIDEST` long.
 
     ``f`` (3,) [m/s^2] in p, ``up`` (3,) [m/s^2] in the frame of the encoders.
     """
@@ -135,29 +129,30 @@ def accelerometer_row(
     gz = 1.0 + c[17] if i == 2 else 0.0
     # g . (f x dtheta) = (g x f) . dtheta
     turn = cross((gx, gy, gz), f)
+    places, values = room.places, room.values
     for k in range(3):
-        places[k], row[k] = k, turn[k]
-    places[3], row[3] = 15 + i, 1.0
-    places[4], row[4] = 18 + i, f[i]
+        places[k], values[k] = k, turn[k]
+    places[3], values[3] = 15 + i, 1.0
+    places[4], values[4] = 18 + i, f[i]
     count = 5
     if i == 1:
-        places[5], row[5] = 7, -f[0]
+        places[5], values[5] = 7, -f[0]
         count = 6
     elif i == 2:
-        places[5], row[5] = 6, f[0]
-        places[6], row[6] = 8, -f[1]
+        places[5], values[5] = 6, f[0]
+        places[6], values[6] = 8, -f[1]
         count = 7
     if len(c) > 18:
         by_beta = turned_by_beta(up, q, c)
         for k in range(3):
             places[count] = 24 + k
-            row[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
+            values[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
             count += 1
-    return count
+    return Row(places, values, count)
 
 
 @kernel
-def encoder_roots(th: Vector | Array, axes: Axes, signs: Array, sigma: float) -> tuple[Rows, Vector]:
+def encoder_roots(th: Vector | Array, axes: Axes, signs: Array, sigma: float) -> tuple[Vectors, Vector]:
     """Inverse Cholesky factor (lower, rows) of the covariance of an encoder attitude, and its variances (3,).
 
     The covariance is ``sigma^2 (J J^T + 0.05^2 I)`` [rad^2] about the axes of p, at gimbal angles ``th`` (3,).

@@ -6,13 +6,14 @@ Attitudes are ``q_bp`` against the frame b of the encoders; earth rate and gravi
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
+from inercal.selfcal.platform.rig import World
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -62,10 +63,16 @@ def accelerometers(f: Vector, c: Array) -> Vector:
     )
 
 
+class Truth(NamedTuple):
+    """A true motion of n rows: attitudes ``q`` (n, 4), and outputs ``acc`` (n, 3) [m/s^2] of accelerometers without
+    noise."""
+
+    q: Array
+    acc: Array
+
+
 @kernel
-def simulate_truth(
-    q0: Array, w: Array, dt: float, noise: Array, c: Array, earth: Array, up: Array, q: Array, acc: Array
-) -> None:
+def simulate_truth(q0: Array, w: Array, dt: float, noise: Array, c: Array, world: World, out: Truth) -> None:
     """True attitudes and accelerometer outputs, integrated at a finer step.
 
     Parameters
@@ -75,12 +82,13 @@ def simulate_truth(
     dt : s, of the finer steps
     noise : (n - 1, m, 3) rad/s, of the gyros in each
     c : (p,) coefficients, linear form
-    earth, up : (3,) rad/s, m/s^2, in b
-    q : (n, 4) receives the attitudes
-    acc : (n, 3) m/s^2, receives the outputs, without noise
+    world : World
+    out : Truth
+        Receives both.
     """
+    q, acc = out
     at = (q0[0], q0[1], q0[2], q0[3])
-    earth_e, up_e = on_the_base(earth, c), on_the_base(up, c)
+    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
     for k in range(len(q)):
         if k > 0:
             for j in range(w.shape[1]):

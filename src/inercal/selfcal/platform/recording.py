@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.inputs import Source
+from inercal.units import Quantity
+
+
+class Steps(NamedTuple):
+    """Rates and measurements of m steps, as kernels take them: ``dt`` (m,) [s]; ``rate`` (m, 3) [rad/s], held over each
+    step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not."""
+
+    dt: Array
+    rate: Array
+    acc: Array
+    th: Array
+
+    def part(self, steps: slice) -> Steps:
+        """Some of the steps."""
+        return Steps(self.dt[steps], self.rate[steps], self.acc[steps], self.th[steps])
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +47,8 @@ class Recording:
     held : tuple of int
         Steps whose rate was not recorded, and is that of a platform that turns on as before
         (`inercal.selfcal.filters.gaps`).
-    temperature : str or None
-        That was recorded, its mean in words.
+    temperature : Quantity or None
+        That was recorded: its mean and standard deviation.
     """
 
     t: Array
@@ -43,12 +59,17 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     sources: tuple[Source, ...] = ()
     held: tuple[int, ...] = ()
-    temperature: str | None = None
+    temperature: Quantity | None = None
 
     @property
     def dt(self) -> Array:
         """(n - 1,) s, from each row to the next."""
         return np.diff(self.t)
+
+    @property
+    def steps(self) -> Steps:
+        """The n - 1 steps from row to row."""
+        return Steps(self.dt, self.rate, self.acc[1:], self.th[1:])
 
     @property
     def scalars(self) -> int:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,9 +111,8 @@ class Base:
         return replace(self, heading=math.remainder(-about_vertical, 2.0 * math.pi), tilt=(north, -west))
 
 
-@dataclass(frozen=True, eq=False)
-class World:
-    """What the platform moves in, as kernels take it.
+class World(NamedTuple):
+    """Earth and gimbals of the platform, as kernels take them.
 
     ``earth`` (3,) [rad/s] earth rate and ``up`` (3,) [m/s^2] the specific force at rest, both in b; ``axes`` (3,)
     and ``signs`` (3,) of the gimbals.
@@ -121,8 +120,8 @@ class World:
 
     earth: Array
     up: Array
-    axes: NDArray[np.int64] = field(default_factory=lambda: Gimbals().index)
-    signs: Array = field(default_factory=lambda: Gimbals().sign)
+    axes: NDArray[np.int64]
+    signs: Array
 
 
 def world(site: Site, base: Base, gimbals: Gimbals) -> World:

@@ -13,7 +13,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
 from inercal.selfcal.before.bounds import Bounds
-from inercal.selfcal.filters.filter_result import problem
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import names, to_product
 from inercal.selfcal.platform.recording import Recording

@@ -20,7 +20,7 @@ from inercal.arrays import Array
 from inercal.inputs import Source
 from inercal.records.made import record_of
 from inercal.records.record import Record
-from inercal.selfcal.filters.filter_result import Filtered
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import divisor, names, units
 from inercal.selfcal.platform.kinematics import all_angles
 from inercal.selfcal.platform.recording import Recording
@@ -60,7 +60,7 @@ def rows(
     return found
 
 
-def history_record(filtered: Filtered, recording: Recording, world: World) -> Record:
+def history_record(filtered: FilterResult, recording: Recording, world: World) -> Record:
     """The columns as a record with the time stamps of the recording.
 
     Raises

@@ -11,7 +11,7 @@ from inercal.arrays import Array
 from inercal.estimate.result import rounded
 from inercal.estimate.table import Table
 from inercal.selfcal.display import of_field
-from inercal.selfcal.filters.filter_result import Filtered, found
+from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.platform.coefficients import names
 
 FILTERS: Final[Mapping[str, str]] = {
@@ -26,7 +26,7 @@ FILTERS: Final[Mapping[str, str]] = {
 
 
 def side_by_side(
-    filters: Mapping[str, Filtered], truth: Array | None, interval: float, status: Mapping[str, str]
+    filters: Mapping[str, FilterResult], truth: Array | None, interval: float, status: Mapping[str, str]
 ) -> list[Table]:
     """All estimators of one recording: what they found, how far it is off, and what they cost.
 
@@ -44,8 +44,8 @@ def side_by_side(
     (_, first), *_ = filters.items()
     p = len(first.coefficients)
     unit, size = of_field(p)
-    by_filter = {kind: found(each) for kind, each in filters.items()}
-    values, u = found(first)
+    by_filter = {kind: product_form(each) for kind, each in filters.items()}
+    values, u = product_form(first)
     true = None if truth is None else truth[:p]
     rows = []
     for k, name in enumerate(names(p)):

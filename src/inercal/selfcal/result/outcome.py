@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.budget import BudgetItem, combine, common
-from inercal.estimate.conditions import conditions
+from inercal.estimate.basis import conditions_of, studied
+from inercal.estimate.budget import BudgetItem, combine
 from inercal.estimate.consistency import Nis, nis
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
-from inercal.findings import Finding, Status
+from inercal.estimate.result import Estimate
+from inercal.findings import CODES, EVERYTHING, Finding, Status, causes
 from inercal.records.places import counted
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen, singular, useless
 from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
 from inercal.selfcal.display import shown_unit
-from inercal.selfcal.filters.filter_result import Filtered, problem
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import LOCK
 from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
@@ -71,15 +72,6 @@ _BY_KIND = {
     "gimbal-ukf": (_SIGMA_POINTS,),
 }
 
-_CAUSES = (
-    "unit_suspect", "channel_swap", "sign_suspect", "command_shift", "stuck_encoder", "dead_channel", "gap",
-    "unmodelled", "site_suspect", "prior_suspect", "excess_scatter", "filter_fails", "contradiction", "outlier",
-)  # fmt: skip
-"""Findings that explain innovations too large, those of a recording's reading the likeliest first."""
-
-#: findings of the diagnosis that leave the values good
-_HARMLESS = ("gap", "low_scatter")
-
 #: axis of p -> coefficients that only a turn about it shows well
 _BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
 
@@ -87,7 +79,7 @@ _BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
 def assemble(
     recording: Recording,
     settings: SelfcalSettings,
-    filtered: Filtered,
+    filtered: FilterResult,
     bounds: Bounds,
     findings: Sequence[Finding] = (),
 ) -> Estimate:
@@ -97,27 +89,27 @@ def assemble(
     ----------
     recording : Recording
     settings : SelfcalSettings
-    filtered : Filtered
+    filtered : FilterResult
     bounds : Bounds
         Along the path as it was estimated, with ``contributions``.
     findings : sequence of Finding
         Of the diagnosis, beside those of the recording.
     """
     p = len(filtered.coefficients)
-    fields: dict[str, Any] = {
-        "model": MODEL + (EXTENSION if settings.filter.extended else ""),
-        "conditions": _conditions(recording, settings),
-        "traceability": settings.traceability,
-        "inputs": recording.sources,
-        "provenance": provenance(settings.given),
-        "references": REFERENCES + _BY_KIND.get(filtered.kind, ()),
-    }
-    known = {each.code for each in recording.findings} - {"gap", "outlier"}
-    said = [*recording.findings, *(each for each in findings if each.code not in known)]
+    basis = studied(
+        COMMAND,
+        settings,
+        recording.sources,
+        MODEL + (EXTENSION if settings.filter.extended else ""),
+        REFERENCES + _BY_KIND.get(filtered.kind, ()),
+        _conditions(recording, settings),
+    )
+    read = {each.code for each in recording.findings} - {"gap", "outlier"}
+    said = [*recording.findings, *(each for each in findings if each.code not in read)]
     if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LOCK:
         angle = math.degrees(math.acos(filtered.gimbal_cosine))
         text = f"the inner gimbal comes to {angle:.2f} deg, where the gimbal-angle model does not hold"
-        said.append(Finding("gimbal_lock", text))
+        said.append(Finding("gimbal_lock", text, harm=EVERYTHING))
     interval = float(np.median(recording.dt))
     result: dict[str, Any] = {
         "filter": filtered.kind,
@@ -131,25 +123,24 @@ def assemble(
     slope, values = product_slope(filtered.coefficients), to_product(filtered.coefficients)
     by_filter = slope @ filtered.covariance @ slope.T
     if (unusable := useless(filtered, bounds, by_filter)) is not None:
-        return without_parameters(COMMAND, *unusable, findings=tuple(said), result=result, **fields)
+        return Estimate.without(basis, *unusable, findings=said, result=result)
 
     result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
     used = _scalars(filtered)
     dof = float(used - p - 3)
     of_site, exact = stated(recording, settings, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
-    covariance, _, budget = combine(names(p), sources)
+    known = combine(names(p), sources)
+    covariance, budget = known.covariance, known.budget
     if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
-        return without_parameters(
-            COMMAND, Status.ILL_CONDITIONED, text, findings=tuple(said), result=result, **fields
-        )
+        return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=said, result=result)
     if (unusable := singular(bounds.prior, covariance)) is not None:
-        return without_parameters(COMMAND, *unusable, findings=tuple(said), result=result, **fields)
+        return Estimate.without(basis, *unusable, findings=said, result=result)
     # all noises are judged by one set of innovations; their parts add up to them but for rounding
     more = np.square(np.diag(covariance) / np.diag(by_filter))
     effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
-    u = np.sqrt(np.diag(covariance))
+    u = known.u
 
     judged = seen(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
@@ -171,19 +162,14 @@ def assemble(
             Status.UNOBSERVABLE,
             f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better",
         )
-    if status is Status.OK:
-        message = _doubted(message, findings)
-    return Estimate(
-        command=COMMAND,
-        names=names(p),
-        units=units(p),
-        values=values,
-        covariance=covariance,
-        dof=effective,
-        k=np.array([coverage_factor(float(each)) for each in effective]),
-        status=status,
-        message=message,
-        findings=tuple(said),
+    return Estimate.of(
+        basis,
+        names(p),
+        units(p),
+        values,
+        known._replace(dof=effective),
+        (status, message),
+        findings=said,
         statistics={
             "dof": dof,
             "condition": judged.learned.condition**2,
@@ -194,15 +180,12 @@ def assemble(
             "nis_limit": limit,
             "steps": float(filtered.steps),
         },
-        budget=budget,
         result=result,
-        common=common(sources, p),
-        **fields,
     )
 
 
 def verdict(
-    filtered: Filtered, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
+    filtered: FilterResult, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
 ) -> tuple[Status, str]:
     """Status of what an estimator found, and its sentence, without all that an estimate holds: for comparisons."""
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
@@ -217,10 +200,7 @@ def verdict(
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
     """What explains innovations that are too large: the diagnosis, else the reading of the recording."""
-    by_rank = sorted(
-        (each for each in recorded if each.code in _CAUSES), key=lambda each: _CAUSES.index(each.code)
-    )
-    explaining = [*(each for each in diagnosed if each.code in _CAUSES), *by_rank]
+    explaining = [*(each for each in diagnosed if CODES[each.code].rank), *causes(recorded)]
     return explaining[0].message if explaining else "check noise, commands, signs and units"
 
 
@@ -236,14 +216,6 @@ def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> f
     moved = likely(recording, of, errors)
     before, after = (float(np.nansum(judging((recording, each)).nis)) for each in (of, moved))
     return agreement.limit() + max(0.0, before - after) / agreement.rows
-
-
-def _doubted(message: str, diagnosed: Sequence[Finding]) -> str:
-    """The sentence of a verdict that values can be used, with the findings for which they may be wrong all the same."""
-    codes = dict.fromkeys(each.code for each in diagnosed if each.code not in _HARMLESS)
-    if not codes:
-        return message
-    return f"{message}; but see {', '.join(codes)}: values may be off by more than their u"
 
 
 def _verdict(
@@ -353,13 +325,13 @@ def _taken_as_exact(words: Mapping[str, str]) -> list[Finding]:
     return [Finding("stated_exact", text)]
 
 
-def _scalars(filtered: Filtered) -> int:
+def _scalars(filtered: FilterResult) -> int:
     """Number of scalar measurements used."""
     known = np.isfinite(filtered.innovations)
     return int(known.sum() if len(known) else filtered.dims.sum())
 
 
-def _rms(filtered: Filtered) -> float:
+def _rms(filtered: FilterResult) -> float:
     """Root mean square of the normalised innovations; 1 where all is well."""
     count = float(filtered.dims.sum())
     return math.sqrt(float(np.nansum(filtered.nis)) / count) if count else math.nan
@@ -368,7 +340,7 @@ def _rms(filtered: Filtered) -> float:
 def _conditions(recording: Recording, settings: SelfcalSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid."""
     angles = recording.th[np.isfinite(recording.th).all(axis=1)]
-    return conditions(
+    return conditions_of(
         settings,
         recording.temperature,
         {

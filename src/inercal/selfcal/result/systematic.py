@@ -99,7 +99,7 @@ def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
                 continue
             there = statement.changed(float(value) * statement.u).world
             earth, up = earth + there.earth - here.earth, up + there.up - here.up
-        return recording, replace(problem, world=replace(problem.world, earth=earth, up=up))
+        return recording, replace(problem, world=problem.world._replace(earth=earth, up=up))
 
     names = tuple(each.name for each in uncertain)
     return Hypothesis(

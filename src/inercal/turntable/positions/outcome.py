@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.designs.comparison import in_basis
+from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
-from inercal.estimate.conditions import conditions
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
@@ -96,14 +96,8 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
 def assemble(record: Record, found: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
     """Put the estimate together."""
     unit = found.unit.si
-    common: dict[str, Any] = {
-        "model": MODELS[settings.instrument.kind],
-        "conditions": _conditions(record, found, settings),
-        "traceability": settings.traceability,
-        "inputs": record.sources,
-        "provenance": provenance(settings.given),
-        "references": REFERENCES,
-    }
+    model, conditions = MODELS[settings.instrument.kind], _conditions(record, found, settings)
+    basis = studied(COMMAND, settings, record.sources, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
     rank, terms_asked = worst_rank(fitting.identified)
     result: dict[str, Any] = {
@@ -116,14 +110,13 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     }
 
     def nothing(status: Status, message: str) -> Estimate:
-        return without_parameters(
-            COMMAND,
+        return Estimate.without(
+            basis,
             status,
             message,
-            findings=tuple(findings),
+            findings=findings,
             statistics={"positions": float(len(found.y))},
             result=result | {"tolerance_shares": {}},
-            **common,
         )
 
     if fitting.fit is None:
@@ -131,30 +124,25 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
     fit = fitting.fit
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         terms = terms_of(fit)
-        known = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
-    if not known.all():
-        return nothing(Status.UNOBSERVABLE, _dead(fit, known))
+        finite = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
+    if not finite.all():
+        return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
-    covariance, dof, budget = combine(names, sources(fit, terms, unit))
-    status, message = _verdict(found, fitting)
-    findings += _too_large(fit) + of_site(names, budget, [each.source for each in fit.model.references])
-    return Estimate(
-        command=COMMAND,
-        names=names,
-        units=tuple(unit_of_term(name, unit) for name in names),
-        values=terms.values,
-        covariance=covariance,
-        dof=dof,
-        k=np.array([coverage_factor(float(value)) for value in dof]),
-        status=status,
-        message=message,
-        findings=tuple(findings),
+    # stated noise is of type B, but not the same in repeat runs
+    known = combine(names, sources(fit, terms, unit))._replace(common=None)
+    findings += _too_large(fit) + of_site(names, known.budget, [each.source for each in fit.model.references])
+    return Estimate.of(
+        basis,
+        names,
+        [unit_of_term(name, unit) for name in names],
+        terms.values,
+        known,
+        _verdict(found, fitting),
+        findings=findings,
         statistics=_statistics(found, fitting, result["plan"]["condition"]),
-        budget=budget,
         result=result
         | _shares(fit, terms)
         | {"table_errors": _table_errors(fit), "noise": _noise(found, fit, unit)},
-        **common,
     )
 
 
@@ -335,7 +323,7 @@ def _conditions(record: Record, found: Readings, settings: TurntableSettings) ->
             found.channels, found.y.min(axis=0).tolist(), found.y.max(axis=0).tolist(), strict=True
         )
     }
-    return conditions(settings, recorded_temperature(record), ranges, frame=FRAME)
+    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
 
 
 def _plan(found: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:

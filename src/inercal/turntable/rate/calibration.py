@@ -147,7 +147,7 @@ def _excess(fit: RateFit) -> list[Finding]:
         "table explain: what S_nl and S_hyst say is the gyro's own, and the uncertainties are those of the terms over "
         "these rates"
     )
-    return [Finding("excess_scatter", text)]
+    return [Finding("excess_scatter", text, harm=())]
 
 
 def _whole_turns(stays: RateDwells, inputs: Sequence[Input]) -> list[Finding]:

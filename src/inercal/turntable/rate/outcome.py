@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.conditions import conditions
 from inercal.estimate.identifiability import Identifiability
-from inercal.estimate.result import Estimate, coverage_factor, provenance, without_parameters
+from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record
@@ -49,9 +49,10 @@ def assemble(
     unit = found.unit.si
     names = tuple(name for fit in fits for name in fit.names)
     found_sources = sources(found, inputs, fits, unit)
-    covariance, dof, budget = combine(names, found_sources)
+    # stated noise is of type B, but not the same in repeat runs
+    uncertainty = combine(names, found_sources)._replace(common=None)
     values = np.concatenate([fit.values for fit in fits])
-    u = np.sqrt(np.diag(covariance))
+    u = uncertainty.u
     status = Status.OK
     message = f"{counted(len(names), 'term')} from {counted(len(found.rate), 'stay')} at rates"
     for fit in fits:
@@ -65,17 +66,14 @@ def assemble(
         message = f"the rates fix {weak}: spread them wider"
     test = settings.rate_test
     assert test is not None
-    return Estimate(
-        command=COMMAND,
-        names=names,
-        units=tuple(unit_of_term(name, unit) for name in names),
-        values=values,
-        covariance=covariance,
-        dof=dof,
-        k=np.array([coverage_factor(float(each)) for each in dof]),
-        status=status,
-        message=message,
-        findings=(*findings, *of_site(names, budget, ("latitude",))),
+    return Estimate.of(
+        _basis(record, found, settings),
+        names,
+        [unit_of_term(name, unit) for name in names],
+        values,
+        uncertainty,
+        (status, message),
+        findings=(*findings, *of_site(names, uncertainty.budget, ("latitude",))),
         statistics={
             "dof": float(min(fit.dof for fit in fits)),
             "condition": known.condition,
@@ -83,7 +81,6 @@ def assemble(
             "chi2": float(sum(fit.chi2 for fit in fits)),
             "stays": float(len(found.rate)),
         },
-        budget=budget,
         result={
             "rank": known.rank,
             "null_vectors": [],
@@ -96,7 +93,6 @@ def assemble(
                 for row in _rows(found, given, fit, full_scale)
             ],
         },
-        **_common(record, found, settings),
     )
 
 
@@ -112,11 +108,11 @@ def unobservable(
     """An estimate without terms."""
     test = settings.rate_test
     assert test is not None
-    return without_parameters(
-        COMMAND,
+    return Estimate.without(
+        _basis(record, found, settings),
         Status.UNOBSERVABLE,
         said,
-        findings=tuple(findings),
+        findings=findings,
         statistics={"stays": float(len(found.rate))},
         result={
             "rank": rank,
@@ -126,7 +122,6 @@ def unobservable(
             "instrument": settings.instrument.kind,
             "rates": [],
         },
-        **_common(record, found, settings),
     )
 
 
@@ -220,18 +215,8 @@ def _shares(
     }
 
 
-def _common(record: Record, found: RateDwells, settings: TurntableSettings) -> dict[str, Any]:
-    """What every estimate of a rate test says."""
-    return {
-        "model": MODEL,
-        "conditions": conditions(
-            settings,
-            recorded_temperature(record),
-            {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]},
-            frame=FRAME,
-        ),
-        "traceability": settings.traceability,
-        "inputs": record.sources,
-        "provenance": provenance(settings.given),
-        "references": REFERENCES,
-    }
+def _basis(record: Record, found: RateDwells, settings: TurntableSettings) -> Basis:
+    """What every estimate of a rate test rests on."""
+    ranges = {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]}
+    conditions = conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
+    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)

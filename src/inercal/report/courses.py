@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -12,8 +13,11 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.result import rounded
+from inercal.report import marks as marks_of
 from inercal.report.cells import Cell, band, canvas, frame, line
 from inercal.report.html import Picture
+from inercal.report.marks import Axis, Level, Mark, Panel, Strips
+from inercal.report.panels import draw
 from inercal.report.style import (
     ALARM,
     COLOURS,
@@ -21,9 +25,7 @@ from inercal.report.style import (
     QUIET,
     WIDTH,
     envelope,
-    figure,
     plain_unit,
-    power_of_ten,
     svg,
 )
 
@@ -221,59 +223,42 @@ def lines_by_group(
     """Lines over ``t`` (n,) [s], a panel with its own legend for each label of an axis, on a scale linear up to
     ``symlog`` and logarithmic beyond."""
     shown = few(len(t), 3 * _PIECES)
-    with figure(WIDTH, 0.4 + 2.0 * len(panels)) as page:
-        rows = page.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, (label, lines) in zip(rows, panels.items(), strict=True):
-            axes.axhline(0.0, color=QUIET, lw=0.6)
-            for k, each in enumerate(lines):
-                values = np.where(np.isfinite(each.values), each.values, np.nan)
-                axes.plot(t[shown], values[shown], color=COLOURS[k], lw=0.9, label=each.label)
-            _symlog(axes, symlog)
-            axes.set_ylabel(label)
-            axes.margins(x=0.005)
-            axes.grid(axis="y")
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        rows[-1].set_xlabel("time [s]")
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
-
-
-def _symlog(axes: Axes, linear: float) -> None:
-    """A scale linear up to that value and logarithmic beyond, with a tick at each power of ten."""
-    low, high = axes.get_ylim()
-    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
-    far = min(max(abs(low), abs(high), 3.0 * linear), 1e9 * linear)
-    powers = linear * 10.0 ** np.arange(0, int(np.log10(far / linear)) + 1)
-    every = powers[:: max(1, -(-len(powers) // 4))]
-    ticks = [*(-every[::-1]), 0.0, *every]
-    axes.set_yticks(ticks, list(map(power_of_ten, ticks)))
-    axes.set_yticks([], minor=True)
-    axes.set_ylim(
-        max(low, -far) * 1.3 if low < 0.0 else -linear, min(high, far) * 1.3 if high > 0.0 else linear
-    )
+    drawn = []
+    for label, lines in panels.items():
+        values = [np.where(np.isfinite(each.values), each.values, np.nan)[shown] for each in lines]
+        marks: list[Mark] = [Level(0.0)]
+        marks += [
+            marks_of.Line(t[shown], y, each.label, COLOURS[k], 0.9)
+            for k, (each, y) in enumerate(zip(lines, values, strict=True))
+        ]
+        least, most = np.nanmin([0.0, *np.ravel(values)]), np.nanmax([0.0, *np.ravel(values)])
+        far = 1e9 * symlog
+        limits = max(min(1.3 * least, -symlog), -far), min(max(1.3 * most, symlog), far)
+        up = Axis(label, "symlog", limits, linear=symlog)
+        drawn.append([Panel(marks, Axis(margin=0.005), up, grid="y", legend="beside")])
+    drawn[-1] = [replace(drawn[-1][0], x=Axis("time [s]", margin=0.005))]
+    return draw(title, caption, drawn, 0.4 + 2.0 * len(panels))
 
 
 def path(t: Array, angles: Array, joints: Sequence[str], title: str, caption: str) -> Picture:
     """Angles (n, k) [rad] of joints over ``t`` (n,) [s]; the background has the colour of the joint that turns."""
-    from matplotlib.ticker import MaxNLocator
-
     shown = few(len(t), 400)
-    with figure(WIDTH, 2.3) as page:
-        axes = page.subplots()
-        for k, (joint, turned) in enumerate(zip(joints, np.degrees(angles).T, strict=True)):
-            for first, last in turning(t, np.radians(turned)):
-                axes.axvspan(first, last, color=COLOURS[k], alpha=0.13, lw=0)
-            known = shown[np.isfinite(turned[shown])]
-            axes.plot(t[known], turned[known], color=COLOURS[k], lw=1.4, label=joint)
-        axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 1.5, 3, 4.5, 9, 10]))
-        axes.set_xlabel("time [s]")
-        axes.set_ylabel("angle [°]")
-        axes.margins(x=0.005)
-        axes.grid(axis="y")
-        axes.axhline(0.0, color=INK, lw=0.4)
-        page.legend(loc="outside upper right", ncols=len(joints))
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
+    marks: list[Mark] = []
+    for k, (joint, turned) in enumerate(zip(joints, angles.T, strict=True)):
+        known = shown[np.isfinite(turned[shown])]
+        marks.append(Strips(turning(t, turned), COLOURS[k], 0.13))
+        marks.append(marks_of.Line(t[known], np.degrees(turned[known]), joint, COLOURS[k], 1.4))
+    marks.append(Level(0.0, "", INK, 0.4))
+    reach = np.degrees(angles[np.isfinite(angles)])
+    ticks = _quarters(float(reach.min()), float(reach.max())) if len(reach) else None
+    axes = Axis("time [s]", margin=0.005), Axis("angle [°]", ticks=ticks)
+    return draw(title, caption, [[Panel(marks, *axes, grid="y")]], 2.3)
+
+
+def _quarters(low: float, high: float) -> list[float]:
+    """At most nine angles [deg] between the limits that divide a turn evenly."""
+    step = next((s for s in (1.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0) if high - low <= 8.0 * s), 720.0)
+    return [float(k * step) for k in range(math.floor(low / step + 0.1), math.ceil(high / step - 0.1) + 1)]
 
 
 def turning(

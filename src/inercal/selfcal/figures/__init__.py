@@ -1,4 +1,4 @@
-"""Pictures and pages of self-calibration: a calibration, filters beside each other, a path, a campaign."""
+"""Pictures and the page of a self-calibration, with or without other filters."""
 
 from __future__ import annotations
 
@@ -9,26 +9,22 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.geometry.rotations import boxminus
-from inercal.report import filtering
-from inercal.report.figures import budget, correlation, dots
-from inercal.report.histories import Course, Line, converging, falling, lines_by_group, path
-from inercal.report.html import Picture, page, render
-from inercal.report.selfcal import attitude_correction, attitude_errors, bounds_beside, filters_apart
-from inercal.selfcal.display import displayed, of_field, shown_unit
-from inercal.selfcal.filters.filter_result import found
+from inercal.report.coefficients import budget, correlation
+from inercal.report.courses import Course, Line, converging, falling, lines_by_group, path
+from inercal.report.html import Picture, render
+from inercal.report.innovations import innovations, nis
+from inercal.selfcal.display import displayed, of_field
+from inercal.selfcal.figures.filters import attitude_correction, attitude_errors, bounds_beside, filters_apart
+from inercal.selfcal.figures.gimbals import rig
+from inercal.selfcal.filters.filter_result import product_form
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
 from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.result.comparison import FILTERS
-from inercal.selfcal.result.tables import bounds_by_path, campaign_table, paths, turns, weak_combinations
+from inercal.selfcal.result.tables import weak_combinations
 from inercal.selfcal.task import compared
 
 if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
-    from inercal.selfcal.before.path_design import Designed
-    from inercal.selfcal.filters.filter_result import Filtered, History
-    from inercal.selfcal.monte_carlo import Campaign
-    from inercal.selfcal.settings import SelfcalSettings
+    from inercal.selfcal.filters.filter_result import FilterResult, History
     from inercal.selfcal.task import Calibration
 
 
@@ -38,25 +34,26 @@ _AT_ONCE = ("map", "lm")
 _CHANNELS = ("acc x", "acc y", "acc z")
 
 
-def calibration_page(calibration: Calibration, settings: SelfcalSettings) -> str:
+def main(calibration: Calibration) -> Picture:
+    """The picture that answers the question: uncertainties beside bounds and goals, or the path where none came out."""
+    return _bounds(calibration) if calibration.estimate.names else _path(calibration)
+
+
+def page(calibration: Calibration) -> str:
     """The report of a self-calibration as one self-contained HTML page, with or without other filters."""
-    estimate = displayed(calibration.estimate)
     tables = [*compared(calibration), weak_combinations(calibration.bounds)]
-    drawn = pictures(calibration, settings) + compare_pictures(calibration)
-    return render(estimate, drawn, "Self-calibration of a platform", tables)
+    return render(
+        displayed(calibration.estimate), pictures(calibration), "Self-calibration of a platform", tables
+    )
 
 
-def pictures(
-    calibration: Calibration, settings: SelfcalSettings, attitude: Array | None = None
-) -> list[Picture]:
-    """Draw what there is to see of a calibration.
+def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Picture]:
+    """All pictures of a calibration, the main one first.
 
     Parameters
     ----------
     calibration : Calibration
         Of any status.
-    settings : SelfcalSettings
-        Of its study.
     attitude : (n, 4), optional
         True ``q_bp`` at each row, of a simulation; without it the attitude is drawn against the encoders'.
     """
@@ -66,30 +63,34 @@ def pictures(
         displayed(calibration.estimate),
     )
     t, history = recording.t, filtered.history
-    drawn = [
-        path(
-            t,
-            recording.th,
-            JOINTS,
-            "The path",
-            "Gimbal angles that the encoders read; the background has the colour of the joint that turns: th_x the "
-            "outer, th_y the inner one, th_z the platform's.",
-        )
-    ]
+    drawn = [_bounds(calibration)] if estimate.names else []
+    if history is not None and filtered.kind not in _AT_ONCE:
+        drawn += convergence(calibration)
+    drawn += [_path(calibration), rig(calibration.settings.base, calibration.settings.gimbals)]
     if history is not None:
-        if filtered.kind not in _AT_ONCE:
-            drawn += convergence(calibration)
         drawn.append(_attitude(calibration, history, attitude))
         if filtered.kind not in _AT_ONCE:
             drawn.append(relative_errors(t, history, calibration.truth))
-    drawn.append(filtering.nis(t[1:], filtered.nis, filtered.dims))
+    drawn.append(nis(t[1:], filtered.nis, filtered.dims))
     if len(filtered.innovations):
         last = JOINTS if filtered.kind == "gimbal-ukf" else tuple(f"attitude {axis}" for axis in "XYZ")
-        drawn.append(filtering.innovations(t[1:], filtered.innovations, (*_CHANNELS, *last)))
+        drawn.append(innovations(t[1:], filtered.innovations, (*_CHANNELS, *last)))
     if estimate.names:
-        drawn += [_bounds(calibration, settings), correlation(estimate)]
+        drawn.append(correlation(estimate))
         drawn += [budget(estimate)] if estimate.budget else []
-    return drawn
+    return drawn + compare_pictures(calibration)
+
+
+def _path(calibration: Calibration) -> Picture:
+    """The angles of the gimbals over time."""
+    return path(
+        calibration.recording.t,
+        calibration.recording.th,
+        JOINTS,
+        "The path",
+        "Gimbal angles that the encoders read; the background has the colour of the joint that turns: th_x the "
+        "outer, th_y the inner one, th_z the platform's.",
+    )
 
 
 def compare_pictures(calibration: Calibration) -> list[Picture]:
@@ -97,9 +98,9 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     filters = _all(calibration)
     if len(filters) < 2:
         return []
-    values, u = found(calibration.filtered)
+    values, u = product_form(calibration.filtered)
     apart = {
-        kind: (found(each)[0] - values) / u
+        kind: (product_form(each)[0] - values) / u
         for kind, each in filters.items()
         if kind != calibration.filtered.kind
     }
@@ -177,103 +178,6 @@ def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
     )
 
 
-def design_page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
-    """The report of a search for a path as one self-contained HTML page."""
-    bounds, plan = designed.bounds, designed.plan
-    units, size = of_field(len(bounds.names))
-    drawn = [
-        path(
-            plan.step * np.arange(len(plan.angles()), dtype=float),
-            plan.angles(),
-            JOINTS,
-            "The path found",
-            "Gimbal angles; the background has the colour of the joint that turns: th_x the outer, th_y the inner one, "
-            "th_z the platform's.",
-        ),
-        dots(
-            "Bounds by path",
-            "Standard uncertainty of each coefficient at the end of each path, the best that any filter can reach with "
-            f"the stated noise and prior; further left is better.{' Bar: the goal.' if settings.goal else ''}",
-            bounds.names,
-            units,
-            {each.name: each.seen.bounds.u / size for each in designed.compare},
-            np.array([settings.goal.get(name, np.nan) for name in bounds.names]) / size
-            if settings.goal
-            else None,
-        ),
-    ]
-    return page(
-        "selfcal.html",
-        estimate,
-        "A path for self-calibration",
-        _facts(settings),
-        tables=[paths(designed), turns(plan), weak_combinations(bounds)],
-        pictures=drawn,
-        details=[bounds_by_path(designed)],
-    )
-
-
-def campaign_page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> str:
-    """The report of many simulated calibrations as one self-contained HTML page."""
-    coverage, nees, p = campaign.coverage, campaign.nees, len(campaign.names)
-    m = campaign.joint_error.shape[1]
-    each = np.einsum(
-        "ri,ri->r",
-        campaign.joint_error,
-        np.linalg.solve(campaign.joint_covariance, campaign.joint_error[..., None])[..., 0],
-    )
-    what = "attitude and coefficients" if m > p else "coefficients"
-    drawn = [
-        filtering.covered(coverage, campaign.names, campaign.rms_over_bound),
-        filtering.chi_square(
-            "Normalised estimation error squared",
-            f"Errors of {what} of a run together, {m} numbers, squared and over their stated covariance (NEES), beside "
-            f"the chi-square density that they follow if the covariances are true. Mean {nees.mean:.3g} of {nees.runs} "
-            f"runs, expected {nees.limits[0]:.4g} to {nees.limits[1]:.4g}. Too far right: covariances too small.",
-            each,
-            m,
-            1.0,
-            "NEES",
-        ),
-        filtering.chi_square(
-            "Normalised innovations squared",
-            f"Mean over the {campaign.rows:.0f} rows of each run away from gimbal lock (NIS), beside the density of "
-            f"such a mean. Mean {np.nanmean(campaign.nis):.4f}, expected {campaign.nis_limits[0]:.4f} to "
-            f"{campaign.nis_limits[1]:.4f}.",
-            campaign.nis,
-            campaign.nis_expected * campaign.rows,
-            campaign.rows,
-            "mean NIS of a run",
-        ),
-    ]
-    return page(
-        "selfcal.html",
-        estimate,
-        "Self-calibration simulated many times",
-        [*_facts(settings), ("filter", "", f"{FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind})")],
-        tables=[campaign_table(campaign)],
-        pictures=drawn,
-        details=[],
-    )
-
-
-def _facts(settings: SelfcalSettings) -> list[tuple[str, str, str]]:
-    """Site, noise and path, as name, unit and text."""
-    noise, site = settings.noise, settings.site
-    _, arcsec = shown_unit("rad")
-    _, ug = shown_unit("m/s^2")
-    facts = [
-        ("latitude", "°", f"{np.degrees(site.latitude):.6g}") if site.latitude is not None else ("", "", ""),
-        ("gravity", "m/s²", f"{site.gravity:.7g}"),
-        ("angle random walk", "°/√h", f"{np.degrees(noise.angle_random_walk) * 60.0:.3g}"),
-        ("noise of an accelerometer's sample", "µg", f"{noise.accelerometer / ug:.3g}"),
-        ("noise of an encoder's sample", "arcsec", f"{noise.encoder / arcsec:.3g}"),
-    ]
-    if settings.plan is not None:
-        facts.append(("path of the study", "", settings.plan.words()))
-    return [fact for fact in facts if fact[0]]
-
-
 def _attitude(calibration: Calibration, history: History, truth: Array | None) -> Picture:
     """The attitude against the truth where that is known, else against the encoders."""
     t = calibration.recording.t
@@ -292,17 +196,17 @@ def _attitude(calibration: Calibration, history: History, truth: Array | None) -
     return attitude_correction(t, correction, history.attitude_u if about_axes else None)
 
 
-def _bounds(calibration: Calibration, settings: SelfcalSettings) -> Picture:
+def _bounds(calibration: Calibration) -> Picture:
     """Uncertainties beside bounds, priors and goals."""
     estimate, bounds = calibration.estimate, calibration.bounds
     units, size = of_field(len(bounds.names))
-    goal = np.array([settings.goal.get(name, np.nan) for name in bounds.names])
+    goal = np.array([calibration.settings.goal.get(name, np.nan) for name in bounds.names])
     stated = [estimate[name].u if name in estimate.parameters else np.nan for name in bounds.names]
     return bounds_beside(
         bounds.names, units, np.array(stated) / size, bounds.u / size, bounds.prior / size, goal / size
     )
 
 
-def _all(calibration: Calibration) -> Mapping[str, Filtered]:
+def _all(calibration: Calibration) -> Mapping[str, FilterResult]:
     """Every filter that ran, the one that counts first."""
     return {calibration.filtered.kind: calibration.filtered} | dict(calibration.compared)

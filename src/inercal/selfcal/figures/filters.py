@@ -8,19 +8,11 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.result import rounded
-from inercal.report.histories import Line, panels_of_lines
+from inercal.report.courses import Line, panels_of_lines
 from inercal.report.html import Picture
-from inercal.report.style import (
-    ALARM,
-    COLOURS,
-    QUIET,
-    WIDTH,
-    few_powers,
-    figure,
-    plain_unit,
-    power_of_ten,
-    svg,
-)
+from inercal.report.marks import Axis, Dots, Level, Mark, Panel, Strips
+from inercal.report.panels import draw
+from inercal.report.style import ALARM, COLOURS, QUIET, plain_unit, power_of_ten
 
 _MARKS = "osD^vP"
 
@@ -90,42 +82,32 @@ def bounds_beside(
 
     What is NaN, as a goal that is not stated, has no mark.
     """
-    places = np.arange(len(names))
-    with figure(WIDTH, 0.75 + 0.165 * len(names)) as page:
-        axes = page.subplots()
-        axes.set_xscale("log")
-        axes.axvline(1.0, color=QUIET, lw=0.9)
-        axes.axvspan(0.5, 1.0, color=ALARM, alpha=0.08, lw=0)
-        for label, values, mark, colour, size in (
-            ("goal", goal, "D", COLOURS[2], 6.0),
-            ("bound", bound, "s", COLOURS[1], 7.0),
-            ("estimate", u, "o", COLOURS[0], 4.0),
-        ):
-            part = np.where(np.isfinite(values) & (values > 0.0), values, np.nan) / prior
-            if np.isfinite(part).any():
-                fill = colour if mark == "o" else "none"
-                axes.plot(part, places, mark, color=colour, mfc=fill, mew=1.1, ms=size, label=label)
-        axes.set_yticks(places, names, fontsize=7)
-        axes.set_ylim(len(names) - 0.5, -0.5)
-        axes.tick_params(axis="y", length=0)
-        axes.grid(axis="both")
-        axes.set_xlabel("standard uncertainty / prior")
-        few_powers(axes.xaxis)
-        axes.minorticks_off()
-        for place, (value, own, unit) in enumerate(zip(u, prior, units, strict=True)):
-            if np.isfinite(value) and value > 0.0:
-                text = f"{rounded(value, value)[1]} of {own:.4g} {plain_unit(unit)}"
-                across = axes.get_yaxis_transform()
-                axes.text(1.01, place, text, transform=across, fontsize=6.5, va="center_baseline")
-        page.legend(loc="outside upper center", ncols=3)
-        drawn = svg(page)
+    rows = np.arange(len(names))
+    marks: list[Mark] = [Strips((0.5, 1.0), ALARM, 0.08), Level(1.0, "", QUIET, 0.9, upright=True)]
+    for label, own, mark, colour, size in (
+        ("goal", goal, "D", COLOURS[2], 6.0),
+        ("bound", bound, "s", COLOURS[1], 7.0),
+        ("estimate", u, "o", COLOURS[0], 4.0),
+    ):
+        part = np.where(np.isfinite(own) & (own > 0.0), own, np.nan) / prior
+        if np.isfinite(part).any():
+            marks.append(Dots(part, rows, label, colour, mark, size, filled=mark == "o"))
+    notes = [
+        f"{rounded(value, value)[1]} of {own:.4g} {plain_unit(unit)}"
+        if np.isfinite(value) and value > 0.0
+        else ""
+        for value, own, unit in zip(u, prior, units, strict=True)
+    ]
+    across = Axis("standard uncertainty / prior", "log")
     wanted = " Goal: what the study wants." if np.isfinite(goal).any() else ""
-    return Picture(
+    return draw(
         "Uncertainties beside their bounds",
         "Standard uncertainty of each coefficient over that of its prior; at the right, both in units. Squares: the "
         "Cramér-Rao bound, the best that any filter can reach on this path with the stated noise. In the red strip "
         f"the path leaves a coefficient at its prior. A dot above its square holds other sources too.{wanted}",
-        drawn,
+        [[Panel(marks, across, Axis(names=names), notes=notes, grid="both")]],
+        0.75 + 0.165 * len(names),
+        where="center",
     )
 
 
@@ -134,39 +116,20 @@ def filters_apart(names: Sequence[str], apart: Mapping[str, Array], first: str) 
     finite = [np.abs(x[np.isfinite(x)]) for x in apart.values()]
     far = max((float(x.max()) for x in finite if len(x)), default=0.0)
     linear = 0.01
-    with figure(WIDTH, 0.8 + 0.17 * len(names)) as page:
-        axes = page.subplots()
-        axes.axvspan(-1.0, 1.0, color=COLOURS[0], alpha=0.1, lw=0)
-        axes.axvline(0.0, color=QUIET, lw=0.6)
-        for k, (label, x) in enumerate(apart.items()):
-            places = np.arange(len(names)) + 0.6 * (k - 0.5 * (len(apart) - 1)) / max(len(apart), 1)
-            axes.plot(
-                np.where(np.isfinite(x), np.clip(x, -1e9, 1e9), np.nan),
-                places,
-                _MARKS[k % len(_MARKS)],
-                color=COLOURS[k % len(COLOURS)],
-                ms=3.5,
-                label=label,
-            )
-        axes.set_xscale("symlog", linthresh=linear, linscale=0.7)
-        top = max(1.0, min(far, 1e9))
-        powers = 10.0 ** np.arange(-2, int(np.ceil(np.log10(top))) + 1)
-        powers = powers[:: max(1, -(-len(powers) // 5))]
-        ticks = [*(-powers[::-1]), 0.0, *powers]
-        axes.set_xticks(ticks, list(map(power_of_ten, ticks)), minor=False)
-        axes.set_xticks([], minor=True)
-        axes.set_xlim(-1.5 * top, 1.5 * top)
-        axes.set_ylim(len(names) - 0.4, -0.6)
-        axes.set_yticks(range(len(names)), names, fontsize=7)
-        axes.tick_params(axis="y", length=0)
-        axes.set_xlabel(f"difference from {first} / its u")
-        axes.grid(axis="both")
-        page.legend(loc="outside upper center", ncols=6)
-        drawn = svg(page)
-    return Picture(
+    top = max(1.0, min(far, 1e9))
+    marks: list[Mark] = [Strips((-1.0, 1.0), alpha=0.1), Level(0.0, upright=True)]
+    for k, (label, x) in enumerate(apart.items()):
+        rows = np.arange(len(names)) + 0.6 * (k - 0.5 * (len(apart) - 1)) / max(len(apart), 1)
+        off = np.where(np.isfinite(x), np.clip(x, -1e9, 1e9), np.nan)
+        marks.append(Dots(off, rows, label, COLOURS[k % len(COLOURS)], _MARKS[k % len(_MARKS)], 3.5))
+    across = Axis(f"difference from {first} / its u", "symlog", (-1.5 * top, 1.5 * top), linear=linear)
+    return draw(
         "Filters against each other",
         f"Estimate of each filter less that of {first}, over the standard uncertainty of {first}; logarithmic beyond "
         f"± {linear:g}. Band: ± 1. All have the same data: good approximations lie close together; lm, which "
         "leaves the noise of the gyros out of its fit, is a start for others and lies up to some u away.",
-        drawn,
+        [[Panel(marks, across, Axis(names=names), grid="both")]],
+        0.8 + 0.17 * len(names),
+        6,
+        "center",
     )

@@ -9,27 +9,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
+from inercal.aoa.figures import sensors
+from inercal.aoa.figures.innovations import innovations
+from inercal.aoa.figures.learned import flexure, learned, lever_arms
 from inercal.aoa.flow import alpha_beta, stated
 from inercal.aoa.reading.pauses import at_rest
-from inercal.aoa.result.display import delays, displayed, shown_unit
-from inercal.aoa.result.outcome import unit_of
+from inercal.aoa.result.display import delays, displayed
 from inercal.aoa.result.tables import answer, on_page
 from inercal.aoa.result.verification import REFERENCE_U
 from inercal.aoa.task import in_order
 from inercal.arrays import Array
-from inercal.report import sting
-from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches
-from inercal.report.aoa_innovations import innovations
-from inercal.report.figures import correlation
-from inercal.report.histories import Course, converging, falling
+from inercal.report.coefficients import correlation
 from inercal.report.html import Picture, render
 from inercal.report.numbers import SETTLED, known, largest, middle, rms, settled, span
+from inercal.report.over_time import Flags, Marks, Panel, gaps, measured, over_time, stretches
 from inercal.report.spectra import of_angle
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from inercal.aoa.fusion.filter_result import Filtered
+    from inercal.aoa.reading.recording import Recording
     from inercal.aoa.settings import AoaSettings
     from inercal.aoa.task import Measurement
 
@@ -39,46 +37,42 @@ _MG = 1e-3 * STANDARD_GRAVITY
 _CLOSE = 4.0
 """Time [s] of the close-up."""
 
-_NO_FORCE = 1e-3
-"""Specific force [mg] that is none."""
 
-
-def angle_page(measurement: Measurement, settings: AoaSettings) -> str:
-    """The report of a measurement as one self-contained HTML page, with or without other methods and a reference."""
-    estimate = measurement.estimate
-    return render(
-        displayed(estimate),
-        pictures(measurement, settings),
-        "Angle of a wind-tunnel model",
-        on_page(estimate),
-        answer(estimate, measurement.points, settings),
-    )
-
-
-def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
-    """Draw what there is to see of a measurement of whatever method, status and length."""
-    layout, gyro = settings.layout, measurement.recording.gyro
-    map_of_sensors = sting.side_view(
-        layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any())
-    )
+def main(measurement: Measurement) -> Picture:
+    """The picture that answers the question: the angle with its band; the sensors where there is no angle."""
     seen = in_order(measurement)
+    return _angle(seen, _marks(seen)) if len(seen.recording.t) > 1 else _sensors(measurement)
+
+
+def page(measurement: Measurement) -> str:
+    """The report of a measurement as one self-contained HTML page, with or without other methods and a reference."""
+    return render(
+        displayed(measurement.estimate),
+        pictures(measurement),
+        "Angle of a wind-tunnel model",
+        on_page(measurement.estimate),
+        answer(measurement.estimate, measurement.points, measurement.settings),
+    )
+
+
+def pictures(measurement: Measurement) -> list[Picture]:
+    """All pictures of a measurement of whatever method, status and length, the main one first."""
+    settings, map_of_sensors, seen = measurement.settings, _sensors(measurement), in_order(measurement)
     recording, found = seen.recording, seen.filtered
     t = recording.t
     if len(t) < 2:
         return [map_of_sensors]
-    names = (*layout.names, "gyro")
-    missing = np.isnan(np.column_stack([recording.acc, recording.gyro]))
-    masked = recording.masked if recording.masked is not None else np.zeros(missing.shape, dtype=bool)
-    restarts = np.empty(0) if found is None else t[list(found.starts[1:])]
-    marks = Marks(stretches(t, np.asarray(masked.any(axis=1))), gaps(t), restarts=restarts)
+    names = (*settings.layout.names, "gyro")
+    missing, masked = _lost(recording)
+    marks = _marks(seen)
     drawn = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
     if missing.any() or len(marks.gaps):
         drawn.append(measured(t, names, missing, masked, marks))
     drawn += _in_the_stream(seen, settings, marks)
     drawn += _against_reference(seen, marks) + _fitted(seen) + _points(measurement) + _compared(seen, marks)
-    drawn += _lever_arms(seen, settings, marks)
+    drawn += lever_arms(seen, settings, marks)
     if found is not None:
-        drawn += _flexure(seen, found, settings, marks) + _learned(seen, found)
+        drawn += flexure(seen, found, settings, marks) + learned(seen, found)
         drawn += innovations(t, found.innovations, names, found.nis_mean, marks)
     reference = recording.reference
     drawn += of_angle(
@@ -88,6 +82,26 @@ def pictures(measurement: Measurement, settings: AoaSettings) -> list[Picture]:
         {} if found is None else dict(zip(names, found.innovations.T, strict=True)),
     )
     return drawn + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
+
+
+def _sensors(measurement: Measurement) -> Picture:
+    """Where the sensors are on the model."""
+    layout, gyro = measurement.settings.layout, measurement.recording.gyro
+    return sensors.side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
+
+
+def _lost(recording: Recording) -> tuple[Flags, Flags]:
+    """Samples (n, k) that are missing, and those that are saturated."""
+    missing = np.isnan(np.column_stack([recording.acc, recording.gyro]))
+    masked = recording.masked if recording.masked is not None else np.zeros(missing.shape, dtype=bool)
+    return missing, np.asarray(masked)
+
+
+def _marks(seen: Measurement) -> Marks:
+    """Stretches that are saturated or empty, and where the filter started anew."""
+    t, (_, masked) = seen.recording.t, _lost(seen.recording)
+    restarts = np.empty(0) if seen.filtered is None else t[list(seen.filtered.starts[1:])]
+    return Marks(stretches(t, np.asarray(masked.any(axis=1))), gaps(t), restarts=restarts)
 
 
 def _angle(seen: Measurement, marks: Marks) -> Picture:
@@ -226,7 +240,7 @@ def _fitted(seen: Measurement) -> list[Picture]:
     values[0] -= 1.0
     u = np.array([[each.u for each in row] for row in rows])
     told = np.array([[each.name not in fit.unseen for each in row] for row in rows])
-    return [sting.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
+    return [sensors.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
 
 
 def _points(measurement: Measurement) -> list[Picture]:
@@ -242,7 +256,7 @@ def _points(measurement: Measurement) -> list[Picture]:
         true = [known(reference[each.start : each.stop]) for each in found]
         means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
         error = np.degrees(_apart(np.radians(theta), means))
-    return [sting.points(theta, u, left, scatter, error)]
+    return [sensors.points(theta, u, left, scatter, error)]
 
 
 def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
@@ -260,7 +274,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
     panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
     return [
-        sting.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
+        sensors.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
         over_time(
             "Methods over time",
             f"The {what}, a panel for each method, each on a scale of its own: that which it spans after the first "
@@ -269,123 +283,6 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
             panels,
             marks,
             0.5,
-        ),
-    ]
-
-
-def _lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[Picture]:
-    """What lever arms add to the reading of each accelerometer."""
-    t, found, layout, roll = seen.recording.t, seen.filtered, settings.layout, settings.attitude.roll
-    rate = seen.angles.rate if np.isfinite(seen.angles.rate).any() else seen.recording.gyro
-    level = 1.0 if roll is None else math.cos(roll.value)
-    weights = all_weights(layout)
-    if found is not None:
-        acceleration = found.acceleration
-    else:
-        acceleration = np.full(len(t), np.nan) if weights is None else seen.recording.acc @ weights / level
-    degrees, late = math.degrees(_MG / settings.site.gravity), settled(t)
-    panels = []
-    for name, q, p in zip(
-        layout.names, centrifugal_arms(layout, level), tangential_arms(layout, level), strict=True
-    ):
-        terms = {"centrifugal": -q * rate**2 / _MG, "tangential": p * acceleration / _MG}
-        sizes = {word: largest(x[late]) for word, x in terms.items()}
-        most = ", ".join(
-            f"{word} {size:.3g} mg = {degrees * size:.2g}°"
-            for word, size in sizes.items()
-            if size > _NO_FORCE
-        )
-        title = f"{name}, at most: {most}" if most else f"{name}: none"
-        panels.append(Panel(f"{name} [mg]", terms, title, zero=True))
-    return [
-        over_time(
-            "What lever arms add to the readings",
-            "Specific force that each accelerometer feels because it sits away from the pivot, by the positions that "
-            "the study states: centrifugal with the square of the rate, tangential with the angular acceleration. "
-            f"Taken for gravity, each mg costs {degrees:.2g}° or more. What is small against the biases needs no "
-            f"compensation; what is large shows any error of a position.{marks.words}",
-            t,
-            panels,
-            marks,
-            0.75,
-        )
-    ]
-
-
-def _flexure(seen: Measurement, found: Filtered, settings: AoaSettings, marks: Marks) -> list[Picture]:
-    """The sting's flexure as it was estimated; nothing where it is not."""
-    names, prior = seen.problem.names, settings.prior
-    if "flexure_z" not in names or len(found.kept_t) < 2:
-        return []
-    panels = []
-    for axis, word, of in (("z", "across", prior.heave), ("x", "along", prior.axial)):
-        k = names.index(f"flexure_{axis}")
-        value, u, level = found.states[:, k] / _MG, found.states_u[:, k] / _MG, 2.0 * of.level / _MG
-        title = f"{word} the model: {rms(value):.2g} mg rms, u {middle(u):.2g} mg; prior {0.5 * level:.2g} mg"
-        band = value - 2.0 * u, value + 2.0 * u
-        panels.append(Panel(f"{axis} [mg]", {"": value}, title, band, {"": level, " ": -level}, zero=True))
-    return [
-        over_time(
-            "Flexure of the sting",
-            "Specific force of the model's vibration on its sting, as the fusion estimates it beside the pitch, with "
-            "bands of ± two standard uncertainties; dashes: ± two standard deviations of the prior. Within its band "
-            "there is none to be seen. Beyond the dashes the prior is too small, and so is the uncertainty of theta; "
-            f"even where they hold it can be too small by some 20 % while the sting vibrates.{marks.words}",
-            found.kept_t,
-            panels,
-            marks,
-        )
-    ]
-
-
-def _learned(seen: Measurement, found: Filtered) -> list[Picture]:
-    """Biases, lever arms, heights and scale: at the end against their priors, and over time."""
-    problem, t = seen.problem, found.kept_t
-    if len(t) < 2:
-        return []
-    places = [*problem.nuisances.values()]
-    prior, sizes = (
-        np.sqrt(np.diag(problem.covariance)),
-        np.array([shown_unit(unit_of(name))[1] for name in problem.nuisances]),
-    )
-    units = [shown_unit(unit_of(name))[0] for name in problem.nuisances]
-    told = np.flatnonzero(np.isfinite(found.states_u[:, places]).all(axis=1))
-    if not len(told):
-        return []
-    courses = [
-        Course(
-            name,
-            unit,
-            found.states[:, k] / size,
-            found.states_u[:, k] / size,
-            float(prior[k] / size),
-            centre=float(problem.mean[k] / size),
-        )
-        for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True)
-    ]
-    last = found.states[told[-1], places] / sizes, found.states_u[told[-1], places] / sizes
-    at_end = sting.learned(
-        tuple(problem.nuisances), units, *last, problem.mean[places] / sizes, prior[places] / sizes
-    )
-    if found.smoothed:
-        return [at_end]  # constants are the same all along
-    return [
-        at_end,
-        converging(
-            "What was learned, over time",
-            "Biases b, lever arms dr, heights zo and scale k of the gyro as the record goes on, with bands of ± two "
-            "standard uncertainties; above each its last value with its u. Bar at the start: the prior, ± two standard "
-            "deviations. Each panel spans what the last 45 % of the time leave open. A value that keeps moving "
-            "by more than its band is no constant: temperature, or an error of another kind.",
-            t,
-            courses,
-        ),
-        falling(
-            "How the uncertainties fall",
-            "Standard uncertainty of each over that of its prior. A line falls when the motion tells the coefficients "
-            "apart, and stays level while it does not: biases need a sweep of the angle, lever arms fast motion.",
-            t,
-            courses,
         ),
     ]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.report.cells import Cell, band, frame, line
-from inercal.report.histories import grid
+from inercal.report.courses import grid
 from inercal.report.html import Picture
 from inercal.report.numbers import SETTLED
 from inercal.report.style import ALARM, COLOURS, INK, QUIET, envelope, svg

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.report import filtering
-from inercal.report.aoa import Marks, Panel, over_time
+from inercal.report import innovations as white_noise
 from inercal.report.html import Picture
+from inercal.report.over_time import Marks, Panel, over_time
 
 _BLOCKS = 400
 """Pieces of a record whose mean squared innovations are drawn."""
@@ -56,7 +56,7 @@ def innovations(
         ],
         replace(marks, gaps=np.empty((0, 2))),
     )
-    white = filtering.innovations(t, values, names)
+    white = white_noise.innovations(t, values, names)
     return [
         nis,
         replace(

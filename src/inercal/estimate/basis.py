@@ -1,0 +1,105 @@
+"""What a result rests on beside its numbers: command, model, conditions, files, versions, publications."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from inercal.inputs import Source
+from inercal.units import Quantity
+
+if TYPE_CHECKING:
+    from inercal.geometry.site import Site
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What an `inercal.estimate.result.Estimate` rests on; its fields of the same names."""
+
+    command: str
+    model: str = ""
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    traceability: Mapping[str, str] = field(default_factory=dict)
+    inputs: tuple[Source, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    references: tuple[str, ...] = ()
+
+
+class Settings(Protocol):
+    """What studies of all systems state of where and when."""
+
+    @property
+    def site(self) -> Site:
+        """Gravity and latitude."""
+
+    @property
+    def temperature(self) -> Quantity | None:
+        """That stated of the instrument."""
+
+    @property
+    def traceability(self) -> Mapping[str, str]:
+        """Free texts, the date among them."""
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """Keys of the study, as they were given."""
+
+
+def studied(
+    command: str,
+    settings: Settings,
+    inputs: Iterable[Source],
+    model: str,
+    references: tuple[str, ...],
+    conditions: Mapping[str, Any] | None = None,
+) -> Basis:
+    """The basis of a result that a study and recordings lead to; ``conditions`` as `conditions_of` gives them."""
+    return Basis(
+        command,
+        model,
+        conditions or {},
+        settings.traceability,
+        tuple(inputs),
+        provenance(settings.given),
+        references,
+    )
+
+
+def conditions_of(
+    settings: Settings, recorded: Quantity | None, ranges: Mapping[str, Any], **own: Any
+) -> dict[str, Any]:
+    """The conditions of a result.
+
+    Parameters
+    ----------
+    settings : Settings
+        The study.
+    recorded : Quantity or None
+        The temperature that was recorded (`inercal.records.temperature.recorded_temperature`); that of the study goes
+        before.
+    ranges : mapping
+        Smallest and largest input by name, its SI unit at the end of the name.
+    **own
+        What only this kind of estimate has, such as its frame; comes first.
+    """
+    site, stated = settings.site, settings.temperature
+    temperature = recorded if stated is None else stated
+    return own | {
+        "temperature": temperature and {"value": temperature.value, "u": temperature.u, "unit": "degC"},
+        "site": {"gravity_m_s2": site.gravity, "latitude_rad": site.latitude},
+        "date": settings.traceability.get("date", ""),
+        "ranges": ranges,
+    }
+
+
+def provenance(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What a repetition of a calibration needs beside its inputs: the keys ``given``; nothing in it is random."""
+    import platform
+
+    import scipy
+
+    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+    return {"settings": given, "seed": None, "versions": versions}

@@ -1,0 +1,38 @@
+"""Pictures and the page of an IMU's calibration, by whichever method it was made."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+from inercal.imu.aided.calibration import AidedCalibration
+from inercal.imu.aided.figures import pictures as of_aided
+from inercal.imu.ferraris.calibration import FerrarisCalibration
+from inercal.imu.ferraris.figures import pictures as of_ferraris
+from inercal.imu.multiposition.figures import pictures as of_multiposition
+from inercal.report.html import Picture, render
+
+if TYPE_CHECKING:
+    from inercal.imu.multiposition.calibration import MultipositionCalibration
+
+    AnyCalibration: TypeAlias = MultipositionCalibration | FerrarisCalibration | AidedCalibration
+
+
+def main(calibration: AnyCalibration) -> Picture:
+    """The picture that answers the question: the poses, the sections or the test, and what the fit leaves over."""
+    return pictures(calibration)[0]
+
+
+def pictures(calibration: AnyCalibration) -> list[Picture]:
+    """All pictures of a calibration of any status, the main one first."""
+    match calibration:
+        case FerrarisCalibration():
+            return of_ferraris(calibration)
+        case AidedCalibration():
+            return of_aided(calibration)
+        case _:
+            return of_multiposition(calibration)
+
+
+def page(calibration: AnyCalibration) -> str:
+    """The report of a calibration as one self-contained HTML page."""
+    return render(calibration.estimate, pictures(calibration), "Calibration of an inertial measurement unit")
