@@ -150,7 +150,7 @@ def test_no_circles():
 WITHIN = {
     "imu": (
         "limits recording turns aided_settings ferraris_settings settings simulate multiposition ferraris aided "
-        "temperature task"
+        "temperature task figures"
     ),
     "turntable": (
         "limits settings model weights noise regression readings display sensitivity positions rate task "

@@ -9,7 +9,8 @@ from inercal.rigs.plans import NAMED
 from inercal.rigs.tables import slots
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.display import tolerances
-from inercal.turntable.task import Calibration, calibrate, simulate
+from inercal.turntable.positions.calibration import PositionCalibration
+from inercal.turntable.task import calibrate, simulate
 
 #: unit in the table of terms -> a usual size and its unit, by kind of output
 _SIZES = {
@@ -56,10 +57,10 @@ def _run(done, draws):
     estimate = found.estimate
     done.outcome = estimate.status.value
     done.wrong += laws.of_estimate(estimate)
-    if isinstance(found, Calibration):
+    if isinstance(found, PositionCalibration):
         found.shown.table()
     tolerances(estimate)
-    if done.outcome == "ok" and not faults and isinstance(found, Calibration) and _obeyed(estimate):
+    if done.outcome == "ok" and not faults and isinstance(found, PositionCalibration) and _obeyed(estimate):
         truth = [settings.instrument.coefficients.get(name, _unstated(name)) for name in estimate.names]
         done.wrong += laws.of_truth(estimate.values, estimate.u, truth, estimate.names)
 

@@ -7,13 +7,13 @@ from recordings import shipped
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import AidedCalibration
 from inercal.imu.ferraris.calibration import FerrarisCalibration
-from inercal.imu.multiposition.calibration import Calibration
+from inercal.imu.multiposition.calibration import MultipositionCalibration
 from inercal.imu.task import calibrate
 
 
 def test_the_settings_choose_the_method():
     for name, kind in (
-        ("mpu6050", Calibration),
+        ("mpu6050", MultipositionCalibration),
         ("ferraris", FerrarisCalibration),
         ("table", AidedCalibration),
     ):

@@ -51,10 +51,11 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 def design(study: Study, progress: Progress = lambda _: None) -> Result:
     """Find the positions that calibrate best; ``evidence`` is the `inercal.turntable.positions.planning.Designed`."""
     from inercal.turntable.positions.planning import REFERENCES
+    from inercal.turntable.positions.planning import design as planned
 
     clock = time.perf_counter()
     with study.at_fault():
-        designed = task.design(study.settings, progress)
+        designed = planned(study.settings, progress)
     timing = {"solve": time.perf_counter() - clock}
     result = without_coefficients(
         "design positions", designed.message, designed.result, study, designed.findings, timing, REFERENCES

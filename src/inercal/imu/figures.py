@@ -12,9 +12,9 @@ from inercal.imu.multiposition.figures import pictures as of_multiposition
 from inercal.report.html import Picture, render
 
 if TYPE_CHECKING:
-    from inercal.imu.multiposition.calibration import Calibration
+    from inercal.imu.multiposition.calibration import MultipositionCalibration
 
-    AnyCalibration: TypeAlias = Calibration | FerrarisCalibration | AidedCalibration
+    AnyCalibration: TypeAlias = MultipositionCalibration | FerrarisCalibration | AidedCalibration
 
 
 def main(calibration: AnyCalibration) -> Picture:

@@ -15,9 +15,9 @@ from inercal.records.record import Record
 if TYPE_CHECKING:
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.imu.multiposition.calibration import Calibration
+    from inercal.imu.multiposition.calibration import MultipositionCalibration
 
-    Calibrated = Calibration | FerrarisCalibration | AidedCalibration
+    Calibrated = MultipositionCalibration | FerrarisCalibration | AidedCalibration
 
 
 def calibrate(
@@ -37,7 +37,7 @@ def calibrate(
 
     Returns
     -------
-    `inercal.imu.multiposition.calibration.Calibration`, or that of the method asked for
+    `inercal.imu.multiposition.calibration.MultipositionCalibration`, or that of the method asked for
         An estimate and the evidence behind it; nothing is raised for a poor fit.
 
     Raises

@@ -28,7 +28,7 @@ LONGEST = 3.0
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ReadingNoise:
     """Noise of a reading: standard deviations ``std`` (c,), and their degrees of freedom ``dof``, inf where stated."""
 
     std: Array
@@ -44,7 +44,9 @@ class _Likelihood:
     information: Array
 
 
-def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None], floor: Array) -> Scatter:
+def scatter(
+    rows: Array, y: Array, table: Weights, noise: Sequence[float | None], floor: Array
+) -> ReadingNoise:
     """Noise of each channel.
 
     Parameters
@@ -62,7 +64,7 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
     start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), std), floor))
     dof = np.full(len(free), np.inf)
     if not free.any():
-        return Scatter(np.exp(0.5 * start), dof)
+        return ReadingNoise(np.exp(0.5 * start), dof)
     log, now = start, _likelihood(rows, y, table, np.exp(start))
     for _ in range(STEPS):
         s2 = np.exp(log)
@@ -86,7 +88,7 @@ def scatter(rows: Array, y: Array, table: Weights, noise: Sequence[float | None]
     s2 = np.exp(log)[free]
     of_log = now.information[np.ix_(free, free)] * s2 * s2[:, None]
     dof[free] = 2.0 / np.diag(np.linalg.pinv(of_log))
-    return Scatter(np.exp(0.5 * log), dof)
+    return ReadingNoise(np.exp(0.5 * log), dof)
 
 
 def _spread(rows: Array, y: Array) -> Array:

@@ -29,7 +29,7 @@ from inercal.records.record import Record
 
 
 @dataclass(frozen=True)
-class Calibration:
+class MultipositionCalibration:
     """An ``estimate`` and, where the fit came that far, the evidence behind it for pictures and tests."""
 
     estimate: Estimate
@@ -40,7 +40,7 @@ class Calibration:
 
 def calibrate_multiposition(
     record: Record, settings: ImuSettings, progress: Callable[[str], None] = lambda _: None
-) -> Calibration:
+) -> MultipositionCalibration:
     """Calibrate the accelerometers, and the gyro if the record has one.
 
     Parameters
@@ -54,7 +54,7 @@ def calibrate_multiposition(
 
     Returns
     -------
-    Calibration
+    MultipositionCalibration
         Its estimate's status says whether the values can be used; nothing is raised for a poor fit.
 
     Raises
@@ -70,7 +70,7 @@ def calibrate_multiposition(
     gravity = settings.site.gravity
     candidates = list(sweep(recording, gravity))
     if not candidates:
-        return Calibration(timed(without_fit(record, recording, settings), clock), recording)
+        return MultipositionCalibration(timed(without_fit(record, recording, settings), clock), recording)
     poses = choose(candidates)
     scatter = _scatter(poses)
     progress("fitting the gyro to the turns")
@@ -78,7 +78,7 @@ def calibrate_multiposition(
     findings = [*scatter_findings(poses, scatter), *of_gyro]
     joint = join(poses.accelerometer, gyro)
     estimate = assemble(record, recording, poses, scatter, joint, settings, findings)
-    return Calibration(timed(estimate, clock), recording, poses, gyro)
+    return MultipositionCalibration(timed(estimate, clock), recording, poses, gyro)
 
 
 def _scatter(poses: Poses) -> Scatter:

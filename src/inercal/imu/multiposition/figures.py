@@ -20,19 +20,19 @@ from inercal.report.sphere import hemispheres
 from inercal.report.style import ALARM, COLOURS, INK, envelope
 
 if TYPE_CHECKING:
-    from inercal.imu.multiposition.calibration import Calibration
+    from inercal.imu.multiposition.calibration import MultipositionCalibration
     from inercal.imu.multiposition.gyro import GyroFit
 
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 
 
-def pictures(calibration: Calibration) -> list[Picture]:
+def pictures(calibration: MultipositionCalibration) -> list[Picture]:
     """Draw what there is to see of a calibration.
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : MultipositionCalibration
         Of any status; without poses there is one picture, without a gyro there are none of turns.
     """
     estimate, poses, gyro = calibration.estimate, calibration.poses, calibration.gyro
@@ -49,7 +49,7 @@ def pictures(calibration: Calibration) -> list[Picture]:
     return drawn
 
 
-def _rest(calibration: Calibration) -> Picture:
+def _rest(calibration: MultipositionCalibration) -> Picture:
     """Windowed variance over time, the threshold, and the static intervals below it."""
     recording, poses = calibration.recording, calibration.poses
     t = recording.accelerometer.t

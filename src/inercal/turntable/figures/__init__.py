@@ -23,8 +23,8 @@ from inercal.turntable.weights import weights
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
+    from inercal.turntable.positions.calibration import PositionCalibration
     from inercal.turntable.readings import Readings
-    from inercal.turntable.task import Calibration
 
 
 _SCOPES = {
@@ -34,17 +34,17 @@ _SCOPES = {
 }
 
 
-def main(calibration: Calibration | RateCalibration) -> Picture:
+def main(calibration: PositionCalibration | RateCalibration) -> Picture:
     """The picture that answers the question: the residuals, or the positions where these do not identify the terms."""
     return pictures(calibration)[0]
 
 
-def page(calibration: Calibration | RateCalibration) -> str:
+def page(calibration: PositionCalibration | RateCalibration) -> str:
     """The report of a calibration as one self-contained HTML page."""
     return render(calibration.shown, pictures(calibration), "Calibration on a turntable")
 
 
-def pictures(calibration: Calibration | RateCalibration) -> list[Picture]:
+def pictures(calibration: PositionCalibration | RateCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first.
 
     Where the positions do not identify the terms there are those of positions and table alone; where no gyro could be

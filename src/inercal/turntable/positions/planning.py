@@ -38,7 +38,7 @@ REFERENCES = (
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class JudgedPlan:
     """A plan and its figures of merit.
 
     ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``model`` with the terms that ``figures.u``
@@ -70,7 +70,7 @@ class Designed:
     ----------
     plan : Plan
         The positions chosen.
-    judged : tuple of Judged
+    judged : tuple of JudgedPlan
         The chosen plan first, then those it is compared with; u in SI.
     units : mapping
         SI unit of each coefficient.
@@ -85,7 +85,7 @@ class Designed:
     """
 
     plan: Plan
-    judged: tuple[Judged, ...]
+    judged: tuple[JudgedPlan, ...]
     units: Mapping[str, str]
     unit: Unit
     message: str
@@ -172,7 +172,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     )
 
 
-def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judged:
+def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> JudgedPlan:
     """Figures of a plan, with table errors; the earth rate as `calibrate` would treat it there."""
     channels = channels_of(settings)
     whole = (
@@ -188,7 +188,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
         noise, samples = [settings.instrument.noise] * len(channels), _samples(settings, plan.angles)
         y = used.outputs(plan.angles, c)
         shares = drift_shares(fit(used, plan.angles, y, noise, start=c, samples=samples))
-    return Judged(
+    return JudgedPlan(
         plan,
         replace(
             figures,
@@ -208,7 +208,7 @@ def _figures(plan: Plan, settings: TurntableSettings, used: TableModel) -> PlanF
     return judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
 
 
-def _of_site(judged: Judged, settings: TurntableSettings) -> list[Finding]:
+def _of_site(judged: JudgedPlan, settings: TurntableSettings) -> list[Finding]:
     """A remark where it is the site, not the table or the noise, that rules what a plan is worth."""
     acting, _ = judged.model.beside(judged.plan.angles, _expected(settings, judged.model))
     rms = judged.figures.rms_prediction
@@ -292,7 +292,7 @@ def _largest_index(settings: TurntableSettings) -> Array:
     return np.asarray(np.nan_to_num(indices.first[..., factors]).max(axis=(0, 2)))
 
 
-def _entry(judged: Judged) -> dict[str, Any]:
+def _entry(judged: JudgedPlan) -> dict[str, Any]:
     """Figures of a plan for JSON; what it does not identify has no number."""
     figures = judged.figures
     return {

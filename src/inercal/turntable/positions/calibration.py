@@ -1,0 +1,70 @@
+"""Calibration of an instrument from positions of a table: a record and settings in, an estimate out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from inercal.errors import StudyError
+from inercal.estimate.result import Estimate
+from inercal.records.record import Record
+from inercal.turntable.display import displayed
+from inercal.turntable.positions.fit import Fitting, fit_readings
+from inercal.turntable.positions.outcome import assemble
+from inercal.turntable.readings import Readings, readings
+from inercal.turntable.settings import TurntableSettings
+
+
+@dataclass(frozen=True, eq=False)
+class PositionCalibration:
+    """An ``estimate``, and the evidence behind it for pictures and tests."""
+
+    estimate: Estimate
+    readings: Readings
+    fitting: Fitting
+
+    @property
+    def shown(self) -> Estimate:
+        """The estimate in the units of the record, for people."""
+        return displayed(self.estimate, self.readings.unit)
+
+
+def calibrate_positions(
+    record: Record, settings: TurntableSettings, progress: Callable[[str], None] = lambda _: None
+) -> PositionCalibration:
+    """Calibrate an instrument that was taken through positions on a table.
+
+    Parameters
+    ----------
+    record : Record
+        Angles of the table and outputs of the instrument: a row for each position, or samples.
+    settings : TurntableSettings
+        Site, table with its errors, instrument.
+    progress : callable
+        Told, in words, what is being done.
+
+    Raises
+    ------
+    InputError
+        The record has no angles or no outputs of such an instrument, or the study does not fit it.
+    """
+    progress("averaging over the positions")
+    means = readings(record, settings.chain.joints, settings.instrument.kind)
+    settings = _with_unit(settings, means)
+    progress("fitting")
+    fitting = fit_readings(means, settings)
+    return PositionCalibration(assemble(record, means, fitting, settings), means, fitting)
+
+
+def _with_unit(settings: TurntableSettings, means: Readings) -> TurntableSettings:
+    """The settings with the record's unit; refused where values were stated for another."""
+    instrument = settings.instrument
+    if instrument.unit.dimension != means.unit.dimension and (
+        instrument.noise is not None or instrument.coefficients
+    ):
+        raise StudyError(
+            "instrument.unit",
+            f"noise or coefficients are stated for outputs in {instrument.unit.symbol}, and the record's are in "
+            f"{means.unit.symbol}, expected the same kind of unit",
+        )
+    return replace(settings, instrument=replace(instrument, unit=means.unit))
