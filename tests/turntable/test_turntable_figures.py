@@ -8,15 +8,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from inercal.estimate.basis import Basis
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
 from inercal.findings import Status
 from inercal.geometry.site import Site
+from inercal.instruments.terms import shown_unit
 from inercal.report.html import render
 from inercal.report.positions import hemispheres
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import turntable
-from inercal.turntable.display import displayed, shown_unit
+from inercal.turntable.display import displayed
 from inercal.turntable.figures import design_page, pictures
 from inercal.turntable.planning import design
 from inercal.turntable.settings import Design, Instrument, TurntableSettings

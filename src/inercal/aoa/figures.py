@@ -12,12 +12,13 @@ import numpy as np
 from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.flow import alpha_beta, stated
 from inercal.aoa.reading.pauses import at_rest
-from inercal.aoa.result.display import delays, displayed, shown_unit
+from inercal.aoa.result.display import delays, displayed
 from inercal.aoa.result.outcome import unit_of
 from inercal.aoa.result.tables import answer, on_page
 from inercal.aoa.result.verification import REFERENCE_U
 from inercal.aoa.task import in_order
 from inercal.arrays import Array
+from inercal.instruments.terms import shown_unit
 from inercal.report import sting
 from inercal.report.aoa import Marks, Panel, gaps, measured, over_time, stretches
 from inercal.report.aoa_innovations import innovations

@@ -83,9 +83,9 @@ def calibrate_imu(
         from inercal.report.html import render
 
         drawn = _imu_pictures(solved[0][0]) if len(runs) == 1 else repeats(estimate)
-        return render(estimate, drawn, "Calibration of an inertial measurement unit")
+        return render(estimate.shown(), drawn, "Calibration of an inertial measurement unit")
 
-    return hand_over(estimate, [printed(estimate)], page, output)
+    return hand_over(estimate, [printed(estimate.shown())], page, output)
 
 
 def _imu_pictures(found: Calibration | FerrarisCalibration | AidedCalibration) -> list[Picture]:

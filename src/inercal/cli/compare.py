@@ -40,17 +40,15 @@ def compare(
     estimate = compared(*files)
     timing = {"read": read - clock, "solve": time.perf_counter() - read}
     estimate = replace(estimate, inputs=inputs, timing=timing)
-    shown = _of_field(estimate) if files[0].estimate.command == "selfcal" else estimate
+    shown = _shown(estimate, files[0].estimate)
     return hand_over(estimate, [table(shown)], lambda: page(shown), output, "comparison")
 
 
-def _of_field(estimate: Estimate) -> Estimate:
-    """The comparison of two self-calibrations with its rows in deg/h, arcsec, ug and ppm."""
-    from inercal.selfcal.display import shown_unit
-
+def _shown(estimate: Estimate, first: Estimate) -> Estimate:
+    """The comparison with its rows in the units in which the first calibration is shown."""
     lengths = ("first", "u_first", "second", "u_second", "difference", "u", "U")
-    rows = []
+    units, rows = first.shown_units(), []
     for row in estimate.result["coefficients"]:
-        unit, size = shown_unit(row["unit"])
+        unit, size = units[row["name"]]
         rows.append({**row, **{key: row[key] / size for key in lengths}, "unit": unit})
     return replace(estimate, result={**estimate.result, "coefficients": rows})

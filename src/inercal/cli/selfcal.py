@@ -86,7 +86,6 @@ def selfcal(
 
 def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) -> int:
     """Hand over the calibration of one run."""
-    from inercal.selfcal.display import displayed
     from inercal.selfcal.task import compared
 
     def page() -> str:
@@ -100,17 +99,16 @@ def _one(found: Calibration, settings: SelfcalSettings, output: ReportOutput) ->
 
         write_record(history_record(found.filtered, found.recording, found.problem.world), path)
 
-    tables = [printed(displayed(found.estimate)), *(f"{t.title}\n{t.text()}" for t in compared(found))]
+    tables = [printed(found.estimate.shown()), *(f"{t.title}\n{t.text()}" for t in compared(found))]
     return hand_over(found.estimate, tables, page, output, "calibration", histories)
 
 
 def _repeated(runs: Sequence[Calibration], output: ReportOutput) -> int:
     """Hand over what repeat runs say together."""
     from inercal.estimate.repeat import combine_runs
-    from inercal.selfcal.display import displayed
 
     of_runs = [found.estimate for found in runs]
-    estimate, shown = combine_runs(of_runs), combine_runs([displayed(each) for each in of_runs])
+    estimate, shown = combine_runs(of_runs), combine_runs(of_runs).shown()
     solve = sum(each.timing["solve"] for each in of_runs)
     estimate = replace(estimate, timing={**of_runs[-1].timing, "solve": solve})
 

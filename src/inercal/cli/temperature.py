@@ -54,9 +54,9 @@ def temperature(
         from inercal.imu.temperature.figures import pictures
         from inercal.report.html import render
 
-        return render(estimate, pictures(model), "Bias and scale factor against temperature")
+        return render(estimate.shown(), pictures(model), "Bias and scale factor against temperature")
 
-    return hand_over(estimate, [printed(estimate)], page, output, "temperature model")
+    return hand_over(estimate, [printed(estimate.shown())], page, output, "temperature model")
 
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.drivers import Drivers

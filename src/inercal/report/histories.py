@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.report.cells import Cell, band, canvas, frame, line
 from inercal.report.html import Picture
 from inercal.report.style import (

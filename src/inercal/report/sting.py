@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.report.html import Picture
 from inercal.report.style import ALARM, COLOURS, INK, QUIET, WIDTH, few_powers, figure, plain_unit, svg
 

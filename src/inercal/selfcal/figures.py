@@ -9,12 +9,13 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.geometry.rotations import boxminus
+from inercal.instruments.terms import shown_unit
 from inercal.report import filtering
 from inercal.report.figures import budget, correlation, dots
 from inercal.report.histories import Course, Line, converging, falling, lines_by_group, path
 from inercal.report.html import Picture, page, render
 from inercal.report.selfcal import attitude_correction, attitude_errors, bounds_beside, filters_apart
-from inercal.selfcal.display import displayed, of_field, shown_unit
+from inercal.selfcal.display import of_field
 from inercal.selfcal.filters.filter_result import found
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
@@ -40,7 +41,7 @@ _CHANNELS = ("acc x", "acc y", "acc z")
 
 def calibration_page(calibration: Calibration, settings: SelfcalSettings) -> str:
     """The report of a self-calibration as one self-contained HTML page, with or without other filters."""
-    estimate = displayed(calibration.estimate)
+    estimate = calibration.estimate.shown()
     tables = [*compared(calibration), weak_combinations(calibration.bounds)]
     drawn = pictures(calibration, settings) + compare_pictures(calibration)
     return render(estimate, drawn, "Self-calibration of a platform", tables)
@@ -63,7 +64,7 @@ def pictures(
     recording, filtered, estimate = (
         calibration.recording,
         calibration.filtered,
-        displayed(calibration.estimate),
+        calibration.estimate.shown(),
     )
     t, history = recording.t, filtered.history
     drawn = [

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
+from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted
 from inercal.report import sensitivity
 from inercal.report.figures import budget, correlation, dots, heat
@@ -19,7 +20,6 @@ from inercal.report.style import COLOURS, INK, QUIET, WIDTH, figure, plain_unit,
 from inercal.rigs.chain import Error
 from inercal.rigs.outputs import gravity_reference
 from inercal.turntable.analysis import result as analysis_result
-from inercal.turntable.display import shown_unit
 from inercal.turntable.regression import Regression
 from inercal.turntable.weights import weights
 

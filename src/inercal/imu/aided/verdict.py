@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.imu.aided.fit import Fit, Sensor

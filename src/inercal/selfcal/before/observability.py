@@ -9,7 +9,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Learned, learned
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.display import of_field

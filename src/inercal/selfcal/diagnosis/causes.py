@@ -16,14 +16,14 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis, surprising, whiteness
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.earth import EARTH_RATE
+from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted, places
 from inercal.selfcal.before.observability import UNOBSERVABLE
 from inercal.selfcal.diagnosis.gross import RISK, Proposal, proposals
 from inercal.selfcal.diagnosis.small import Case, Cause, Found, directions, filtered, likely, regular, search
-from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import Filtered, Problem
 from inercal.selfcal.platform.coefficients import names, units
 from inercal.selfcal.platform.recording import Recording

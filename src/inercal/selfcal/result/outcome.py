@@ -15,12 +15,12 @@ from inercal.estimate.budget import BudgetItem, combine
 from inercal.estimate.consistency import Nis, nis
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, EVERYTHING, Finding, Status, causes
+from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen, singular, useless
 from inercal.selfcal.diagnosis.small import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
-from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import Filtered, problem
 from inercal.selfcal.filters.run import LOCK
 from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units

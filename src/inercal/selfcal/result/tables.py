@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.estimate.identifiability import learned
+from inercal.estimate.rounding import short
 from inercal.estimate.table import Table
 from inercal.records.places import counted
 from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE
 from inercal.selfcal.display import of_field
 from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.result.comparison import short
 
 if TYPE_CHECKING:
     from inercal.selfcal.before.bounds import Bounds
