@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.estimate.identifiability import WORST_BY_SIZE
 from inercal.imu.accelerometer import AccelerometerFit
 from inercal.imu.poses import Poses, dwells_at
-from inercal.imu.verdict import WORST_CONDITION, curing_pose, pose_words
+from inercal.imu.verdict import curing_pose, pose_words
 from inercal.records.places import counted
 from inercal.report.figures import budget, correlation
 from inercal.report.html import Picture
@@ -116,7 +117,7 @@ def _sphere(poses: Poses) -> Picture:
 
 def _lacking(fit: AccelerometerFit) -> Array:
     """Directions (2, 3) that would cure an ill-conditioned fit; (0, 3) where none is needed."""
-    if fit.fit.identifiability.condition <= WORST_CONDITION:
+    if fit.fit.identifiability.condition <= WORST_BY_SIZE:
         return np.zeros((0, 3))
     gravity = float(np.mean(np.linalg.norm(fit.f, axis=1)))
     cure = curing_pose(fit, gravity)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
+from inercal.estimate.identifiability import WORST_BY_SIZE
 from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.imu.accelerometer import AccelerometerFit
@@ -21,10 +22,6 @@ from inercal.imu.turns import Turns
 from inercal.instruments.triad import TriadModel
 from inercal.records.column import Triad
 from inercal.records.places import counted
-
-WORST_CONDITION = 50.0
-"""Condition of the scaled Jacobian beyond which a fit is called ill-conditioned; good sets of poses have 2
-to 20."""
 
 WORST_MISS = 0.2
 """Root-mean-square angle [rad] between carried and measured verticals beyond which gyro and accelerometers
@@ -105,7 +102,7 @@ def verdict(
         if wrong:
             return Status.INCONSISTENT, wrong
     known = acc.fit.identifiability
-    if known.condition > WORST_CONDITION:
+    if known.condition > WORST_BY_SIZE:
         term = known.leading_term()
         value = float(acc.fit.x[known.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
@@ -128,7 +125,7 @@ def verdict(
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
     known = gyro.geometry
-    if known.condition > WORST_CONDITION:
+    if known.condition > WORST_BY_SIZE:
         term = known.leading_term()
         return (
             Status.UNOBSERVABLE if known.rank < len(known.names) else Status.ILL_CONDITIONED,

@@ -13,6 +13,7 @@ from inercal.arrays import Array
 from inercal.designs.comparison import in_basis
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
+from inercal.estimate.identifiability import WORST_BY_LENGTH
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
@@ -28,9 +29,6 @@ from inercal.turntable.tolerance import alternatives, coefficient_shares, drift_
 from inercal.turntable.weights import weights
 
 COMMAND = "calibrate turntable"
-
-WORST_CONDITION = 100.0
-"""Condition number of the unit-length columns beyond which a combination of terms counts as weakly known."""
 
 SURPRISE = 1e-4
 """Probability of a misfit as large by chance, below which the readings contradict what is stated of them."""
@@ -161,7 +159,7 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
     fit = fitting.fit
     assert fit is not None
     worst = max(fitting.known, key=lambda each: each.identifiability.condition).identifiability
-    if worst.condition > WORST_CONDITION:
+    if worst.condition > WORST_BY_LENGTH:
         return Status.ILL_CONDITIONED, (
             f"the {len(found.y)} positions fix {worst.weakest()} only weakly (condition number "
             f"{worst.condition:.0f} of the scaled columns): add positions that change it"

@@ -9,14 +9,14 @@ import numpy as np
 
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.identifiability import Identifiability
+from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.model import FRAME
-from inercal.turntable.outcome import COMMAND, WORST_CONDITION, of_site, unit_of_term
+from inercal.turntable.outcome import COMMAND, of_site, unit_of_term
 from inercal.turntable.rate import Input, RateDwells
 from inercal.turntable.rate_fit import RateFit, approaches
 from inercal.turntable.settings import RateTest, TurntableSettings
@@ -62,7 +62,7 @@ def assemble(
         if abs(values[k]) < SEEN * u[k]:
             status = Status.INCONSISTENT
             message = f"the output of gyro_{fit.axis} does not follow the rate: check channel, axis and units"
-    if status is Status.OK and known.condition > WORST_CONDITION:
+    if status is Status.OK and known.condition > WORST_BY_LENGTH:
         status = Status.ILL_CONDITIONED
         weak = f"{known.weakest()} only weakly (condition number {known.condition:.0f})"
         message = f"the rates fix {weak}: spread them wider"

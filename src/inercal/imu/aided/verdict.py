@@ -6,16 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from inercal.estimate.identifiability import WORST_BY_SIZE
 from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.aided.misfit import Misfit, variation
 from inercal.records.places import counted, counted_names
-
-WORST_CONDITION = 50.0
-"""Condition of what the data tell of a triad's gains, beyond which it is called ill-conditioned; good tests have 1
-to 5."""
 
 HARDLY = 0.1
 """Standard uncertainty of a scale factor over its value, or of a misalignment [rad], beyond which the data say next to
@@ -85,7 +82,7 @@ def verdict(
             )
     for triad in triads:
         known = fit.known[triad]
-        if known.condition > WORST_CONDITION:
+        if known.condition > WORST_BY_SIZE:
             term = known.leading_term()
             return (
                 Status.ILL_CONDITIONED,

@@ -16,12 +16,12 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis, surprising, whiteness
+from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding
 from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted, places
-from inercal.selfcal.before.observability import UNOBSERVABLE
 from inercal.selfcal.diagnosis.gross import RISK, Proposal, proposals
 from inercal.selfcal.diagnosis.small import Case, Cause, Found, directions, filtered, likely, regular, search
 from inercal.selfcal.filters.filter_result import Filtered, Problem
@@ -80,7 +80,7 @@ def _fair(problem: Problem, moved: Problem, found: Filtered) -> Problem:
     u, prior = np.sqrt(np.diag(found.covariance)), problem.prior
     # values are distributed about 0 with this variance where the prior holds
     spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
-    far = (u < UNOBSERVABLE * prior) & ~(np.abs(found.coefficients) < _most(len(prior)) * spread)
+    far = (u < UNSEEN * prior) & ~(np.abs(found.coefficients) < _most(len(prior)) * spread)
     return replace(moved, prior=np.where(far, 10.0 * np.maximum(np.abs(found.coefficients), prior), prior))
 
 
