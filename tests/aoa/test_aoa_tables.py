@@ -15,7 +15,7 @@ from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reference.corrections import told
 from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected
-from inercal.aoa.result.display import delays, displayed, in_words, rest_of_fit, shown_unit, sized, use_of_fit
+from inercal.aoa.result.display import delays, displayed, in_words, rest_of_fit, use_of_fit
 from inercal.aoa.result.outcome import assemble, assemble_paper
 from inercal.aoa.result.points import points
 from inercal.aoa.result.tables import (
@@ -33,6 +33,7 @@ from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import Calibration, MotionPlan, Timing
 from inercal.aoa.simulate import simulate
 from inercal.estimate.files import save, to_json
+from inercal.instruments.terms import shown_unit, sized
 
 PAUSES = MotionPlan(
     "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.errors import CalibrationError
-from inercal.estimate.result import Estimate, Parameter, coverage_factor, rounded
+from inercal.estimate.result import Estimate, Parameter, coverage_factor
+from inercal.estimate.rounding import rounded
 from inercal.findings import Status
 from rows import for_each
 
@@ -84,7 +85,7 @@ def test_expanded_uncertainty_and_interval_agree():
     [
         (10.05762, 0.027, ("10.058", "0.027")),  # GUM 7.2.6
         (100.02147, 0.00035, ("100.02147", "0.00035")),  # GUM 7.2.2
-        (50.000838e-3, 32e-9, ("5.0000838e-02", "3.2e-08")),  # GUM H.1.7, in metres
+        (50.000838e-3, 32e-9, ("0.050000838", "3.2e-08")),  # GUM H.1.7, in metres
         (9.81744, 0.0996, ("9.82", "0.10")),
         (1234567.0, 1500.0, ("1234600", "1500")),
         (-0.5, 12.3, ("0", "12")),

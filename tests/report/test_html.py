@@ -153,7 +153,8 @@ def test_what_a_metrologist_looks_for():
     text = Page(render(estimate(), [PICTURE], "Calibration of MTi 7")).text
     for words in (
         "Calibration of MTi 7", "2026-11-03", "NMI", "not stated", "saturation : gyro_x sits at 32767 (rows 3-10)",
-        "95.45 %", "JCGM 100:2008", "y = S M x + b", "temperature 23.00(50) degC", "recorded rate 100 Hz", "A figure",
+        "95.45 %", "JCGM 100:2008", "y = S M x + b", "temperature 23.00 ± 0.50 degC", "recorded rate 100 Hz",
+        "A figure",
         "What it shows.", "pose scatter", "settings.imu.static_start 50 s", "g_sensitivity no",
         "run 1.mat", "ab" * 32, "method multiposition", "new number 2 s",
     ):  # fmt: skip

@@ -24,7 +24,7 @@ from inercal.report.courses import turning
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import Designed, Judged
-from inercal.selfcal.display import displayed, of_field
+from inercal.selfcal.display import of_field
 from inercal.selfcal.figures.design import page as design_page
 from inercal.selfcal.figures.filters import attitude_errors
 from inercal.selfcal.figures.monte_carlo import page as campaign_page
@@ -260,7 +260,7 @@ def test_every_case_has_a_page(found):
 
 def test_what_people_see_is_the_same_in_other_units():
     si = evidence(filtered(p=24)).estimate
-    shown = displayed(si)
+    shown = si.shown()
     factor = [parse_unit(unit).factor for unit in shown.units]
     assert shown.units == of_field(24)[0]
     assert shown.values * factor == pytest.approx(si.values)
@@ -273,7 +273,7 @@ def test_what_people_see_is_the_same_in_other_units():
 def test_angles_of_the_conditions_are_degrees_for_people():
     given = {"site": {"latitude_rad": np.pi / 4.0, "gravity_m_s2": 9.8}, "ranges": {"th_x_rad": [0.0, np.pi]}}
     unknown = {"latitude_rad": None}
-    shown = displayed(replace(evidence().estimate, conditions=given | {"other": unknown})).conditions
+    shown = replace(evidence().estimate, conditions=given | {"other": unknown}).shown().conditions
     assert shown == {
         "site": {"latitude_deg": pytest.approx(45.0), "gravity_m_s2": 9.8},
         "ranges": {"th_x_deg": pytest.approx([0.0, 180.0])},
@@ -456,7 +456,7 @@ def test_statistics_are_in_words():
     page = drawn_by.page(replace(calibration, estimate=own))
     for words in (
         "<dt>root-mean-square normalised innovation, expected 1</dt><dd>1.001</dd>",
-        "<dt>normalised innovation squared of a row (NIS), mean</dt><dd>6.008</dd>",
+        "<dt>normalised innovation squared (NIS), mean</dt><dd>6.008</dd>",
         "<dt>time of a row</dt><dd>4 µs</dd>",
         "<dt>time of a row, of the sample interval</dt><dd>0.002 %</dd>",
     ):

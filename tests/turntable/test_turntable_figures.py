@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 
 from inercal.estimate.basis import Basis
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
 from inercal.findings import Status
 from inercal.geometry.site import Site
+from inercal.instruments.terms import shown_unit
 from inercal.report.html import render
 from inercal.report.marks import Dots
 from inercal.report.sphere import hemispheres
 from inercal.rigs.distribution import uniform
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import turntable
-from inercal.turntable.display import displayed, shown_unit
+from inercal.turntable.display import displayed
 from inercal.turntable.figures import pictures
 from inercal.turntable.figures.design import page as design_page
 from inercal.turntable.positions.planning import design

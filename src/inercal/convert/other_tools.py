@@ -114,8 +114,8 @@ def _touched(
 ) -> tuple[str, ...]:
     """Those of the terms ``after`` (m,) into which coefficients ``before`` (p,) go that a finding harms; ``matters``
     (m, p) says which go into which."""
-    hit = np.any(matters[:, [name in harm for name in before]], axis=1, keepdims=True)[:, 0]
-    return tuple(name for name, each in zip(after, hit.tolist(), strict=True) if each)
+    hit = np.any(matters[:, [name in harm for name in before]], axis=1).tolist()
+    return tuple(name for name, each in zip(after, hit, strict=True) if each)
 
 
 def _jacobian(estimate: Estimate, function: Callable[[Array], Array]) -> Array:

@@ -9,6 +9,18 @@ import numpy as np
 
 from inercal.arrays import Array
 
+UNSEEN = 0.9
+"""Part of its prior standard deviation above which the data say nothing about a parameter."""
+
+HALF_SEEN = 0.5
+"""Part of its prior above which a parameter counts as left at it where the motion is planned: plan better."""
+
+WORST_BY_SIZE = 50.0
+"""Condition number beyond which a fit is ill-conditioned, its parameters scaled by their typical sizes (`identify`)."""
+
+WORST_BY_LENGTH = 100.0
+"""The same where columns are scaled to unit length, as those of polynomials in positions, whose powers go alike."""
+
 
 @dataclass(frozen=True)
 class Identifiability:

@@ -24,7 +24,8 @@ from inercal.errors import InputError
 from inercal.estimate.basis import Basis
 from inercal.estimate.budget import BudgetItem, Uncertainty
 from inercal.estimate.files import plain_objects
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
 from inercal.records.places import counted

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from decimal import Decimal
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +14,8 @@ from inercal.arrays import Array
 from inercal.errors import CalibrationError
 from inercal.estimate.basis import Basis
 from inercal.estimate.budget import BudgetItem, Uncertainty
+from inercal.estimate.rounding import rounded
+from inercal.estimate.shown import budget_shown, in_words, statistics_in_words, units_shown
 from inercal.estimate.suspicion import judged
 from inercal.findings import Finding, Status
 from inercal.inputs import Source
@@ -202,6 +203,22 @@ class Estimate:
             common=None if self.common is None else self.common / square,
         )
 
+    def shown(self) -> Estimate:
+        """The estimate for people: coefficients and budget in units of the field, conditions and statistics in words.
+
+        All of ``result`` stays as it is.
+        """
+        return replace(
+            self.in_units(list(self.shown_units().values())),
+            conditions=in_words(self.conditions),
+            statistics=statistics_in_words(self.statistics, self.result),
+            budget=budget_shown(self.command, self.budget),
+        )
+
+    def shown_units(self) -> dict[str, tuple[str, float]]:
+        """Name of a coefficient -> its unit for people, and how many of its own unit that is."""
+        return dict(zip(self.names, units_shown(self.command, self.units), strict=True))
+
     def raise_for_status(self, *, suspect: bool = False) -> Estimate:
         """Return the estimate itself if its status is ok, else raise `CalibrationError` with the message.
 
@@ -242,33 +259,3 @@ def timed(estimate: Estimate, begun: float) -> Estimate:
     import time
 
     return replace(estimate, timing={"solve": time.perf_counter() - begun})
-
-
-def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
-    """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6).
-
-    A dash stands for NaN: what is not known.
-    """
-    if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
-        return tuple("–" if math.isnan(x) else f"{x:.6g}" for x in (value, u, *others))
-    first = Decimal(f"{u:.1e}").adjusted()  # power of ten of the first digit; 0.0996 rounds to 0.10
-    if first >= -4 and max(abs(value), u) < 1e7:
-        places = max(0, 1 - first)
-        # + 0.0 takes the sign off a zero
-        return tuple(f"{round(x, 1 - first) + 0.0:.{places}f}" for x in (value, u, *others))
-    value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
-    digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
-    return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))
-
-
-def in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested values whose keys say rad or rad/s, in degrees, which the keys then say."""
-    shown: dict[str, Any] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            shown[key] = in_degrees(value)
-        elif key.endswith(("_rad", "_rad_s")) and value is not None:
-            shown[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
-        else:
-            shown[key] = value
-    return shown

@@ -28,7 +28,7 @@ def judged(
         return findings, verdict
     codes = ", ".join(dict.fromkeys(each.code for each in doing_harm))
     doubtful = [name for name in names if any(name in each.harm for each in doing_harm)]
-    what = "values" if len(doubtful) == len(names) else counted_names(doubtful, 4)
+    what = "values" if len(doubtful) == len(names) > 1 else counted_names(doubtful, 4)
     whose = "its" if len(doubtful) == 1 else "their"
     text = f"{message}; but see {codes}: {what} may be off by more than {whose} u"
     return findings, (Status.SUSPECT, text)

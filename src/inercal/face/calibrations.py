@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +45,7 @@ def compare(first: Result | Estimate | str | Path, second: Result | Estimate | s
     from inercal.face.comparison import of_comparison
 
     files = [Saved(*estimate_of(each, where)) for each, where in ((first, "first"), (second, "second"))]
-    return of_comparison(compared(*files), files[0].estimate.command)
+    return of_comparison(compared(*files), files[0].estimate)
 
 
 def apply(calibration: Result | Estimate | str | Path, record: Record, invert: bool = False) -> Record:
@@ -131,10 +130,11 @@ def load(path: str | Path) -> Result:
     estimate = read_estimate(path)
     match estimate.command:
         case "compare":
-            return of_comparison(estimate, "")
-        case "selfcal" | "aoa" as kind:
-            found: Result = import_module(f"inercal.face.{kind}").loaded(estimate)
-            return found
+            return of_comparison(estimate, estimate)
+        case "aoa":
+            from inercal.face.aoa import loaded as angles_loaded
+
+            return angles_loaded(estimate)
         case _:
             from inercal.face.imu import loaded
 

@@ -8,11 +8,11 @@ from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View
 
 
-def of_comparison(estimate: Estimate, command: str) -> Result:
-    """The comparison of two calibrations that ``command`` made, as a result."""
+def of_comparison(estimate: Estimate, first: Estimate) -> Result:
+    """The comparison of a calibration with the ``first`` as a result, in the units in which that is shown."""
     from inercal.report.comparison import page, picture, table
 
-    shown = _of_field(estimate) if command == "selfcal" else estimate
+    shown = _shown(estimate, first)
     view = View(
         shown,
         estimate.message,
@@ -23,14 +23,12 @@ def of_comparison(estimate: Estimate, command: str) -> Result:
     return Result(estimate, view)
 
 
-def _of_field(estimate: Estimate) -> Estimate:
-    """The comparison of two self-calibrations in deg/h, arcsec, ug and ppm."""
-    from inercal.selfcal.display import shown_unit
-
+def _shown(estimate: Estimate, first: Estimate) -> Estimate:
+    """The comparison with its rows in the units in which the first calibration is shown."""
     lengths = ("first", "u_first", "second", "u_second", "difference", "u", "U")
-    rows = []
+    units, rows = first.shown_units(), []
     for row in estimate.result["coefficients"]:
-        unit, size = shown_unit(row["unit"])
+        unit, size = units[row["name"]]
         rows.append({**row, **{key: row[key] / size for key in lengths}, "unit": unit})
-    of_field = estimate.in_units([shown_unit(unit) for unit in estimate.units])
+    of_field = estimate.in_units([units[name] for name in estimate.names])
     return replace(of_field, result={**estimate.result, "coefficients": rows})

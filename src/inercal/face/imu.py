@@ -32,6 +32,7 @@ def calibrate(
     found = calibrations(records, study, progress, calibrate_run)
     runs = [each.estimate for each in found]
     estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
+    shown = estimate.shown()
 
     def page() -> str:
         from inercal.imu import figures
@@ -40,9 +41,9 @@ def calibrate(
 
         if len(found) == 1:
             return figures.page(found[0])
-        return render(estimate, repeats(estimate), "Calibration of an inertial measurement unit")
+        return render(shown, repeats(shown), "Calibration of an inertial measurement unit")
 
-    return Result(estimate, of_coefficients(estimate, page), found[0] if len(found) == 1 else tuple(found))
+    return Result(estimate, of_coefficients(shown, page), found[0] if len(found) == 1 else tuple(found))
 
 
 def of_temperature(model: TemperatureModel) -> Result:
@@ -52,9 +53,10 @@ def of_temperature(model: TemperatureModel) -> Result:
     def page() -> str:
         from inercal.imu.temperature.figures import pictures
 
-        return render(model.estimate, pictures(model), "Bias and scale factor against temperature")
+        return render(shown, pictures(model), "Bias and scale factor against temperature")
 
-    return Result(model.estimate, of_coefficients(model.estimate, page), model)
+    shown = model.estimate.shown()
+    return Result(model.estimate, of_coefficients(shown, page), model)
 
 
 def of_coefficients(
@@ -77,13 +79,14 @@ def of_coefficients(
 
 
 def loaded(estimate: Estimate) -> Result:
-    """A result that was saved, in the units that it was saved in."""
+    """A result that was saved, in the units of the command line."""
     from inercal.report.coefficients import budget, correlation
     from inercal.report.html import render
 
     def page() -> str:
-        drawn = [correlation(estimate)] if len(estimate.names) > 1 else []
-        drawn += [budget(estimate)] if estimate.names and estimate.budget else []
-        return render(estimate, drawn, f"inercal {estimate.command}")
+        drawn = [correlation(shown)] if len(estimate.names) > 1 else []
+        drawn += [budget(shown)] if estimate.names and estimate.budget else []
+        return render(shown, drawn, f"inercal {estimate.command}")
 
-    return Result(estimate, of_coefficients(estimate, page))
+    shown = estimate.shown()
+    return Result(estimate, of_coefficients(shown, page))

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.errors import InputError, MissingExtraError
-from inercal.estimate.result import Estimate, Parameter, rounded
+from inercal.estimate.result import Estimate, Parameter
+from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record

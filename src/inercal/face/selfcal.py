@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import InputError
-from inercal.estimate.result import Estimate
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
 from inercal.face.runs import Progress, calibrations, with_span, without_coefficients
 from inercal.face.study import Study
 from inercal.records.record import Record
 from inercal.selfcal import task
-from inercal.selfcal.display import displayed
 
 if TYPE_CHECKING:
     from inercal.report.html import Picture
@@ -63,7 +61,7 @@ def _one(found: task.Calibration) -> Result:
         return history_record(found.filtered, found.recording, found.problem.world)
 
     kept = found.filtered.history is not None
-    view = of_coefficients(displayed(found.estimate), page, more)
+    view = of_coefficients(found.estimate.shown(), page, more)
     return Result(found.estimate, replace(view, rows=rows if kept else None), found)
 
 
@@ -72,7 +70,8 @@ def _repeated(found: Sequence[task.Calibration], records: Sequence[Record]) -> R
     from inercal.estimate.repeat import combine_runs
 
     runs = [each.estimate for each in found]
-    estimate, shown = combine_runs(runs), combine_runs([displayed(each) for each in runs])
+    estimate = combine_runs(runs)
+    shown = estimate.shown()
 
     def page() -> str:
         from inercal.report.coefficients import repeats
@@ -128,12 +127,3 @@ def design(study: Study, progress: Callable[[int, int], None] | None = None) -> 
 
     view = View(result, designed.plan.words(), lambda: [designed.table()], page, picture)
     return Result(result, view, designed)
-
-
-def loaded(estimate: Estimate) -> Result:
-    """A result that was saved, in the units of the command line."""
-    from inercal.face.imu import loaded as plain
-
-    whole = plain(estimate)
-    shown = displayed(estimate)
-    return replace(whole, view=of_coefficients(shown, plain(shown).view.page))

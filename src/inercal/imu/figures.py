@@ -35,4 +35,6 @@ def pictures(calibration: AnyCalibration) -> list[Picture]:
 
 def page(calibration: AnyCalibration) -> str:
     """The report of a calibration as one self-contained HTML page."""
-    return render(calibration.estimate, pictures(calibration), "Calibration of an inertial measurement unit")
+    return render(
+        calibration.estimate.shown(), pictures(calibration), "Calibration of an inertial measurement unit"
+    )

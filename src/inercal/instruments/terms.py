@@ -10,6 +10,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from inercal.errors import QuantityError
+from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
+
 
 @dataclass(frozen=True)
 class Term:
@@ -274,6 +277,71 @@ def term(name: str) -> Term | None:
 def _output(channel: str) -> Term | None:
     """The output of a channel at rest, as of a temperature model; None if there is no such channel."""
     return Term(channel, f"{channel}: output at rest", "output") if re.fullmatch(_CHANNEL, channel) else None
+
+
+#: SI unit -> that of the field, in which data sheets and studies have it
+_OF_FIELD = {
+    "rad/s": "deg/h",
+    "rad": "arcsec",
+    "m/s^2": "ug",
+    "m": "mm",
+    "s": "ms",
+    "rad/sqrt(s)": "deg/sqrt(h)",
+}
+
+#: unit of the field -> that of larger things, and from how many of the latter on it is taken
+_LARGE = {"deg/h": ("deg/s", 0.01), "ug": ("mg", 1.0), "arcsec": ("deg", 1.0 / 60.0)}
+
+
+def shown_unit(si: str, output: Unit | None = None) -> tuple[str, float]:
+    """A unit for people, and how many of the SI unit it is: deg/h, arcsec, ug, mm, ms, ppm; others stay.
+
+    Where the ``output`` of the instrument is in another unit, rates and accelerations are in that one, but ``ug`` where
+    it is g or m/s^2.
+    """
+    if si == "1" and output is None:
+        return "ppm", 1e-6
+    if si.startswith("1/(m/s^2)"):
+        power = 2 if si.endswith("^2") and si != "1/(m/s^2)" else 1
+        return f"ug/g^{power + 1}", 1e-6 / STANDARD_GRAVITY**power
+    if (
+        output is not None
+        and (si != "m/s^2" or output.symbol not in ("g", "m/s^2"))
+        and si not in ("rad", "m")
+    ):
+        if output.factor == 1.0 or not si.startswith(output.si):
+            return si, 1.0
+        return output.symbol + si.removeprefix(output.si), output.factor
+    if si not in _OF_FIELD:
+        return si, 1.0
+    unit = parse_unit(_OF_FIELD[si])
+    return unit.symbol, unit.factor
+
+
+def sized(u: float, si: str) -> tuple[float, str]:
+    """An uncertainty for people: a large rate in deg/s, acceleration in mg, angle in deg; a whole as it is."""
+    if si == "1" and u == 1.0:
+        return u, si
+    text, size = shown_unit(si)
+    larger, least = _LARGE.get(text, (text, 0.0))
+    if larger != text and u / parse_unit(larger).factor >= least:
+        return u / parse_unit(larger).factor, larger
+    return u / size, text
+
+
+def sized_ratio(unit: str) -> tuple[str, float]:
+    """A unit for people, and how many of the old it is: a sensitivity per unit of its own output, g/g for g/(m/s^2)."""
+    match = re.fullmatch(r"\(?(.+?)\)?/\((m/s\^2|rad/s)\)(.*)", unit)
+    if match is None or match[1] == match[2] or match[1] in ("1", "count", "V"):
+        return unit, 1.0
+    try:
+        output = parse_unit(match[1])
+    except QuantityError:
+        return unit, 1.0
+    if output.si != match[2]:
+        return unit, 1.0
+    per = f"({match[1]})" if "/" in match[1] else match[1]
+    return f"{per}/{per}{match[3]}", 1.0 / output.factor
 
 
 def resting_on(channel: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.noise.outcome import ChannelNoise, Noise

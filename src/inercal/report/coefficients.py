@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
 from inercal.instruments.terms import term
 from inercal.report.html import Picture
 from inercal.report.marks import Axis, Bars, Cells, Colours, Dots, Level, Mark, Note, Panel, Strips

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
+from inercal.estimate.shown import temperature
 from inercal.findings import Status
 from inercal.instruments.terms import term
 from inercal.report.html import Picture
@@ -90,7 +92,8 @@ def page(estimate: Estimate) -> str:
     result, given = estimate.result, estimate.provenance["settings"]
     facts = []
     for way in ("first", "second"):
-        known = (Path(given[way]).name, *(estimate.conditions[way][key] for key in ("date", "temperature")))
+        conditions = estimate.conditions[way]
+        known = (Path(given[way]).name, conditions["date"], temperature(conditions["temperature"]))
         facts.append((way, "", ", ".join(filter(None, known))))
     facts += [(name, "", text) for name, text in estimate.traceability.items() if text]
     return template(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.report import marks as marks_of
 from inercal.report.cells import Cell, band, canvas, frame, line
 from inercal.report.html import Picture

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.files import plain_objects
-from inercal.estimate.result import Estimate, Parameter, in_degrees, rounded
+from inercal.estimate.result import Estimate, Parameter
+from inercal.estimate.rounding import rounded
+from inercal.estimate.shown import in_words
 from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.instruments.terms import term
@@ -194,7 +196,9 @@ def page(
         estimate=estimate,
         title=title,
         facts=_heading(estimate) if facts is None else facts,
-        mood={Status.OK: "good", Status.ILL_CONDITIONED: "doubtful"}.get(estimate.status, "bad"),
+        mood={Status.OK: "good", Status.ILL_CONDITIONED: "doubtful", Status.SUSPECT: "doubtful"}.get(
+            estimate.status, "bad"
+        ),
         meaning=meaning,
         first=pictures[:1],
         pictures=pictures[1:],
@@ -212,7 +216,7 @@ def page(
 
 def _with_units(estimate: Estimate) -> dict[str, Any]:
     """The conditions with angles in degrees, and the unit of the gyro's output where its range is stated."""
-    shown = in_degrees(estimate.conditions)
+    shown = in_words(estimate.conditions)
     if "gyro_output" in shown.get("ranges", {}) and "D_F_x" in estimate.names:
         unit = estimate["D_F_x"].unit
         shown["ranges"] = {

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
 from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.records.record import Record

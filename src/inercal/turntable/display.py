@@ -10,32 +10,11 @@ from typing import Any
 import numpy as np
 
 from inercal.estimate.result import Estimate
+from inercal.estimate.shown import in_words
+from inercal.instruments.terms import shown_unit
 from inercal.units import STANDARD_GRAVITY, Unit
 
 _ARCSEC = np.radians(1.0 / 3600.0)
-
-#: SI unit of a term -> that of the field, in which it is stated too, and how many of the old it is
-_OF_FIELD = {
-    "rad": ("arcsec", _ARCSEC),
-    "1/(m/s^2)": ("ug/g^2", 1e-6 / STANDARD_GRAVITY),
-    "1/(m/s^2)^2": ("ug/g^3", 1e-6 / STANDARD_GRAVITY**2),
-}
-
-
-def shown_unit(text: str, unit: Unit) -> tuple[str, float]:
-    """A unit of a term or reading for people, and how many of the old it is.
-
-    Rates and accelerations as the record has them: ``deg/h`` and 4.8e-6 for ``rad/s`` where ``unit`` is deg/h, but
-    ``ug`` where it is g or m/s^2. Angles in arcsec, terms of second and third order of an accelerometer in ug/g^2
-    and ug/g^3. Units of anything else stay.
-    """
-    if text in _OF_FIELD:
-        return _OF_FIELD[text]
-    if text == "m/s^2" and unit.symbol in ("g", "m/s^2"):
-        return "ug", 1e-6 * STANDARD_GRAVITY
-    if unit.factor == 1.0 or not text.startswith(unit.si):
-        return text, 1.0
-    return unit.symbol + text.removeprefix(unit.si), unit.factor
 
 
 def displayed(estimate: Estimate, unit: Unit) -> Estimate:
@@ -80,8 +59,8 @@ def _with_unit(values: Mapping[str, float], key: str, unit: Unit) -> dict[str, f
 
 
 def _conditions(conditions: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
-    """Conditions with the ranges of readings in the unit of the record, and the latitude in degrees."""
-    changed = dict(conditions)
+    """Conditions in words, with the ranges of readings in the unit of the record."""
+    changed = in_words(conditions)
     if "ranges" in changed:
         changed["ranges"] = {
             (f"{name} [{unit.symbol}]" if name.startswith("reading_of_") else name): (
@@ -89,10 +68,6 @@ def _conditions(conditions: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
             )
             for name, ends in changed["ranges"].items()
         }
-    site = dict(changed.get("site", {}))
-    if site.get("latitude_rad") is not None:
-        site["latitude_deg"] = float(np.degrees(site.pop("latitude_rad")))
-        changed["site"] = site
     return changed
 
 

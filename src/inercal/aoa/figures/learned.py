@@ -9,8 +9,8 @@ import numpy as np
 
 from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.figures import sensors
-from inercal.aoa.result.display import shown_unit
 from inercal.aoa.result.outcome import unit_of
+from inercal.instruments.terms import shown_unit
 from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture
 from inercal.report.numbers import largest, middle, rms, settled

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.report.coefficients import limits
 from inercal.report.html import Picture
 from inercal.report.marks import Arrows, Axis, Band, Dots, Level, Line, Mark, Note, Panel

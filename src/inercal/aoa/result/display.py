@@ -10,44 +10,9 @@ import numpy as np
 
 from inercal.aoa.reference.corrections import is_verified
 from inercal.aoa.settings import GYROS
-from inercal.estimate.result import Estimate, in_degrees, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded
 from inercal.instruments.terms import term
-from inercal.units import STANDARD_GRAVITY
-
-#: SI unit -> that of the field, and how many of the old it is
-_OF_FIELD = {
-    "rad/s": ("deg/h", np.radians(1.0 / 3600.0)),
-    "rad": ("deg", np.radians(1.0)),
-    "m/s^2": ("ug", 1e-6 * STANDARD_GRAVITY),
-    "m": ("mm", 1e-3),
-    "s": ("ms", 1e-3),
-    "1": ("ppm", 1e-6),
-}
-
-#: unit -> that of larger things, how many of the former it is, and from where on it is taken
-_LARGE = {"deg/h": ("deg/s", 3600.0, 0.01), "ug": ("mg", 1000.0, 1.0)}
-
-_STATISTICS = {
-    "residual_rms": "root-mean-square normalised innovation",
-    "nis_mean": "normalised innovation squared (NIS), mean once settled",
-    "samples": "rows",
-    "angles": "rows with an angle",
-    "starts": "starts of the filter",
-}
-
-
-def shown_unit(si: str) -> tuple[str, float]:
-    """A unit for people, and how many of the old it is: ug, mm, deg/h, ppm, ms, deg; others stay."""
-    return _OF_FIELD.get(si, (si, 1.0))
-
-
-def sized(u: float, si: str) -> tuple[float, str]:
-    """An uncertainty of a budget for people: a large rate in deg/s, a large acceleration in mg, a whole as it is."""
-    unit, size = shown_unit(si)
-    if si == "1" and u == 1.0:
-        return u, si
-    larger, many, least = _LARGE.get(unit, (unit, 1.0, 0.0))
-    return (u / size / many, larger) if u / size / many >= least else (u / size, unit)
 
 
 def in_words(name: str) -> str:
@@ -57,23 +22,11 @@ def in_words(name: str) -> str:
 
 
 def displayed(estimate: Estimate) -> Estimate:
-    """The estimate with coefficients and budget in units of the field, angles of the conditions in degrees, sensors and
-    keys of the statistics in words.
-
-    All of ``result`` stays as it is.
-    """
-    conditions = in_degrees(estimate.conditions)
+    """The estimate for people, its sensors in words."""
     stated = estimate.conditions.get("sensors", {})
-    return replace(
-        estimate.in_units([shown_unit(unit) for unit in estimate.units]),
-        conditions=conditions | {"sensors": {name: _sensor(name, of) for name, of in stated.items()}},
-        statistics={_STATISTICS.get(key, key): value for key, value in estimate.statistics.items()},
-        budget=tuple(
-            replace(item, u=u, unit=unit)
-            for item in estimate.budget
-            for u, unit in [sized(item.u, item.unit)]
-        ),
-    )
+    shown = estimate.shown()
+    sensors = {name: _sensor(name, of) for name, of in stated.items()}
+    return replace(shown, conditions={**shown.conditions, "sensors": sensors})
 
 
 def _sensor(name: str, stated: Mapping[str, float]) -> str:
@@ -192,12 +145,3 @@ def _ms(value: float, u: float) -> str:
 def _deg(value: float) -> str:
     """An angle [rad] in degrees."""
     return f"{np.degrees(value):.2g} deg"
-
-
-def short(value: float | None, digits: int = 2) -> str:
-    """A number to so many digits after the first; a dash where there is none."""
-    if value is None or not np.isfinite(value):
-        return "–"
-    if value and not 1e-5 <= abs(value) < 1e5:
-        return f"{value:.1e}"
-    return f"{value:.{digits + 1}g}" if abs(value) < 10 ** (digits + 1) else f"{value:.0f}"

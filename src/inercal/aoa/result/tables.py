@@ -14,15 +14,14 @@ from inercal.aoa.result.display import (
     in_words,
     off_stated,
     off_statement,
-    short,
-    shown_unit,
-    sized,
     use_of_fit,
 )
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings
-from inercal.estimate.result import Estimate, rounded
+from inercal.estimate.result import Estimate
+from inercal.estimate.rounding import rounded, short
 from inercal.estimate.table import Table
+from inercal.instruments.terms import shown_unit, sized
 
 _OF_AXIS = ("mrad", 1e-3)
 """Unit of the error of an axis."""

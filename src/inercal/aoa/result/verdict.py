@@ -15,6 +15,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.estimate.factor import NEGATIVE
+from inercal.estimate.identifiability import UNSEEN
 from inercal.findings import CODES, Finding, Status, causes
 from inercal.records.places import counted, counted_names
 from inercal.units import STANDARD_GRAVITY
@@ -24,9 +25,6 @@ NIS_LIMIT = 2.0
 
 NIS_CHANCE = 1e-5
 """Chance to find a sound recording above the limit, where that is so short that scatter alone may be."""
-
-AT_PRIOR = 0.9
-"""Part of its prior above which a coefficient is no better known than before."""
 
 SHAKING = 5.0
 """Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
@@ -119,7 +117,7 @@ def _missing(known: NDArray[np.bool_]) -> str:
 
 def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
     """Of all coefficients whose u is a ``ratio`` (p,) of their prior's: those of which the recording says nothing."""
-    left = [name for name, each in zip(names, ratio, strict=True) if each > AT_PRIOR]
+    left = [name for name, each in zip(names, ratio, strict=True) if each > UNSEEN]
     if not left:
         return None
     text = (

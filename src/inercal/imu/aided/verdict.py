@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from inercal.estimate.result import rounded
+from inercal.estimate.identifiability import WORST_BY_SIZE
+from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.imu.aided.diagnosis.examination import Misfit
@@ -64,7 +65,7 @@ def verdict(
             )
     for triad in triads:
         known = fit.identified[triad]
-        if known.condition > LIMITS.condition:
+        if known.condition > WORST_BY_SIZE:
             term = known.leading_term()
             return (
                 Status.ILL_CONDITIONED,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.imu.limits import LIMITS
+from inercal.estimate.identifiability import WORST_BY_SIZE
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.poses import Poses, dwells_at
 from inercal.imu.multiposition.verdict import curing_pose, pose_words
@@ -99,7 +99,7 @@ def _sphere(poses: Poses) -> Picture:
 
 def _lacking(fit: AccelerometerFit) -> Array:
     """Directions (2, 3) that would cure an ill-conditioned fit; (0, 3) where none is needed."""
-    if fit.fit.identifiability.condition <= LIMITS.condition:
+    if fit.fit.identifiability.condition <= WORST_BY_SIZE:
         return np.zeros((0, 3))
     gravity = float(np.mean(np.linalg.norm(fit.f, axis=1)))
     cure = curing_pose(fit, gravity)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.identifiability import WORST_BY_SIZE
+from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
@@ -76,7 +77,7 @@ def verdict(
         if wrong:
             return Status.INCONSISTENT, wrong
     known = acc.fit.identifiability
-    if known.condition > LIMITS.condition:
+    if known.condition > WORST_BY_SIZE:
         term = known.leading_term()
         value = float(acc.fit.x[known.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
@@ -99,7 +100,7 @@ def verdict(
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
     known = gyro.geometry
-    if known.condition > LIMITS.condition:
+    if known.condition > WORST_BY_SIZE:
         term = known.leading_term()
         return (
             Status.UNOBSERVABLE if known.rank < len(known.names) else Status.ILL_CONDITIONED,

@@ -8,18 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.identifiability import Learned, learned
-from inercal.estimate.result import rounded
+from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
+from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.display import of_field
 from inercal.selfcal.filters.filter_result import FilterResult
-
-AT_PRIOR = 0.5
-"""Part of its prior above which a coefficient counts as left at it."""
-
-UNOBSERVABLE = 0.9
-"""Part of its prior above which a path says nothing about a coefficient."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +30,12 @@ class Seen:
     @property
     def rank(self) -> int:
         """Number of combinations of coefficients of which the path tells something."""
-        return int(np.sum(self.learned.left <= UNOBSERVABLE))
+        return int(np.sum(self.learned.left <= UNSEEN))
 
     @property
     def at_prior(self) -> tuple[str, ...]:
         """Names of the coefficients that the path leaves at their prior."""
-        return self.learned.at_prior(AT_PRIOR)
+        return self.learned.at_prior(HALF_SEEN)
 
     @property
     def unmet(self) -> tuple[str, ...]:

@@ -17,15 +17,15 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import Hypothesis, likeliest, sigmas
-from inercal.estimate.result import rounded
+from inercal.estimate.identifiability import UNSEEN
+from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding
-from inercal.selfcal.before.observability import UNOBSERVABLE
+from inercal.instruments.terms import shown_unit
 from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, sound, sum_of_squares, white
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
 from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
 from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
-from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
@@ -74,9 +74,7 @@ def _fair(problem: FilterProblem, moved: FilterProblem, found: FilterResult) -> 
     u, prior = np.sqrt(np.diag(found.covariance)), problem.prior
     # values are distributed about 0 with this variance where the prior holds
     spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
-    far = (u < UNOBSERVABLE * prior) & ~(
-        np.abs(found.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread
-    )
+    far = (u < UNSEEN * prior) & ~(np.abs(found.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread)
     return replace(
         moved,
         prior=np.where(far, LIMITS.widened_prior * np.maximum(np.abs(found.coefficients), prior), prior),

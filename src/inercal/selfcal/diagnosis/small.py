@@ -18,9 +18,9 @@ from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, refitted, sear
 from inercal.findings import EVERYTHING
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import boxminus, exp, rotate
+from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted
 from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, regular
-from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals

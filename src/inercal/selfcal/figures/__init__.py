@@ -13,7 +13,7 @@ from inercal.report.coefficients import budget, correlation
 from inercal.report.courses import Course, Line, converging, falling, lines_by_group, path
 from inercal.report.html import Picture, render
 from inercal.report.innovations import innovations, nis
-from inercal.selfcal.display import displayed, of_field
+from inercal.selfcal.display import of_field
 from inercal.selfcal.figures.filters import attitude_correction, attitude_errors, bounds_beside, filters_apart
 from inercal.selfcal.figures.gimbals import rig
 from inercal.selfcal.filters.filter_result import product_form
@@ -43,7 +43,7 @@ def page(calibration: Calibration) -> str:
     """The report of a self-calibration as one self-contained HTML page, with or without other filters."""
     tables = [*compared(calibration), weak_combinations(calibration.bounds)]
     return render(
-        displayed(calibration.estimate), pictures(calibration), "Self-calibration of a platform", tables
+        calibration.estimate.shown(), pictures(calibration), "Self-calibration of a platform", tables
     )
 
 
@@ -60,7 +60,7 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
     recording, filtered, estimate = (
         calibration.recording,
         calibration.filtered,
-        displayed(calibration.estimate),
+        calibration.estimate.shown(),
     )
     t, history = recording.t, filtered.history
     drawn = [_bounds(calibration)] if estimate.names else []

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.selfcal.display import shown_unit
+from inercal.instruments.terms import shown_unit
 
 if TYPE_CHECKING:
     from inercal.selfcal.settings import SelfcalSettings

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
 from inercal.report.courses import Line, panels_of_lines
 from inercal.report.html import Picture
 from inercal.report.marks import Axis, Dots, Level, Mark, Panel, Strips

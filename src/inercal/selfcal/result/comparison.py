@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded, short
 from inercal.estimate.table import Table
 from inercal.selfcal.display import of_field
 from inercal.selfcal.filters.filter_result import FilterResult, product_form
@@ -136,12 +136,3 @@ def _apart(
         (("coefficient", ""), *heads, ("u", "")),
         tuple(rows),
     )
-
-
-def short(value: float, digits: int = 2) -> str:
-    """A number to so many digits after the first; a dash where there is none."""
-    if not np.isfinite(value):
-        return "–"
-    if value and not 1e-4 <= abs(value) < 1e5:
-        return f"{value:.1e}"
-    return f"{value:.{digits + 1}g}" if abs(value) < 10 ** (digits + 1) else f"{value:.0f}"

@@ -13,14 +13,15 @@ from inercal.arrays import Array
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import BudgetItem, combine
 from inercal.estimate.consistency import Nis, nis
+from inercal.estimate.identifiability import HALF_SEEN, UNSEEN
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, EVERYTHING, Finding, Status, causes
+from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted
 from inercal.selfcal.before.bounds import Bounds
-from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE, Seen, seen, singular, useless
+from inercal.selfcal.before.observability import Seen, seen, singular, useless
 from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
-from inercal.selfcal.display import shown_unit
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import LOCK
@@ -163,7 +164,7 @@ def assemble(
         said += _missed(result["goal"], units(p), hints)
         said += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
         said += _taken_as_exact(exact)
-    lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNOBSERVABLE and name in NAMES}
+    lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNSEEN and name in NAMES}
     if status is Status.OK and lost:
         status, message = (
             Status.UNOBSERVABLE,
@@ -235,7 +236,7 @@ def _verdict(
             f"and at most {limit:.4g}; {cause}"
         )
     ratio = judged.learned.ratio[: len(NAMES)]
-    unseen = [name for name, left in zip(NAMES, ratio, strict=True) if left > UNOBSERVABLE]
+    unseen = [name for name, left in zip(NAMES, ratio, strict=True) if left > UNSEEN]
     if unseen:
         help = next(
             (hints[name] for name in unseen if name in hints), "add turns about other axes, or there and back"
@@ -286,7 +287,7 @@ def _hidden(judged: Seen, ratio: Array, budget: Sequence[BudgetItem]) -> dict[st
     """Coefficients that the path shows, but what is stated of site or base hides: u over prior, and why."""
     found = {}
     for name, left in zip(judged.learned.names, ratio, strict=True):
-        if left > AT_PRIOR and name not in judged.at_prior:
+        if left > HALF_SEEN and name not in judged.at_prior:
             source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
             why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
             found[name] = (float(left), why)

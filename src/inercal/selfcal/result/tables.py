@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.estimate.identifiability import learned
+from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, learned
+from inercal.estimate.rounding import short
 from inercal.estimate.table import Table
 from inercal.records.places import counted
-from inercal.selfcal.before.observability import AT_PRIOR, UNOBSERVABLE
 from inercal.selfcal.display import of_field
 from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.result.comparison import short
 
 if TYPE_CHECKING:
     from inercal.selfcal.before.bounds import Bounds
@@ -28,12 +27,12 @@ _JOINTS = {"x": "outer", "y": "inner", "z": "platform"}
 def weak_combinations(bounds: Bounds) -> Table:
     """What a path tells least of, in words: combinations of coefficients, each in units of its prior."""
     told = learned(bounds.covariance, bounds.prior, bounds.names)
-    unseen = int((told.left > AT_PRIOR).sum())
+    unseen = int((told.left > HALF_SEEN).sum())
     count = max(unseen, min(_WEAKEST, len(told.left)))
     rows = tuple(
         (
             words,
-            "not seen" if left > UNOBSERVABLE else "left at its prior" if left > AT_PRIOR else "",
+            "not seen" if left > UNSEEN else "left at its prior" if left > HALF_SEEN else "",
             short(100.0 * float(left)),
         )
         for words, left in zip(told.weakest(count), told.left, strict=False)

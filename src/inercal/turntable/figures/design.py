@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.result import rounded
+from inercal.estimate.rounding import rounded
+from inercal.instruments.terms import shown_unit
 from inercal.report.coefficients import dots, heat
 from inercal.report.html import Picture
 from inercal.report.html import page as framed
 from inercal.report.panels import draw
 from inercal.report.sphere import hemispheres, plane
 from inercal.rigs.outputs import gravity_reference
-from inercal.turntable.display import shown_unit
 from inercal.turntable.figures.table import factor_rows, rig, rig_facts
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from inercal.arrays import Array
 from inercal.designs.comparison import in_basis
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
+from inercal.estimate.identifiability import WORST_BY_LENGTH
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
@@ -153,7 +154,7 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
     fit = fitting.fit
     assert fit is not None
     worst = max(fitting.identified, key=lambda each: each.identifiability.condition).identifiability
-    if worst.condition > LIMITS.condition:
+    if worst.condition > WORST_BY_LENGTH:
         return Status.ILL_CONDITIONED, (
             f"the {len(found.y)} positions fix {worst.weakest()} only weakly (condition number "
             f"{worst.condition:.0f} of the scaled columns): add positions that change it"

@@ -9,7 +9,7 @@ import numpy as np
 
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.identifiability import Identifiability
+from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
@@ -60,7 +60,7 @@ def assemble(
         if abs(values[k]) < LIMITS.scale_sigmas * u[k]:
             status = Status.INCONSISTENT
             message = f"the output of gyro_{fit.axis} does not follow the rate: check channel, axis and units"
-    if status is Status.OK and known.condition > LIMITS.condition:
+    if status is Status.OK and known.condition > WORST_BY_LENGTH:
         status = Status.ILL_CONDITIONED
         weak = f"{known.weakest()} only weakly (condition number {known.condition:.0f})"
         message = f"the rates fix {weak}: spread them wider"

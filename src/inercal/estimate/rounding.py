@@ -1,0 +1,34 @@
+"""Numbers as texts: rounded to their uncertainty, or short where they have none."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+
+
+def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
+    """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6).
+
+    A dash stands for NaN: what is not known.
+    """
+    if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
+        return tuple("–" if math.isnan(x) else f"{x:.6g}" for x in (value, u, *others))
+    first = Decimal(f"{u:.1e}").adjusted()  # power of ten of the first digit; 0.0996 rounds to 0.10
+    if first >= -4 and max(abs(value), u) < 1e7:
+        places = max(0, 1 - first)
+        # + 0.0 takes the sign off a zero
+        return tuple(f"{round(x, 1 - first) + 0.0:.{places}f}" for x in (value, u, *others))
+    if first >= -11 and 1e-3 <= abs(value) < 1e7:  # 0.99999047, but 2.2e-07
+        return (f"{round(value, 1 - first):.{1 - first}f}", *(f"{x:.1e}" for x in (u, *others)))
+    value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
+    digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
+    return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))
+
+
+def short(value: float | None, digits: int = 2) -> str:
+    """A number without an uncertainty, to so many digits after the first; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value and not 1e-4 <= abs(value) < 1e5:
+        return f"{value:.1e}"
+    return f"{value:.{digits + 1}g}" if abs(value) < 10 ** (digits + 1) else f"{value:.0f}"
