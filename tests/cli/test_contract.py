@@ -148,7 +148,13 @@ def test_set_overrides_one_key(simulated, capsys):
 @for_each(
     ("arguments", "words"),
     [
-        (["frobnicate"], ["frobnicate"]),
+        (["frobnicate"], ["found 'frobnicate', expected new, inspect"]),
+        (["calibrate", "ium"], ["calibrate: found 'ium', did you mean imu?"]),
+        (["compare", "A", "B", "C"], ["compare: found 'C' too, expected inercal compare FIRST SECOND"]),
+        (["compare", "A", "B", "--out", "x", "--out", "y"], ["compare: found --out twice, expected it once"]),
+        (["aoa", "A", "--study", "B", "--states", "7"], ["found '7' for --states, expected 8, 11, 15 or 19"]),
+        (["inspect", "log.csv", "--begin", "5 m"], ["--begin", "time"]),
+        (["inspect", "log.csv", "--begin", "5 h"], ["--begin", "expected a span within the record"]),
         (["calibrate", "imu", "no.csv", "--study", "imu.toml"], ["no.csv"]),
         (["calibrate", "imu", "log.csv", "--study", "no.toml"], ["no.toml"]),
         (["calibrate", "imu", "log.csv"], ["--study"]),

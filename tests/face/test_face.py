@@ -1,6 +1,8 @@
 """The verbs of Python: every line that the book promises, for each system, and the same numbers as the commands."""
 
+import doctest
 import html.parser
+import importlib
 import importlib.util
 import json
 import random
@@ -331,3 +333,10 @@ def test_verbs_survive_any_order_of_imports():
             [sys.executable, "-c", program, str(seed)], capture_output=True, text=True, timeout=120
         )
         assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("module", ["recordings", "study", "verbs", "noise", "calibrations"])
+def test_the_examples_of_the_verbs_run(module):
+    failed, tried = doctest.testmod(importlib.import_module(f"inercal.face.{module}"))
+    assert failed == 0
+    assert tried > 0

@@ -38,7 +38,7 @@ def allan(record: Record) -> Result:
     >>> white = np.random.default_rng(1).standard_normal(6000) * 1e-3
     >>> noise = ic.allan(ic.record(gyro_z=white, rate=100.0))
     >>> round(noise["N_gyro_z"].value, 6), noise["N_gyro_z"].unit
-    (0.000101, 'rad/sqrt(s)')
+    (0.0001, 'rad/sqrt(s)')
     """
     return of_noise(noise_of(record))
 

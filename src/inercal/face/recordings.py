@@ -118,7 +118,7 @@ def record(
     >>> ic.record(t=np.arange(4) / 100, acc=np.ones((4, 3)), gyro=np.zeros((4, 3)), units={"gyro": "deg/s"})
     Record of 6 columns
       acc_x [m/s^2], acc_y [m/s^2], acc_z [m/s^2], gyro_x [deg/s], gyro_y [deg/s], gyro_z [deg/s]: 4 rows over 0.03 s
-      findings: dead_channel
+      findings: nothing suspicious
     """
     given = dict(units or {})
     if table is not None and hasattr(table, "data_vars"):

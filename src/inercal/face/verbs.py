@@ -62,7 +62,7 @@ def calibrate(
     >>> log = ic.read(FOLDER / "ferraris.csv.gz", map=FOLDER / "ferraris-map.toml")
     >>> found = ic.calibrate(log, gravity="9.81 m/s^2")
     >>> round(found["K1_x"].value), found["K1_x"].unit
-    (208, '1/(m/s^2)')
+    (209, 'count/(m/s^2)')
     """
     runs = [records] if isinstance(records, Record) else list(records)
     if not runs or not all(isinstance(each, Record) for each in runs):
