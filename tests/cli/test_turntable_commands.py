@@ -159,7 +159,10 @@ def test_flagged_positions_leave_the_status_ok(folder, capsys):
             ["calibrate", "turntable", "volts.csv"],
             ["error: calibrate turntable: --study is missing, expected it (Study file (TOML)"],
         ),
-        (["calibrate", "turntable", "volts.csv", "--study"], ["found nothing after --study, expected a value"]),
+        (
+            ["calibrate", "turntable", "volts.csv", "--study"],
+            ["found nothing after --study, expected a value"],
+        ),
         (["calibrate", "turntable"], ["FILES is missing, expected it (Recordings"]),
         (
             ["sensitivity", "t.toml", "--set", "rig.errors.default.uniform=2 arcmn"],
