@@ -33,6 +33,11 @@ def _calibrated(name: str, *overrides: str) -> Estimate:
     return calibrate(record_of(name), load_imu_study(study_of(name), overrides)).estimate
 
 
+def _as_published() -> Estimate:
+    """The calibration of the recording of imu_tk's authors by their model, which has no g-sensitive drift."""
+    return _calibrated("xsens", "imu.g_sensitivity=false")
+
+
 def _matrix(model_of: Estimate, scale: str, cross: str) -> Array:
     """S M (3, 3) of a triad."""
     given = model_of.parameters
@@ -61,7 +66,7 @@ _TK_GYRO = np.array([4777.955828030662, 4764.206560263323, 4773.65741055623])
 
 def _tedaldi_misalignments() -> Array:
     """Upper part of T in the correction T K (raw - b), the inverse of M."""
-    T = np.linalg.inv(_matrix(_calibrated("xsens"), "K1", "M") / _vector(_calibrated("xsens"), "K1")[:, None])
+    T = np.linalg.inv(_matrix(_as_published(), "K1", "M") / _vector(_as_published(), "K1")[:, None])
     return np.asarray(T[[0, 0, 1], [1, 2, 2]])
 
 
@@ -236,7 +241,7 @@ CASES = (
         "imu_tk",
         np.zeros(3),
         1.5e-4,
-        lambda: _vector(_calibrated("xsens"), "K1") / _TK_SCALE - 1.0,
+        lambda: _vector(_as_published(), "K1") / _TK_SCALE - 1.0,
     ),
     Case(
         "tedaldi-misalignment",
@@ -253,7 +258,7 @@ CASES = (
         "imu_tk",
         np.zeros(3),
         2e-3,
-        lambda: (_vector(_calibrated("xsens"), "K0") - _TK_BIAS) / _TK_SCALE,
+        lambda: (_vector(_as_published(), "K0") - _TK_BIAS) / _TK_SCALE,
         "m/s^2",
     ),
     Case(
@@ -262,7 +267,7 @@ CASES = (
         "imu_tk",
         np.zeros(3),
         1.5e-3,
-        lambda: _vector(_calibrated("xsens"), "S") / _TK_GYRO - 1.0,
+        lambda: _vector(_as_published(), "S") / _TK_GYRO - 1.0,
     ),
     *(
         Case(
