@@ -19,8 +19,7 @@ from inercal.examples import FOLDER
 from inercal.geometry.rotations import boxplus
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.filter_result import Start
-from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.settings import KINDS, Disturbances

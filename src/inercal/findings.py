@@ -123,8 +123,8 @@ class Finding:
     """One thing worth knowing: a code of `CODES`, a sentence, and where it was seen.
 
     ``harm`` names what an effect outside the model may shift by more than its u: parameters, ``theta`` of angles,
-    channels of a recording, or `EVERYTHING`. Always empty for a code that never does harm; to be stated, if only as
-    empty, for one that does by size; `EVERYTHING` if absent for one that always does.
+    channels of a recording, or `EVERYTHING`. Always empty for a code that never does harm, and `EVERYTHING` if absent
+    for any other: who finds something that does no harm says so by an empty one.
     """
 
     code: str
@@ -142,7 +142,7 @@ class Finding:
             case Harm.NEVER:
                 object.__setattr__(self, "harm", ())
             case Harm.BY_SIZE if self.harm is None:
-                raise ValueError(f"a finding of the code {self.code!r} must state its harm, if only ()")
+                object.__setattr__(self, "harm", EVERYTHING)
             case Harm.ALWAYS if not self.harm:
                 object.__setattr__(self, "harm", EVERYTHING)
 

@@ -22,7 +22,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 
 Case = TypeVar("Case")
 AnyCase = TypeVar("AnyCase", contravariant=True)
@@ -87,7 +87,7 @@ class Hypothesis(Generic[Case]):
     times: int = 1
     left_out: int = 0
     where: str = ""
-    harm: tuple[str, ...] = ()
+    harm: tuple[str, ...] = EVERYTHING
 
     def chance(self, risk: float) -> float:
         """Fall of the sum of squares that chance exceeds with the probability ``risk`` at most."""
