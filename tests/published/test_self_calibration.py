@@ -320,7 +320,7 @@ def test_an_indefinite_covariance():
         ends[name] = advanced(type(state)(*copied), slice(row, None))
     (sound, of_sound), (end, of_end) = ends["sound"], ends["|P|"]
     assert of_end.lowest_eigenvalue > 0.0
-    assert of_end.nis.mean() == pytest.approx(of_sound.nis.mean(), abs=0.01)
+    assert of_end.estimates.nis.mean() == pytest.approx(of_sound.estimates.nis.mean(), abs=0.01)
     u = np.sqrt(np.diag(sound.covariance)[4:])
     assert 1.5 < np.max(np.abs(end.coefficients - sound.coefficients) / u) < 2.2
     assert ends["told"][1].lowest_eigenvalue < NEGATIVE

@@ -208,7 +208,9 @@ def verdict(
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
     """What explains innovations that are too large: the diagnosis, else the reading of the recording."""
-    explaining = [*(each for each in diagnosed if CODES[each.code].rank), *causes(recorded)]
+    # saturated samples are not used, and explain nothing
+    read = [each for each in causes(recorded) if each.code != "saturation"]
+    explaining = [*(each for each in diagnosed if CODES[each.code].rank), *read]
     return explaining[0].message if explaining else "check noise, commands, signs and units"
 
 
