@@ -18,9 +18,10 @@ def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
         places = max(0, 1 - first)
         # + 0.0 takes the sign off a zero
         return tuple(f"{round(x, 1 - first) + 0.0:.{places}f}" for x in (value, u, *others))
-    if first >= -11 and 1e-3 <= abs(value) < 1e7:  # 0.99999047, but 2.2e-07
+    if -11 <= first < -4 and 1e-3 <= abs(value) < 1e7:  # 0.99999047, but 2.2e-07
         return (f"{round(value, 1 - first):.{1 - first}f}", *(f"{x:.1e}" for x in (u, *others)))
-    value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
+    if abs(value) < 1e308:  # one above may not be there when it is rounded
+        value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
     digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
     return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))
 
