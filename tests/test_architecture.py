@@ -148,10 +148,7 @@ def test_no_circles():
 
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
-    "imu": (
-        "limits recording turns aided_settings ferraris_settings settings simulate multiposition ferraris aided "
-        "temperature task figures"
-    ),
+    "imu": ("limits recording turns settings simulate multiposition ferraris aided temperature task figures"),
     "turntable": (
         "limits settings model weights noise regression readings display sensitivity positions rate task "
         "figures"
@@ -254,6 +251,23 @@ def test_what_is_public_is_explained():
                     yield from undocumented(child, f"{name}.{child.name}")
 
     assert [name for module in MODULES for name in undocumented(TREES[module], module)] == []
+
+
+#: rooms whose docstrings are still to be mended
+UNMENDED = {"aoa", "selfcal", "stream", "convert"}
+
+
+def test_docstrings_begin_with_their_subject():
+    """A noun or a verb: no docstring, of a constant neither, opens with a question."""
+    questions = [
+        f"{module}, line {node.lineno}"
+        for module, tree in TREES.items()
+        if room(module) not in UNMENDED
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if re.match(r"\s*(What|How|Whether|Where)\b", str(node.value.value))
+    ]
+    assert questions == []
 
 
 def names_in(tree):

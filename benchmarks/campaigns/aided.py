@@ -10,8 +10,7 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.aided.simulate import Program, Truth, simulate
-from inercal.imu.aided_settings import AidedSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import AidedSettings, ImuSettings
 from inercal.instruments.triad import TriadModel
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable

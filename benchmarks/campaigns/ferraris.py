@@ -12,8 +12,7 @@ from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.simulate import Session, draw_full_truth, simulate_session, true_values
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import FerrarisSettings, ImuSettings
 from inercal.imu.simulate import ImuTruth, Noise
 
 ALIGNMENT = math.radians(0.5)

@@ -1,4 +1,4 @@
-"""What is said of a recording or a result: findings, and the verdict that programs test."""
+"""Findings about a recording or a result, and the verdict that programs test."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import cast
 
 
 class Harm(enum.Enum):
-    """Whether a finding of a code says that an effect outside the model may shift a value by more than its u."""
+    """Harm of a code: an effect outside the model may shift a value by more than its u."""
 
     NEVER = "never"
     BY_SIZE = "by size"
@@ -18,10 +18,10 @@ class Harm(enum.Enum):
 
 @dataclass(frozen=True)
 class Code:
-    """What a code means, and whether findings of it do harm.
+    """Meaning of a code, and the harm of its findings.
 
-    ``rank`` orders what may cause residuals that are too large, 1 the likeliest; 0 explains none. ``gross``: the fault
-    is one of unit, order, sign or time, for which a result is another one.
+    ``rank`` orders codes that may cause residuals that are too large, 1 the likeliest; 0 explains none. ``gross``: the
+    fault is one of unit, order, sign or time, for which a result is another one.
     """
 
     meaning: str
@@ -148,7 +148,7 @@ class Finding:
 
 
 class Status(enum.Enum):
-    """How an estimate ended. The value is the code of the JSON result; codes are a contract."""
+    """Verdict on an estimate. The value is the code of the JSON result; codes are a contract."""
 
     OK = "ok"
     SUSPECT = "suspect"

@@ -1,4 +1,4 @@
-"""What a study says of a field of settings, once: its key, unit, default, bounds and meaning.
+"""Keys of a study, written once with the field of settings: name, unit, default, bounds and meaning.
 
 A field of a settings dataclass is made by `quantity`, `quantities` or `option`; from it follow the reading of the key
 (`inercal.studies.tables`), its JSON Schema, its line in the reference and in the study that `inercal new` writes.
@@ -45,12 +45,12 @@ RELATIVE_U = Bounds(lambda u: 0.0 <= u < 1.0, "0 or more, and below 1")
 
 @dataclass(frozen=True)
 class Key:
-    """How a study states a field.
+    """The key of a study that states a field.
 
     Attributes
     ----------
     says : str
-        What it means, for people.
+        Its meaning, for people.
     dimension : str
         Of a quantity, as in `inercal.units.parse_quantity`; empty for a plain value, whose type is that of the field.
     default : str

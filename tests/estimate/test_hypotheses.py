@@ -97,7 +97,7 @@ def test_what_is_stated_with_an_uncertainty_is_no_error_within_it():
     """Readings that are off by as much as is stated are no error; where they are off by far more the fit says so."""
     doubted = replace(OFFSET, name="stated", prior=2.0)
     assert names(found(measured(0, offset=2.0))[0]) == ["offset"]
-    fits, left = search(measured(0, offset=2.0), lambda _: [SLOPE, SWAP], JUDGE, 1e-3, 3, stated=doubted)
+    fits, left = search(measured(0, offset=2.0), lambda _: [SLOPE, SWAP], JUDGE, 1e-3, 3, systematic=doubted)
     assert fits == []
     assert abs(np.mean(left - LINE)) < 0.1
     for offset, within in ((2.0, True), (20.0, False)):

@@ -20,8 +20,7 @@ from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.aided.figures import pictures
 from inercal.imu.aided.simulate import simulate
 from inercal.imu.aided.walk import whiten
-from inercal.imu.aided_settings import AidedSettings, mounting_of, mountings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import AidedSettings, ImuSettings, mounting_of, mountings
 from inercal.records.column import Column
 from inercal.records.record import Record
 from inercal.report.html import render

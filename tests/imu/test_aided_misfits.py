@@ -17,8 +17,7 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.aided.simulate import rests_of, simulate
-from inercal.imu.aided_settings import AidedSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import AidedSettings, ImuSettings
 from inercal.records.record import Record
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable

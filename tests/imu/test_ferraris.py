@@ -21,8 +21,7 @@ from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.method import NAMES, Inputs, coefficients, derivatives
 from inercal.imu.ferraris.simulate import true_values
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import FerrarisSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.units import parse_unit
 

@@ -29,7 +29,7 @@ from inercal.imu.ferraris.calibration import calibrate_ferraris
 from inercal.imu.ferraris.detection import detect
 from inercal.imu.ferraris.gravity_transfer import carry
 from inercal.imu.ferraris.names import NAMES, POSITIONS
-from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.imu.settings import FerrarisSettings
 from inercal.records.record import Record
 from inercal.units import parse_unit
 

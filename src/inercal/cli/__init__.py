@@ -122,7 +122,7 @@ def show(text: str) -> None:
 
 
 def abandon_output() -> None:
-    """Drop what is left in standard output's buffer, so that nothing is raised again on the way out."""
+    """Drop the rest of standard output's buffer, so that nothing is raised again on the way out."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()

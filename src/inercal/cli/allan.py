@@ -28,10 +28,10 @@ def allan(
     read_s = time.perf_counter() - clock
     with working(output) as progress:
         progress("noise")
-        found = noise_of(record)
+        result = noise_of(record)
 
     def curves(path: Path) -> None:
-        write_text(path, curves_csv(found.evidence))
+        write_text(path, curves_csv(result.evidence))
 
-    estimate = read_in(found.estimate, read_s)
-    return hand_over(estimate, found.view.tables(), found.view.page, output, "noise", curves)
+    estimate = read_in(result.estimate, read_s)
+    return hand_over(estimate, result.view.tables(), result.view.page, output, "noise", curves)

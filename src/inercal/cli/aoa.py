@@ -27,7 +27,7 @@ States = Literal[8, 11, 15, 19]
 @Parameter(name="*")
 @dataclass(frozen=True)
 class MethodOptions:
-    """How angles are found: by the fusion, or with any of the first three the paper's way."""
+    """Choice of the method: the fusion, or with any of the first three the paper's way."""
 
     static: Annotated[
         Static | None, Parameter(help="The paper's way: angle from the accelerometers at rest.")
@@ -121,18 +121,18 @@ def aoa(
     from inercal.records.write import SUFFIXES
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
-    told = read_study("aoa", study, keys)
-    output.spare(told.files)
-    methods = how.methods(told.settings)
+    the_study = read_study("aoa", study, keys)
+    output.spare(the_study.files)
+    methods = how.methods(the_study.settings)
     clock = time.perf_counter()
     record = one_run(read_repeats(paths, map_file, output, span), system.ONE_RUN)
     read_s = time.perf_counter() - clock
-    smoothed = " smoothed" if told.settings.estimator.smooth or how.compare else ""
+    smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
-        system.prepare(told, how.compare, methods)
+        system.prepare(the_study, how.compare, methods)
     with working(output) as progress:
-        found = system.calibrate([record], told, how.compare, progress, methods, how.points)
-    return give(found, output, read_s, "angles")
+        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points)
+    return give(result, output, read_s, "angles")
 
 
 def _live(
@@ -152,9 +152,9 @@ def _live(
     from inercal.stream.aoa import Aoa
 
     streaming.check(output, (file, map_file, study))
-    told = read_study("aoa", study, keys)
-    settings = told.settings
-    with told.at_fault():
+    the_study = read_study("aoa", study, keys)
+    settings = the_study.settings
+    with the_study.at_fault():
         if settings.estimator.smooth:
             raise StudyError(
                 "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
@@ -163,7 +163,7 @@ def _live(
             load_kernels(problem(settings))
 
     def measurement(lines: Lines) -> Aoa:
-        with told.at_fault():
+        with the_study.at_fault():
             return Aoa(lines, settings, interval, output.say_finding)
 
     run_stream(measurement, file, map_file, output, streaming)

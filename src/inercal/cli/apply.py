@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, MapFile, Span, read_record, reading
-from inercal.cli.outcome import emit, told
+from inercal.cli.outcome import emit
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.errors import InputError
 
@@ -48,6 +48,7 @@ def apply(
         return
 
     from inercal.convert.correct import apply_to
+    from inercal.estimate.result import without_coefficients
     from inercal.face.calibrations import worth_saying
     from inercal.records.read import source_of
     from inercal.records.write import SUFFIXES, write_record
@@ -65,7 +66,7 @@ def apply(
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
-    emit(told("apply", words, result, inputs, findings), words, output)
+    emit(without_coefficients("apply", words, result, inputs, findings), words, output)
 
 
 def _model(calibration: Path) -> tuple[Model, tuple[Finding, ...]]:

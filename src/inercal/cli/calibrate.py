@@ -71,12 +71,12 @@ def _calibrated(
     from inercal.face.study import read_study
 
     output.check(WHOLE, (*files, map_file, study))
-    told = read_study(kind, study, overrides or ())
-    output.spare(told.files)
+    the_study = read_study(kind, study, overrides or ())
+    output.spare(the_study.files)
     clock = time.perf_counter()
     records = read(files, map_file, output, span)
     read_s = time.perf_counter() - clock
     system = import_module(f"inercal.face.{kind}")
     with working(output) as progress:
-        found = system.calibrate(records, told, progress=progress)
-    return give(found, output, read_s)
+        result = system.calibrate(records, the_study, progress=progress)
+    return give(result, output, read_s)

@@ -36,5 +36,5 @@ def compare(
     read = time.perf_counter()
     estimate = compared(*files)
     timing = {"solve": time.perf_counter() - read}
-    found = of_comparison(replace(estimate, inputs=inputs, timing=timing), files[0].estimate)
-    return give(found, output, read - clock, "comparison")
+    result = of_comparison(replace(estimate, inputs=inputs, timing=timing), files[0].estimate)
+    return give(result, output, read - clock, "comparison")

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput
-from inercal.cli.outcome import emit, told
+from inercal.cli.outcome import emit
 
 Shell = Literal["bash", "zsh", "fish"]
 
 _FILES = 'COMPREPLY=( $(compgen -f -- "${cur}") )'
-"""How the script for bash completes file names: without slashes after folders, and broken at blanks."""
+"""Completion of file names in the script for bash: without slashes after folders, and broken at blanks."""
 
 
 _ZSH = """
@@ -32,6 +32,7 @@ def completion(
 ) -> None:
     """Print the script by which a shell completes commands."""
     from inercal._files import write_text
+    from inercal.estimate.result import without_coefficients
 
     output.check(())
     text = script(shell)
@@ -39,7 +40,11 @@ def completion(
         write_text(output.out, text)
         output.say(f"completion: {output.out}")
     shown = text.rstrip("\n") if output.out is None else ""
-    emit(told("completion", f"completion for {shell}", {"shell": shell, "text": text}), shown, output)
+    emit(
+        without_coefficients("completion", f"completion for {shell}", {"shell": shell, "text": text}),
+        shown,
+        output,
+    )
 
 
 def script(shell: Shell) -> str:

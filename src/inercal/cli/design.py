@@ -31,17 +31,17 @@ def design_positions(
 
     output.check((*WHOLE, ".csv"), (study,))
     clock = time.perf_counter()
-    told = read_study("turntable", study, overrides or ())
-    output.spare(told.files)
+    the_study = read_study("turntable", study, overrides or ())
+    output.spare(the_study.files)
     read_s = time.perf_counter() - clock
     with working(output) as progress:
-        found = system.design(told, progress)
+        designed = system.design(the_study, progress)
 
     def rows(path: Path) -> None:
-        write_text(path, _positions(found.estimate.result["positions"], told.settings))
+        write_text(path, _positions(designed.estimate.result["positions"], the_study.settings))
 
-    estimate = read_in(found.estimate, read_s)
-    return hand_over(estimate, found.view.tables(), found.view.page, output, "positions", rows)
+    estimate = read_in(designed.estimate, read_s)
+    return hand_over(estimate, designed.view.tables(), designed.view.page, output, "positions", rows)
 
 
 def design_selfcal(
@@ -59,19 +59,19 @@ def design_selfcal(
 
     output.check((".json", ".toml"), (study,))
     clock = time.perf_counter()
-    told = read_study("selfcal", study, overrides or ())
+    the_study = read_study("selfcal", study, overrides or ())
     read_s = time.perf_counter() - clock
     with compiling("design selfcal", output.say_now):
-        system.prepare_design(told)
+        system.prepare_design(the_study)
     with reading(output, "searching") as progress:
-        found = system.design(told, progress)
+        designed = system.design(the_study, progress)
 
     def plan(path: Path) -> None:
-        write_text(path, _plan(found.evidence.plan, found.message))
+        write_text(path, _plan(designed.evidence.plan, designed.message))
 
-    estimate = read_in(found.estimate, read_s)
-    page = found.view.page
-    return hand_over(estimate, found.view.tables(), page, output, "plan", plan, whole=(".json",))
+    estimate = read_in(designed.estimate, read_s)
+    page = designed.view.page
+    return hand_over(estimate, designed.view.tables(), page, output, "plan", plan, whole=(".json",))
 
 
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:

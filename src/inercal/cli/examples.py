@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput
-from inercal.cli.outcome import emit, told
+from inercal.cli.outcome import emit
 from inercal.errors import InputError
 
 
@@ -21,6 +21,7 @@ def examples(
     from pathlib import Path
 
     from inercal._files import read_bytes, write_bytes
+    from inercal.estimate.result import without_coefficients
     from inercal.examples import EXAMPLES, FOLDER, shipped
 
     if name is None:
@@ -28,7 +29,7 @@ def examples(
             raise InputError("--out", "found no example to copy, expected its name before")
         rows = [{"name": e.name, "title": e.title, "files": list(e.files)} for e in EXAMPLES.values()]
         text = "\n".join(f"{e.name:11s} {e.title}" for e in EXAMPLES.values())
-        emit(told("examples", f"{len(rows)} examples", {"examples": rows}), text, output)
+        emit(without_coefficients("examples", f"{len(rows)} examples", {"examples": rows}), text, output)
         return
     if name not in EXAMPLES:
         raise InputError(name, f"no such example, expected one of {', '.join(EXAMPLES)}")
@@ -45,5 +46,5 @@ def examples(
         write_bytes(folder / Path(file).name, read_bytes(FOLDER / file))
     result = {"folder": str(folder), "run": example.command(str(folder))}
     sources = map(shipped, example.files)
-    estimate = told("examples", f"copied to {folder}", result, sources)
+    estimate = without_coefficients("examples", f"copied to {folder}", result, sources)
     emit(estimate, f"{estimate.message}; now run\n{result['run']}", output)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from inercal.cli.options import Files, MapFile, ReportOutput, Span, read_record
-from inercal.cli.outcome import WHOLE, emit, timed, told
+from inercal.cli.outcome import WHOLE, emit, timed
 
 
 def inspect(
@@ -19,6 +19,7 @@ def inspect(
     """Look at a recording before it is used."""
     from inercal._files import write_text
     from inercal.estimate.files import save
+    from inercal.estimate.result import without_coefficients
     from inercal.records.places import counted
     from inercal.report.inspection import (
         channels_table,
@@ -39,12 +40,14 @@ def inspect(
         "channels": [vars(row) for row in summary(record)],
         "norms": [vars(row) for row in norms(record)],
     }
-    estimate = timed(told("inspect", words, result, record.sources, record.findings))
+    estimate = timed(without_coefficients("inspect", words, result, record.sources, record.findings))
     if output.out is not None:
         save(estimate, output.out)
         output.say(f"findings: {output.out}")
     if output.report is not None:
         write_text(output.report, render_inspection(record, estimate, inspection_pictures(record)))
         output.say(f"report: {output.report}")
-    found = [f"{f.code}: {f.message}{f' ({f.where})' if f.where else ''}" for f in record.findings] or [words]
-    emit(estimate, "\n".join([channels_table(record).text(), "", *found]), output)
+    findings = [f"{f.code}: {f.message}{f' ({f.where})' if f.where else ''}" for f in record.findings] or [
+        words
+    ]
+    emit(estimate, "\n".join([channels_table(record).text(), "", *findings]), output)

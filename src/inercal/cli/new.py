@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, Overrides
-from inercal.cli.outcome import emit, told
+from inercal.cli.outcome import emit
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -105,6 +105,7 @@ def _new(
 ) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
     from inercal._files import write_text
+    from inercal.estimate.result import without_coefficients
     from inercal.records.read import source_of
     from inercal.studies.starting import UNKNOWN
     from inercal.studies.template import template
@@ -126,4 +127,4 @@ def _new(
         words = words.replace("look it over and correct it", f'fill in each "{UNKNOWN}" and look it over', 1)
     if column_map is not None and not _mapped(column_map):
         words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
-    emit(told(f"new {kind}", words, result, map(source_of, files)), words, output)
+    emit(without_coefficients(f"new {kind}", words, result, map(source_of, files)), words, output)

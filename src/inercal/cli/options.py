@@ -1,4 +1,4 @@
-"""What the commands share: their common options, messages, and results going out."""
+"""Common options of the commands, messages, and results going out."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Output:
             self.say_now(text)
 
     def say_now(self, text: str) -> None:
-        """What is worth knowing only while it goes on."""
+        """A message about the progress of a command."""
         if not self.quiet:
             print(text, file=sys.stderr)
 
@@ -159,7 +159,7 @@ class Span:
     ] = None
 
     def check(self) -> None:
-        """Refuse what is no time, before anything is read; raises `InputError`."""
+        """Refuse a time that is none, before anything is read; raises `InputError`."""
         from inercal.records.span import seconds
 
         for option, text in self.given.items():
@@ -215,7 +215,7 @@ def read_repeats(
 
 
 def whole_number(kind: object, tokens: Sequence[Token]) -> int:
-    """What was typed for an option as a whole number, which 1.5 is not; raises `InputError`."""
+    """The whole number typed for an option; raises `InputError`, for 1.5 too."""
     (typed,) = tokens
     try:
         return int(typed.value)
@@ -225,7 +225,7 @@ def whole_number(kind: object, tokens: Sequence[Token]) -> int:
 
 @contextmanager
 def working(output: Output) -> Iterator[Callable[[str], None]]:
-    """A callback (text) that shows on a terminal what is being done, and leaves nothing; elsewhere see `_once`."""
+    """A callback (text) that shows progress on a terminal and leaves nothing; elsewhere see `_once`."""
     if output.quiet or not sys.stderr.isatty():
         yield _once(output)
         return

@@ -1,11 +1,11 @@
-"""What a command brings back going out: file, report, words, and the exit code."""
+"""Output of a command: file, report, words, and the exit code."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from inercal.cli import EXIT_BAD_VERDICT, process_age
 from inercal.cli.options import FileOutput, ReportOutput
@@ -13,40 +13,9 @@ from inercal.cli.options import FileOutput, ReportOutput
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.face.result import Result
-    from inercal.findings import Finding
-    from inercal.inputs import Source
 
 WHOLE = (".json", ".toml")
 """Suffixes of a file that holds the whole result."""
-
-
-def told(
-    command: str,
-    message: str,
-    result: Mapping[str, Any],
-    inputs: Iterable[Source] = (),
-    findings: Iterable[Finding] = (),
-    timing: Mapping[str, float] | None = None,
-    settings: Mapping[str, Any] | None = None,
-    seed: int | None = None,
-    references: tuple[str, ...] = (),
-) -> Estimate:
-    """What a command that estimates no coefficients brings back: the one type of result, ended well.
-
-    ``settings`` are the keys of a study as they were given, for `Estimate.provenance`.
-    """
-    from inercal.estimate.basis import Basis, provenance
-    from inercal.estimate.result import Estimate
-    from inercal.findings import Status
-
-    basis = Basis(
-        command,
-        inputs=tuple(inputs),
-        provenance={} if settings is None else {**provenance(settings), "seed": seed},
-        references=references,
-    )
-    estimate = Estimate.without(basis, Status.OK, message, findings=findings, result=result)
-    return replace(estimate, timing=timing or {})
 
 
 def emit(estimate: Estimate, text: str, output: FileOutput) -> None:

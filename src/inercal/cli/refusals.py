@@ -1,4 +1,4 @@
-"""What is wrong with a command line, in sentences of our own: what was found, what was expected."""
+"""Refusals of a command line in sentences of our own: what was found, what was expected."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def refusal(error: CycloptsError, commands: dict[str, list[str]], usage: str) ->
         case UnknownCommandError():
             return _unknown_command(str((error.unused_tokens or [""])[0]), command, commands)
         case UnusedCliTokensError():
-            found = ", ".join(map(shown, error.unused_tokens or ()))
-            return f"{command}: found {found} too, expected {usage}"
+            extra = ", ".join(map(shown, error.unused_tokens or ()))
+            return f"{command}: found {extra} too, expected {usage}"
         case UnknownOptionError():
             return _unknown_option(error, command)
         case RepeatArgumentError():
@@ -44,7 +44,7 @@ def refusal(error: CycloptsError, commands: dict[str, list[str]], usage: str) ->
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:
-    """What is missing: a value after an option, or the argument altogether."""
+    """The missing part: a value after an option, or the argument altogether."""
     argument = error.argument
     if argument is None:
         return str(error)
@@ -56,9 +56,9 @@ def _missing(error: MissingArgumentError, command: str) -> str:
 
 def _unknown_command(word: str, verb: str, commands: dict[str, list[str]]) -> str:
     """A verb, or the kind after one, that there is not."""
-    known = commands[verb] if verb in commands else list(commands)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    expected = f"did you mean {near[0]}?" if near else f"expected {_or(known)}"
+    names = commands[verb] if verb in commands else list(commands)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    expected = f"did you mean {near[0]}?" if near else f"expected {_or(names)}"
     return f"{verb or 'inercal'}: found {shown(word)}, {expected}"
 
 
@@ -66,9 +66,9 @@ def _unknown_option(error: UnknownOptionError, command: str) -> str:
     """An option that the command does not have."""
     word = (error.token.keyword or error.token.value).partition("=")[0]
     names = [name for each in error.argument_collection if each.parse for name in each.names]
-    known = [name for name in names if name.startswith("--")]
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    expected = f"did you mean {near[0]}?" if near else f"expected {_or(known)}"
+    options = [name for name in names if name.startswith("--")]
+    near = difflib.get_close_matches(word, options, n=1, cutoff=0.6)
+    expected = f"did you mean {near[0]}?" if near else f"expected {_or(options)}"
     return f"{command}: found the option {word}, {expected}"
 
 
@@ -85,10 +85,10 @@ def _wrong_value(error: CoercionError, command: str) -> str:
 
 def _choices(hint: Any) -> list[str]:
     """The texts that a hint allows, those of an optional one too."""
-    found = []
+    choices = []
     for each in get_args(hint):
-        found += _choices(each) if get_origin(each) is not None else [str(each)] if _is_choice(each) else []
-    return found
+        choices += _choices(each) if get_origin(each) is not None else [str(each)] if _is_choice(each) else []
+    return choices
 
 
 def _is_choice(value: object) -> bool:

@@ -14,10 +14,10 @@ def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen
     from inercal.studies.schema import json_schema
 
     output.check((".json",))
-    found = json_schema()
+    document = json_schema()
     if output.out is not None:
-        write_text(output.out, json.dumps(found, indent=1) + "\n")
+        write_text(output.out, json.dumps(document, indent=1) + "\n")
     if output.json or output.out is None:
-        show(json.dumps(found, indent=1))
+        show(json.dumps(document, indent=1))
     if output.out is not None:
         output.say_now(f"schema: {output.out}")

@@ -65,7 +65,7 @@ def selfcal(
     from inercal.records.write import SUFFIXES
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
-    told = read_study("selfcal", study, keys)
+    the_study = read_study("selfcal", study, keys)
     clock = time.perf_counter()
     records = read_repeats(paths, map_file, output, span)
     read_s = time.perf_counter() - clock
@@ -73,12 +73,12 @@ def selfcal(
         raise InputError("--compare", f"found {len(records)} runs, expected one")
     if len(records) > 1 and output.out is not None and output.out.suffix.lower() in SUFFIXES:
         raise InputError(output.out, f"found {len(records)} runs, expected one for a history, or .json")
-    of_all = " all" if compare else f" {told.settings.filter.kind}"
+    of_all = " all" if compare else f" {the_study.settings.filter.kind}"
     with compiling(f"selfcal{of_all}", output.say):
-        system.prepare(told, compare)
+        system.prepare(the_study, compare)
     with working(output) as progress:
-        found = system.calibrate(records, told, compare, progress)
-    return give(found, output, read_s)
+        result = system.calibrate(records, the_study, compare, progress)
+    return give(result, output, read_s)
 
 
 def _live(
@@ -101,13 +101,13 @@ def _live(
     of = read_study("selfcal", study, keys)
     with of.at_fault():
         stated_well(of.settings, "a stream")
-        told = problem(of.settings)
-        filter_of(told)
-        with compiling(f"selfcal stream {told.filter.kind}", output.say):
-            load_kernels(told)
+        filter_problem = problem(of.settings)
+        filter_of(filter_problem)
+        with compiling(f"selfcal stream {filter_problem.filter.kind}", output.say):
+            load_kernels(filter_problem)
 
     def calibration(lines: Lines) -> Selfcal:
         with of.at_fault():
-            return Selfcal(lines, told, interval, output.say_finding)
+            return Selfcal(lines, filter_problem, interval, output.say_finding)
 
     run_stream(calibration, file, map_file, output, streaming)

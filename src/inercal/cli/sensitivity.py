@@ -22,12 +22,12 @@ def sensitivity(
 
     output.check((*WHOLE, ".nc", ".npz"), (study,))
     clock = time.perf_counter()
-    told = read_study("turntable", study, overrides or ())
-    output.spare(told.files)
+    the_study = read_study("turntable", study, overrides or ())
+    output.spare(the_study.files)
     read_s = time.perf_counter() - clock
     with reading(output, "sampling") as progress:
-        found = system.sensitivity(told, bool(output.targets), output.say_now, progress)
-    analysed = found.evidence
+        result = system.sensitivity(the_study, bool(output.targets), output.say_now, progress)
+    analysed = result.evidence
     if analysed.note:
         output.say(analysed.note)
 
@@ -36,5 +36,5 @@ def sensitivity(
 
         write_maps(analysed, path)
 
-    estimate = read_in(found.estimate, read_s)
-    return hand_over(estimate, found.view.tables(), found.view.page, output, "maps", maps)
+    estimate = read_in(result.estimate, read_s)
+    return hand_over(estimate, result.view.tables(), result.view.page, output, "maps", maps)

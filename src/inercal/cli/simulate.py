@@ -12,7 +12,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, reading, whole_number
-from inercal.cli.outcome import WHOLE, emit, hand_over, told
+from inercal.cli.outcome import WHOLE, emit, hand_over
 from inercal.errors import InputError
 
 Seed = Annotated[
@@ -74,6 +74,7 @@ def simulate_aoa(
 def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._jit import compiling
+    from inercal.estimate.result import without_coefficients
     from inercal.face.study import read_study
     from inercal.findings import Status
     from inercal.records.read import source_of
@@ -92,26 +93,26 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
             load_kernels(settings.filter.kind, problem(settings))
         clock = time.perf_counter()
         with reading(output, "simulating") as progress:
-            found = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
+            outcome = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
     timing = {"solve": time.perf_counter() - clock}
-    estimate = told(
+    estimate = without_coefficients(
         "simulate selfcal",
-        found.message,
-        found.result,
+        outcome.message,
+        outcome.result,
         [source_of(study)],
         timing=timing,
         settings=settings.given,
         seed=seed,
         references=REFERENCES,
     )
-    estimate = estimate if found.passed else replace(estimate, status=Status.INCONSISTENT)
+    estimate = estimate if outcome.passed else replace(estimate, status=Status.INCONSISTENT)
 
     def page() -> str:
         from inercal.selfcal.figures.monte_carlo import page as campaign_page
 
-        return campaign_page(found, settings, estimate)
+        return campaign_page(outcome, settings, estimate)
 
-    return hand_over(estimate, [found.table()], page, output, "campaign")
+    return hand_over(estimate, [outcome.table()], page, output, "campaign")
 
 
 def _check(study: Path, seed: int, output: FileOutput) -> None:
@@ -136,6 +137,7 @@ def _simulated(
     """Simulate, and write the record."""
     import numpy as np
 
+    from inercal.estimate.result import without_coefficients
     from inercal.face.study import read_study
     from inercal.face.verbs import simulate
     from inercal.records.read import source_of
@@ -153,4 +155,8 @@ def _simulated(
     words = f"{rows} rows written to {output.out}"
     result = {"out": str(output.out), "rows": rows, "seed": seed, "columns": list(record.columns)}
     sources = map(source_of, inputs)
-    emit(told(f"simulate {kind}", words, result, sources, settings=of.keys, seed=seed), words, output)
+    emit(
+        without_coefficients(f"simulate {kind}", words, result, sources, settings=of.keys, seed=seed),
+        words,
+        output,
+    )

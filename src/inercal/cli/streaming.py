@@ -1,4 +1,4 @@
-"""What the commands that work on a stream share: its options, and running an estimator from lines to lines."""
+"""Streams on the command line: their options, and an estimator run from lines to lines."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ def temperature(
         read_s = time.perf_counter() - clock
         model = fit_recording(record, reference)
     solve_s = time.perf_counter() - clock - read_s
-    found = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
-    return give(found, output, read_s, "temperature model")
+    result = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
+    return give(result, output, read_s, "temperature model")
 
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:

@@ -293,7 +293,7 @@ def call(arguments: list[str]) -> int | None:
 
 
 def _refused(root: App, error: CycloptsError) -> str:
-    """What is wrong with a command line, in a sentence."""
+    """The refusal of a command line, in a sentence."""
     from inercal.cli.refusals import refusal
 
     kinds: dict[str, list[str]] = {}
@@ -305,7 +305,7 @@ def _refused(root: App, error: CycloptsError) -> str:
 
 
 def usage(command: App, verb: str, kind: str) -> str:
-    """How a command is called: its arguments, in brackets where they may be absent, and the options that it needs."""
+    """Usage of a command: its arguments, in brackets where they may be absent, and the options that it needs."""
     given = [each for each in command.assemble_argument_collection() if each.show]
     arguments = [each for each in given if not each.name.startswith("-")]
     options = [each for each in given if each.name.startswith("-") and each.required]

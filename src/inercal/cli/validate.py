@@ -18,6 +18,6 @@ def validate(*, output: ReportOutput = ReportOutput()) -> int:  # noqa: B008  (f
 
     output.check(WHOLE)
     with compiling("validate", output.say), reading(output, "validating") as progress:
-        found = run(executor(), progress)
-    found = replace(found, timing={**found.timing, "total": process_age()})
-    return hand_over(found, [table(found)], lambda: page(found), output, "record")
+        estimate = run(executor(), progress)
+    estimate = replace(estimate, timing={**estimate.timing, "total": process_age()})
+    return hand_over(estimate, [table(estimate)], lambda: page(estimate), output, "record")

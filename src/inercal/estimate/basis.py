@@ -1,4 +1,4 @@
-"""What a result rests on beside its numbers: command, model, conditions, files, versions, publications."""
+"""Basis of a result beside its numbers: command, model, conditions, files, versions, publications."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Basis:
-    """What an `inercal.estimate.result.Estimate` rests on; its fields of the same names."""
+    """Basis of an `inercal.estimate.result.Estimate`; its fields of the same names."""
 
     command: str
     model: str = ""
@@ -29,7 +29,7 @@ class Basis:
 
 
 class Settings(Protocol):
-    """What studies of all systems state of where and when."""
+    """Site, temperature and texts, which studies of all systems have."""
 
     @property
     def site(self) -> Site:
@@ -83,10 +83,10 @@ def conditions_of(
     ranges : mapping
         Smallest and largest input by name, its SI unit at the end of the name.
     **own
-        What only this kind of estimate has, such as its frame; comes first.
+        Conditions of this kind of estimate alone, such as its frame; come first.
     """
-    site, stated = settings.site, settings.temperature
-    temperature = recorded if stated is None else stated
+    site, of_study = settings.site, settings.temperature
+    temperature = recorded if of_study is None else of_study
     return own | {
         "temperature": temperature and {"value": temperature.value, "u": temperature.u, "unit": "degC"},
         "site": {"gravity_m_s2": site.gravity, "latitude_rad": site.latitude},
@@ -96,7 +96,7 @@ def conditions_of(
 
 
 def provenance(given: Mapping[str, Any]) -> dict[str, Any]:
-    """What a repetition of a calibration needs beside its inputs: the keys ``given``; nothing in it is random."""
+    """Provenance for a repetition beside the inputs: the keys ``given``; nothing is random."""
     import platform
 
     import scipy

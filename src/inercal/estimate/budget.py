@@ -64,7 +64,7 @@ class BudgetItem:
 
 
 class Uncertainty(NamedTuple):
-    """How well p parameters are known.
+    """Uncertainty of p parameters.
 
     ``covariance`` (p, p), degrees of freedom ``dof`` (p,), one item of the ``budget`` for each source, and of the
     covariance the part ``common`` (p, p) that is one and the same error in repeat runs; None where it is not told

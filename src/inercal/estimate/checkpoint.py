@@ -75,9 +75,9 @@ def load(path: str | Path, kind: str, fingerprint: str, like: S) -> S:
     if not head.startswith(_MAGIC) or len(words) != 2:
         raise InputError(path, "is no checkpoint, expected one or the name of a new file")
     if words[0] != _VERSION:
-        found = words[0][:9].decode("ascii", "replace")
+        version = words[0][:9].decode("ascii", "replace")
         raise InputError(
-            path, f"is a checkpoint of format {found}, expected {_VERSION.decode()}, or a new file"
+            path, f"is a checkpoint of format {version}, expected {_VERSION.decode()}, or a new file"
         )
     if words[1] != hashlib.sha256(body).hexdigest().encode():
         raise InputError(path, "is a damaged checkpoint, expected it whole: remove it to begin anew")
@@ -167,7 +167,7 @@ def _leaves(state: object, name: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _form(leaf: object) -> object:
-    """What must be the same in two states of one form."""
+    """Form of a state: two of one form agree in it."""
     return (leaf.dtype.newbyteorder("<").str, leaf.ndim) if isinstance(leaf, np.ndarray) else type(leaf)
 
 

@@ -1,10 +1,10 @@
-"""What acts alike in two calibrations, and cancels in their difference.
+"""Sources of uncertainty that act alike in two calibrations, and cancel in their difference.
 
 A saved budget holds the size of each effect on a coefficient but not its sign. So a source is taken as common only
 where the sign is known too: type B, of the same name and u in both, being gravity at the same site or the time base
 of the same instrument, and in proportion to every coefficient it acts on. (Gravity and time base set the scale: the
 effect has the sign of the coefficient, or the opposite one throughout.) All other sources count as independent;
-where they are not, as with errors of one table, the difference is less uncertain than is said of it.
+where they are not, as with errors of one table, the difference is less uncertain than its u says.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ def common_sources(
     if not other_instrument(first, second):
         alike |= _OF_THE_INSTRUMENT
     others = {(item.source, item.unit): item for item in second.budget if item.type == "B"}
-    found = {}
+    shared = {}
     for item in first.budget:
         twin = others.get((item.source, item.unit))
         if item.type != "B" or item.source not in alike or twin is None:
             continue
         effects = a.effect(item), b.effect(twin)
         if math.isclose(item.u, twin.u, rel_tol=1e-9) and _in_proportion(a.values, b.values, *effects):
-            found[item.source] = effects
-    return found
+            shared[item.source] = effects
+    return shared
 
 
 def _in_proportion(a: Array, b: Array, by_a: Array, by_b: Array) -> bool:

@@ -144,7 +144,7 @@ def compare(first: Saved, second: Saved) -> Estimate:
 
 
 def _check(saved: Saved) -> None:
-    """Refuse what is no calibration."""
+    """Refuse a file that is no calibration."""
     estimate = saved.estimate
     if estimate.command == COMMAND:
         raise InputError(saved.where, "is a comparison itself, expected a calibration")
@@ -153,14 +153,14 @@ def _check(saved: Saved) -> None:
             saved.where, f"holds no coefficients ({estimate.status.value}), expected a calibration with some"
         )
     with np.errstate(invalid="ignore"):
-        known = (
+        sound = (
             np.isfinite(estimate.values)
             & np.isfinite(estimate.covariance).all(axis=1)
             & (np.diag(estimate.covariance) >= 0)
             & (estimate.dof > 0)
         )
-    if not known.all():
-        name = estimate.names[int(np.argmin(known))]
+    if not sound.all():
+        name = estimate.names[int(np.argmin(sound))]
         raise InputError(
             saved.where,
             f"{name} is without a finite value, covariance or degrees of freedom, expected all three",
@@ -176,17 +176,17 @@ def _taken(estimate: Estimate, names: list[str], factor: Array) -> Taken:
 
 def _factor(name: str, first: Saved, second: Saved) -> float:
     """The unit of a coefficient in the second file over that in the first; raises `InputError`."""
-    wanted, found = first.estimate[name].unit, second.estimate[name].unit
-    if wanted == found:
+    unit, other_unit = first.estimate[name].unit, second.estimate[name].unit
+    if unit == other_unit:
         return 1.0
-    (mine, per), (other, per_other) = map(_output_and_rest, (wanted, found))
+    (mine, per), (other, per_other) = map(_output_and_rest, (unit, other_unit))
     try:
         units = parse_unit(mine), parse_unit(other)
     except QuantityError:
         units = None
     if units is None or per != per_other or units[0].dimension != units[1].dimension:
         raise InputError(
-            second.where, f"{name} is in {found}, expected a unit like {wanted}, as in {first.where}"
+            second.where, f"{name} is in {other_unit}, expected a unit like {unit}, as in {first.where}"
         )
     return units[1].factor / units[0].factor
 
@@ -260,16 +260,16 @@ def _joint(d: Array, covariance: Array, dof: Array) -> _Joint:
     from scipy.special import chdtrc, fdtrc
 
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    known = u > 0
+    uncertain = u > 0
     direction = np.zeros(len(d))
-    if not known.any():
+    if not uncertain.any():
         return _Joint(0.0, 0, 1.0, direction)
-    z, scale = d[known] / u[known], np.outer(u[known], u[known])
-    values, vectors = np.linalg.eigh(covariance[np.ix_(known, known)] / scale)
+    z, scale = d[uncertain] / u[uncertain], np.outer(u[uncertain], u[uncertain])
+    values, vectors = np.linalg.eigh(covariance[np.ix_(uncertain, uncertain)] / scale)
     kept = values > _SINGULAR * len(z)
     vectors = vectors[:, kept]
-    direction[known] = vectors @ (vectors.T @ z / values[kept])
-    chi2, rank, nu = float(z @ direction[known]), int(kept.sum()), float(dof[known].min())
+    direction[uncertain] = vectors @ (vectors.T @ z / values[kept])
+    chi2, rank, nu = float(z @ direction[uncertain]), int(kept.sum()), float(dof[uncertain].min())
     probability = chdtrc(rank, chi2) if math.isinf(nu) else fdtrc(rank, nu, chi2 / rank)
     return _Joint(chi2, rank, float(probability), direction)
 
@@ -311,9 +311,9 @@ def _conditions(estimate: Estimate) -> dict[str, Any]:
 
 
 def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Array]]) -> list[Finding]:
-    """What makes the comparison doubtful."""
+    """Findings that make the comparison doubtful."""
     a, b = first.estimate, second.estimate
-    found = [
+    findings = [
         Finding(
             "bad_verdict",
             f"the calibration ended {each.estimate.status.value}: {each.estimate.message}",
@@ -333,7 +333,7 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
     if other_instrument(a, b):
         differing.append("instrument")
     if differing:
-        found.append(
+        findings.append(
             Finding(
                 "other_model",
                 f"the calibrations differ in {', '.join(differing)}: coefficients of one name may not mean the same",
@@ -345,7 +345,7 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
     }  # no study, no map
     path = next((source.path for source in a.inputs if source.sha256 in recordings), None)
     if path is not None:
-        found.append(
+        findings.append(
             Finding(
                 "same_recording",
                 f"both rest on {path}: its noise is the same in both, and the uncertainties of the differences are too "
@@ -363,7 +363,7 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
     ]
     if constant:
         shown = counted_names(constant, 6)
-        found.append(
+        findings.append(
             Finding(
                 "perhaps_common",
                 f"{shown}: in both budgets, taken as independent; where they acted alike in both runs, the "
@@ -371,4 +371,4 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
                 f"{first.where}, {second.where}",
             )
         )
-    return found
+    return findings

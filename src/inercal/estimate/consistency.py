@@ -39,7 +39,7 @@ class Nis:
 
     @property
     def excess(self) -> float:
-        """How far the mean is off, in standard errors; inf where it is not a number."""
+        """Offset of the mean in standard errors; inf where it is not a number."""
         if not math.isfinite(self.mean):
             return math.inf
         return (self.mean - self.expected) / self.standard_error
@@ -77,7 +77,7 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
 
     Two tests of each column, and Bonferroni's inequality over all. Of each lag the sum of products x_k x_(k+lag) over
     the root of the sum of their squares is about standard normal, whatever the variances of the rows; their squares are
-    summed over the ``lags``. Sums over blocks of some rows show what is correlated over longer times: their squares,
+    summed over the ``lags``. Sums over blocks of some rows show correlation over longer times: their squares,
     each over the number of its measurements and the mean square, add up to about chi-square with as many degrees of
     freedom as there are blocks with measurements, and can be too large or too small.
     """
@@ -97,10 +97,10 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
         sums = _ratio(np.sum(np.square(parts.sum(axis=1)) / np.maximum(rows, 1), axis=0), mean_square)
         chance = 2.0 * np.minimum(chdtr(count, sums), chdtrc(count, sums))
         chances.append(np.where(count >= 5, chance, 1.0))
-    known = np.isfinite(x).any(axis=0)
-    if not known.any():
+    present = np.isfinite(x).any(axis=0)
+    if not present.any():
         return 1.0
-    return float(min(1.0, np.min(np.array(chances)[:, known]) * known.sum() * len(chances)))
+    return float(min(1.0, np.min(np.array(chances)[:, present]) * present.sum() * len(chances)))
 
 
 def _ratio(a: Array, b: Array) -> Array:

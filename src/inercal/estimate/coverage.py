@@ -21,7 +21,7 @@ Limits = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """How often stated intervals held the truth, and how often they should have.
+    """Share of intervals that held the truth, and the share that should have.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Coverage:
 
     @property
     def passed(self) -> bool:
-        """Whether every coefficient, and all of them together, lie within their limits."""
+        """True if every coefficient, and all of them together, lie within their limits."""
         low, high = self.limits
         each = bool(np.all((low <= self.fraction) & (self.fraction <= high)))
         return each and self.pooled_limits[0] <= self.pooled <= self.pooled_limits[1]
@@ -103,7 +103,7 @@ class Nees:
 
     @property
     def passed(self) -> bool:
-        """Whether the mean lies within its limits."""
+        """True if the mean lies within its limits."""
         return self.limits[0] <= self.mean <= self.limits[1]
 
     def table(self) -> str:

@@ -21,7 +21,7 @@ from inercal.units import shown
 
 
 def to_json(estimate: Estimate) -> dict[str, Any]:
-    """The estimate as plain objects, in the order of the contract; what is not finite becomes None."""
+    """The estimate as plain objects, in the order of the contract; numbers that are not finite become None."""
     from inercal import __version__
 
     parameters = [

@@ -45,7 +45,7 @@ SHOWN = 3
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis(Generic[Case]):
-    """What may have happened to a case.
+    """One explanation of the misfit of a case.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Hypothesis(Generic[Case]):
 class Fitted(Generic[Case]):
     """A hypothesis with the ``values`` (m,) of its parameters and their standard uncertainties ``u`` (m,), in SI.
 
-    ``case`` is what is left without it and without what was found beside it; ``alike`` are others equally possible.
+    ``case`` is the case without it and without those fitted beside it; ``alike`` are others equally possible.
     """
 
     hypothesis: Hypothesis[Case]
@@ -113,13 +113,13 @@ class Fitted(Generic[Case]):
 
     @property
     def sentence(self) -> str:
-        """What happened, by how much, and what to do about it."""
+        """The sentence of the finding: fault, size, and remedy."""
         says = self.hypothesis.says
         return says if isinstance(says, str) else says(self)
 
     @property
     def finding(self) -> Finding:
-        """The sentence, with what is equally possible."""
+        """The sentence, with the equally possible ones."""
         others = dict.fromkeys(each.sentence.split(":")[0] for each in self.alike)
         also = f"; as well possible: {'; '.join([*others][:SHOWN])}" if others else ""
         of = self.hypothesis
@@ -127,7 +127,7 @@ class Fitted(Generic[Case]):
 
 
 class Judge(Protocol[AnyCase]):
-    """How well a case fits."""
+    """Fit quality of a case."""
 
     def residuals(self, case: AnyCase) -> Array:
         """Normalised residuals of any shape, always the same; NaN where one does not count."""
@@ -164,10 +164,10 @@ def search(
     judge: Judge[Case],
     risk: float,
     most: int,
-    stated: Hypothesis[Case] | None = None,
+    systematic: Hypothesis[Case] | None = None,
     choose: Callable[[Case, Iterator[Fits[Case]]], Fits[Case] | None] = lambda _, fits: next(fits, None),
 ) -> tuple[Fits[Case], Case]:
-    """Find what happened to a case, one hypothesis after the other, all that were found fitted together.
+    """Find the hypotheses that explain a case, one after the other, all of them fitted together.
 
     Parameters
     ----------
@@ -180,33 +180,33 @@ def search(
         Probability at each step that any hypothesis is found in a sound case.
     most : int
         Steps at most.
-    stated : Hypothesis, optional
-        Errors of what is stated, with their prior: fitted along with all, never found.
+    systematic : Hypothesis, optional
+        Systematic inputs, with their prior: fitted along with all, never a finding.
     choose : callable
         Which fit is taken, the new hypothesis last in each, the likeliest fit first; None to end. The likeliest if
         absent.
 
     Returns
     -------
-    found : list of `Fitted`
+    fitted : list of `Fitted`
     case
-        Without what was found, and with what is stated where it is likeliest.
+        Without the fitted hypotheses, and with the systematic inputs where they are likeliest.
     """
-    found = [] if stated is None else refitted(case, [tried(stated, case)], judge)
-    now = found[-1].case if found else case
+    fitted = [] if systematic is None else refitted(case, [tried(systematic, case)], judge)
+    now = fitted[-1].case if fitted else case
     for _ in range(most):
-        ranked = _ranked(now, table, judge, risk, found)
-        fits = (refitted(case, [*found, tried(each, now)], judge) for each in ranked)
+        ranked = _ranked(now, table, judge, risk, fitted)
+        fits = (refitted(case, [*fitted, tried(each, now)], judge) for each in ranked)
         chosen = choose(now, (each for each in fits if _believed(each[-1])))
         if chosen is None:
             break
         *earlier, last = chosen
         # earlier ones that were taken for a part of this one
-        found = [*(each for each in earlier if each.hypothesis is stated or _clear(each)), last]
-        if len(found) <= len(earlier):
-            found = refitted(case, found, judge)
-        now = found[-1].case
-    return [each for each in found if each.hypothesis is not stated], now
+        fitted = [*(each for each in earlier if each.hypothesis is systematic or _clear(each)), last]
+        if len(fitted) <= len(earlier):
+            fitted = refitted(case, fitted, judge)
+        now = fitted[-1].case
+    return [each for each in fitted if each.hypothesis is not systematic], now
 
 
 def _ranked(
@@ -214,22 +214,22 @@ def _ranked(
     table: Callable[[Case], Iterable[Hypothesis[Case]]],
     judge: Judge[Case],
     risk: float,
-    found: Sequence[Fitted[Case]],
+    fitted: Sequence[Fitted[Case]],
 ) -> list[Hypothesis[Case]]:
-    """Hypotheses that explain more than chance, beside what was found already; the likeliest first."""
-    names = {each.hypothesis.name for each in found}
+    """Hypotheses that explain more than chance beside those already ``fitted``; the likeliest first."""
+    names = {each.hypothesis.name for each in fitted}
     asked = [each for each in table(case) if each.name not in names]
     if not asked:
         return []
     z, share = judge.residuals(case), risk / len(asked)
-    held = [slopes(case, each.hypothesis, z, judge) for each in found]
-    before = _least_squares_of(held, z, found).gained if held else 0.0
+    held = [slopes(case, each.hypothesis, z, judge) for each in fitted]
+    before = _least_squares_of(held, z, fitted).gained if held else 0.0
 
     def surplus(each: Hypothesis[Case]) -> float:
         one = tried(each, case)
         if not each.parameters:
             return judge.misfit(case) - judge.misfit(one.case) - each.chance(share)
-        after = _least_squares_of([*held, slopes(case, each, z, judge)], z, [*found, one])
+        after = _least_squares_of([*held, slopes(case, each, z, judge)], z, [*fitted, one])
         return (after.gained - before) / after.left - each.chance(share)
 
     gains = [surplus(each) for each in asked]
@@ -248,9 +248,9 @@ def _clear(fit: Fitted[Case]) -> bool:
     return not len(fit.values) or bool(np.abs(fit.values / fit.u).max() > CLEAR)
 
 
-def refitted(case: Case, found: Sequence[Fitted[Case]], judge: Judge[Case]) -> Fits[Case]:
+def refitted(case: Case, fitted: Sequence[Fitted[Case]], judge: Judge[Case]) -> Fits[Case]:
     """All hypotheses together by least squares, linearised again where they are large."""
-    fits = list(found)
+    fits = list(fitted)
     now = _without(case, fits)
     ends = np.cumsum([len(each.values) for each in fits])[:-1]
     for _ in range(ROUNDS):
@@ -266,9 +266,9 @@ def refitted(case: Case, found: Sequence[Fitted[Case]], judge: Judge[Case]) -> F
     return [Fitted(each.hypothesis, each.values, each.u, now) for each in fits]
 
 
-def _without(case: Case, found: Sequence[Fitted[Case]]) -> Case:
-    """A case without what was found."""
-    for each in found:
+def _without(case: Case, fitted: Sequence[Fitted[Case]]) -> Case:
+    """A case without the fitted hypotheses."""
+    for each in fitted:
         case = each.hypothesis.without(case, each.values)
     return case
 
@@ -290,10 +290,10 @@ class LeastSquares(NamedTuple):
     gained: float
 
 
-def _least_squares_of(parts: Sequence[Array], z: Array, found: Sequence[Fitted[Case]]) -> LeastSquares:
-    """Least squares of what was found, with its priors."""
-    values = np.concatenate([each.values for each in found])
-    prior = np.concatenate([np.full(len(each.values), each.hypothesis.prior) for each in found])
+def _least_squares_of(parts: Sequence[Array], z: Array, fitted: Sequence[Fitted[Case]]) -> LeastSquares:
+    """Least squares of the fitted hypotheses, with their priors."""
+    values = np.concatenate([each.values for each in fitted])
+    prior = np.concatenate([np.full(len(each.values), each.hypothesis.prior) for each in fitted])
     return least_squares(np.concatenate(parts, axis=-1), z, values, prior)
 
 

@@ -1,4 +1,4 @@
-"""What the data can tell: rank, condition, null vectors and weak combinations, in terms."""
+"""Identifiability from data: rank, condition, null vectors and weak combinations, in terms."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def identify(J: Array, names: Sequence[str], sizes: Array | None = None) -> Iden
 
 @dataclass(frozen=True)
 class Learned:
-    """What data have added to a prior: principal axes of the covariance in units of the prior.
+    """Information of data beside a prior: principal axes of the covariance in units of the prior.
 
     ``left`` (p,) descending, the part of its prior standard deviation that is left of a combination; ``directions``
     (p, p), row i the combination of parameters, each over its own prior, that belongs to part i; ``ratio`` (p,) the
@@ -138,7 +138,7 @@ class Learned:
 
 
 def learned(covariance: Array, prior: Array, names: Sequence[str]) -> Learned:
-    """Set what is known after the data, ``covariance`` (p, p), against ``prior`` (p,) standard deviations."""
+    """Set the ``covariance`` (p, p) after the data against ``prior`` (p,) standard deviations."""
     scaled = covariance / np.outer(prior, prior)
     values, vectors = np.linalg.eigh(scaled)
     # smaller ones are lost in rounding

@@ -63,10 +63,10 @@ def least_squares(A: Array, y: Array, names: Sequence[str], covariance: Array | 
     if y.shape != (n,) or len(names) != p:
         raise ValueError(f"A is {A.shape}, expected y of ({n},) and {p} names")
     Aw, yw = whiten(A, covariance), whiten(y, covariance)
-    known = identify(Aw, names)
-    beta = known.solution(yw)
+    identified = identify(Aw, names)
+    beta = identified.solution(yw)
     chi2 = float(np.sum((yw - Aw @ beta) ** 2))
-    return LinearFit(beta, known.unit_covariance, y - A @ beta, chi2, n - known.rank, known)
+    return LinearFit(beta, identified.unit_covariance, y - A @ beta, chi2, n - identified.rank, identified)
 
 
 def whiten(a: Array, covariance: Array | None) -> Array:

@@ -83,7 +83,7 @@ def solve(
     from scipy.optimize import least_squares
 
     try:
-        found = least_squares(
+        solution = least_squares(
             _finite(residuals), _finite(np.positive)(start), jac=_finite(jacobian), method="lm",
             x_scale=scale, xtol=1e-12, ftol=1e-12,
         )  # fmt: skip
@@ -91,9 +91,9 @@ def solve(
         r = np.asarray(residuals(start), dtype=float)
         J = np.zeros((len(r), len(start)))
         return NonlinearFit(start, r, J, False, str(error), identify(J, names, scale))
-    J = np.asarray(found.jac, dtype=float)
+    J = np.asarray(solution.jac, dtype=float)
     return NonlinearFit(
-        found.x, found.fun, J, found.status > 0, str(found.message), identify(J, names, scale)
+        solution.x, solution.fun, J, solution.status > 0, str(solution.message), identify(J, names, scale)
     )
 
 

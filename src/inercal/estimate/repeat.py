@@ -59,18 +59,18 @@ def mandel_paule(x: Array, variances: Array, dof: Array) -> Combined:
 
     k = len(x)
     size = max(float(np.ptp(x)), float(np.sqrt(np.max(variances)))) or 1.0
-    apart, known = (x - np.mean(x)) / size, variances / size**2
+    apart, within = (x - np.mean(x)) / size, variances / size**2
     floor = 1e-15  # for variances of 0
 
     def surplus(between: float) -> float:
-        weights = 1.0 / (known + between)
+        weights = 1.0 / (within + between)
         mean = weights @ apart / weights.sum()
         return float(weights @ (apart - mean) ** 2) - (k - 1.0)
 
     first = surplus(floor)
     between = float(brentq(surplus, floor, float(k), xtol=1e-15, rtol=1e-12)) if first > 0.0 else 0.0
-    weights = 1.0 / (known + max(between, floor))
-    probability = _welch(1.0 / (known + floor), first + k - 1.0, dof)
+    weights = 1.0 / (within + max(between, floor))
+    probability = _welch(1.0 / (within + floor), first + k - 1.0, dof)
     return Combined(weights / weights.sum(), between * size**2, probability)
 
 
@@ -129,14 +129,14 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
         [np.zeros_like(run.covariance) if run.common is None else run.common for run in sound]
     )
     own = np.array([run.covariance for run in sound]) - elsewhere
-    known = np.mean(elsewhere, axis=0)
+    shared = np.mean(elsewhere, axis=0)
     spread = np.maximum(np.diagonal(own, axis1=1, axis2=2), 0.0)
     alone = _own_dof(sound, spread)
     parts = [mandel_paule(*each) for each in zip(x.T, spread.T, alone.T, strict=True)]
     weights = np.array([part.weights for part in parts]).T
     within = np.einsum("kp,kq,kpq->pq", weights, weights, own)
     between = np.array([part.between for part in parts]) * np.sum(weights**2, axis=0)
-    covariance = known + within + np.diag(between)
+    covariance = shared + within + np.diag(between)
     dof = _dof(alone, weights, spread, np.diag(within) + between, np.diag(covariance))
     names = first.names
     findings = [*_findings(runs), *_changes(first, parts)]
@@ -158,7 +158,7 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
         names,
         first.units,
         np.sum(weights * x, axis=0),
-        Uncertainty(covariance, dof, _budget(sound, np.diag(within), between, np.diag(covariance)), known),
+        Uncertainty(covariance, dof, _budget(sound, np.diag(within), between, np.diag(covariance)), shared),
         (status, message),
         findings=findings,
         statistics={"runs": float(len(sound)), "dof": float(len(sound) - 1)},
@@ -193,20 +193,20 @@ def _dof(dof: Array, weights: Array, spread: Array, type_a: Array, total: Array)
     """Degrees of freedom (p,): k - 1 where a change from run to run was found, else those of the runs together."""
     with np.errstate(divide="ignore", invalid="ignore"):
         pooled = type_a**2 / np.sum((weights**2 * spread) ** 2 / dof, axis=0)
-        found = type_a > 1.000001 * np.sum(weights**2 * spread, axis=0)
-        combined = np.where(found, len(dof) - 1.0, pooled) * (total / type_a) ** 2
+        changed = type_a > 1.000001 * np.sum(weights**2 * spread, axis=0)
+        combined = np.where(changed, len(dof) - 1.0, pooled) * (total / type_a) ** 2
     return np.where(np.isfinite(combined), np.maximum(combined, 1.0), np.inf)
 
 
 def _changes(first: Estimate, parts: Sequence[Combined]) -> list[Finding]:
     """``between_runs``: coefficients that change from run to run beyond chance."""
-    found = []
+    findings = []
     for name, part in zip(first.names, parts, strict=True):
         if part.probability < SIGNIFICANCE / len(parts):
             size = np.sqrt(part.between)
             text = f"{name} changes from run to run, standard deviation {rounded(size, size)[0]} {first[name].unit}"
-            found.append(Finding("between_runs", text))
-    return found
+            findings.append(Finding("between_runs", text))
+    return findings
 
 
 def _budget(runs: Sequence[Estimate], within: Array, between: Array, total: Array) -> tuple[BudgetItem, ...]:
@@ -221,7 +221,7 @@ def _budget(runs: Sequence[Estimate], within: Array, between: Array, total: Arra
         }
 
     def variance(source: str) -> Array:
-        """What a source does, in the mean of the runs."""
+        """The effect of a source in the mean of the runs."""
         each = [
             (run.u**2, item.share)
             for run in runs
@@ -265,15 +265,15 @@ def _row(run: Estimate) -> dict[str, Any]:
 
 def _findings(runs: Sequence[Estimate]) -> tuple[Finding, ...]:
     """The findings of all runs, each with its run; what every run says alike is said once."""
-    said: dict[Finding, list[int]] = {}
+    runs_of: dict[Finding, list[int]] = {}
     for number, run in enumerate(runs, start=1):
         for finding in run.findings:
-            said.setdefault(finding, []).append(number)
+            runs_of.setdefault(finding, []).append(number)
     return tuple(
         finding
         if len(numbers) == len(runs)
         else replace(finding, where=", ".join([run_words(numbers), *filter(None, [finding.where])]))
-        for finding, numbers in said.items()
+        for finding, numbers in runs_of.items()
     )
 
 

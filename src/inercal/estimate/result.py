@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import CalibrationError
-from inercal.estimate.basis import Basis
+from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import BudgetItem, Uncertainty
 from inercal.estimate.rounding import rounded
 from inercal.estimate.shown import budget_shown, in_words, statistics_in_words, units_shown
@@ -96,7 +96,7 @@ class Estimate:
         names: Sequence[str],
         units: Sequence[str],
         values: Array,
-        known: Uncertainty,
+        uncertainty: Uncertainty,
         verdict: tuple[Status, str],
         *,
         findings: Iterable[Finding] = (),
@@ -109,27 +109,27 @@ class Estimate:
         Parameters
         ----------
         basis : Basis
-            What it rests on.
+            Files, study and publications behind it.
         names, units : sequences of str, length p
         values : (p,)
-        known : Uncertainty
+        uncertainty : Uncertainty
             `inercal.estimate.budget.combine` makes it of all sources.
         verdict : Status and str
             Becomes ``suspect`` where it is ``ok`` and a finding does harm.
         findings : iterable of Finding
         statistics, result : mapping
         beside : tuple of str
-            What the result states beside its parameters, and findings may harm: ``theta``.
+            Results beside the parameters that findings may harm: ``theta``.
         """
-        said, (status, message) = judged(verdict, findings, (*names, *beside))
+        marked, (status, message) = judged(verdict, findings, (*names, *beside))
         return cls(
             names=tuple(names),
             units=tuple(units),
             values=values,
-            **known._asdict(),
+            **uncertainty._asdict(),
             status=status,
             message=message,
-            findings=said,
+            findings=marked,
             statistics=statistics or {},
             result=result or {},
             **vars(basis),
@@ -252,6 +252,27 @@ class Estimate:
             ).rstrip()
             for row in rows
         )
+
+
+def without_coefficients(
+    command: str,
+    message: str,
+    result: Mapping[str, Any],
+    inputs: Iterable[Source] = (),
+    findings: Iterable[Finding] = (),
+    timing: Mapping[str, float] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    seed: int | None = None,
+    references: tuple[str, ...] = (),
+) -> Estimate:
+    """The result of a command that estimates no coefficients and ended well.
+
+    ``settings`` are the keys of a study as they were given, for `Estimate.provenance`.
+    """
+    origin = {} if settings is None else {**provenance(settings), "seed": seed}
+    basis = Basis(command, inputs=tuple(inputs), provenance=origin, references=references)
+    estimate = Estimate.without(basis, Status.OK, message, findings=findings, result=result)
+    return replace(estimate, timing=timing or {})
 
 
 def timed(estimate: Estimate, begun: float) -> Estimate:

@@ -9,7 +9,7 @@ from decimal import Decimal
 def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
     """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6).
 
-    A dash stands for NaN: what is not known.
+    A dash stands for NaN, an unknown number.
     """
     if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
         return tuple("–" if math.isnan(x) else f"{x:.6g}" for x in (value, u, *others))

@@ -69,7 +69,7 @@ class RunError(InercalError):
 
 
 class Executor(Protocol):
-    """Where the chunks of a campaign are computed."""
+    """Place in which the chunks of a campaign are computed."""
 
     def map(self, work: Work, chunks: Sequence[range]) -> Finished:
         """Yield every chunk together with ``work(chunk)``, in any order.
@@ -275,7 +275,7 @@ def _join(parts: Mapping[int, Sample], seed: int) -> Sample:
 
 
 def _manifest(task: Task, seed: int, runs: int, chunk: int) -> dict[str, str | int]:
-    """What makes two campaigns the same, as far as their files are concerned."""
+    """Identity of a campaign in its files."""
     named = task.func if isinstance(task, partial) else task
     name = f"{named.__module__}.{getattr(named, '__qualname__', type(named).__qualname__)}"
     try:
@@ -305,12 +305,12 @@ def _open(folder: Path, manifest: dict[str, str | int]) -> None:
         write_bytes(path, json.dumps(manifest, indent=2).encode())
         return
     try:
-        found = dict(json.loads(path.read_bytes()))
+        stored = dict(json.loads(path.read_bytes()))
     except (ValueError, TypeError) as error:
         raise InputError(path, f"cannot be read ({error}), expected the manifest of a campaign") from error
-    differing = [key for key in manifest if found.get(key) != manifest[key]]
+    differing = [key for key in manifest if stored.get(key) != manifest[key]]
     if differing:
-        got, expected = ({key: d.get(key) for key in differing} for d in (found, manifest))
+        got, expected = ({key: d.get(key) for key in differing} for d in (stored, manifest))
         raise InputError(path, f"belongs to another campaign, with {got}, expected {expected}")
 
 

@@ -43,28 +43,28 @@ def budget_shown(command: str, budget: tuple[BudgetItem, ...]) -> tuple[BudgetIt
 
 def statistics_in_words(statistics: Mapping[str, float], result: Mapping[str, Any]) -> dict[str, float]:
     """Statistics of a filter under keys for people, and what a row cost; those of a fit keep their keys."""
-    told = dict(statistics)
-    if "nis_mean" in told:
-        told = {_STATISTICS.get(key, key): value for key, value in told.items()}
+    words = dict(statistics)
+    if "nis_mean" in words:
+        words = {_STATISTICS.get(key, key): value for key, value in words.items()}
     if "step_us" in result:
-        told["time of a row_us"] = result["step_us"]
-        told["time of a row, of the sample interval_percent"] = 100.0 * result["sample_share"]
-    return told
+        words["time of a row_us"] = result["step_us"]
+        words["time of a row, of the sample interval_percent"] = 100.0 * result["sample_share"]
+    return words
 
 
 def in_words(conditions: Mapping[str, Any]) -> dict[str, Any]:
     """Nested conditions for people: a temperature as text, angles and rates in degrees, which their keys then say."""
-    told: dict[str, Any] = {}
+    words: dict[str, Any] = {}
     for key, value in conditions.items():
         if key == "temperature":
-            told[key] = temperature(value)
+            words[key] = temperature(value)
         elif isinstance(value, Mapping):
-            told[key] = in_words(value)
+            words[key] = in_words(value)
         elif key.endswith(("_rad", "_rad_s")) and value is not None:
-            told[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
+            words[key.replace("_rad", "_deg")] = np.degrees(value).tolist()
         else:
-            told[key] = value
-    return told
+            words[key] = value
+    return words
 
 
 def temperature(value: Mapping[str, Any] | str | None) -> str | None:

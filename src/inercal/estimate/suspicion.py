@@ -1,4 +1,4 @@
-"""Whether a result may be off by more than its u: the status ``suspect`` arises here and nowhere else."""
+"""Suspect results, which may be off by more than their u: the status arises here and nowhere else."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def judged(
 
 def harmed(harm: tuple[str, ...], names: tuple[str, ...]) -> tuple[str, ...]:
     """Those of ``names`` that a finding harms, in their order."""
-    found = set[str]()
+    affected = set[str]()
     for each in harm:
         if each in names:
-            found.add(each)
+            affected.add(each)
         else:
-            found.update(names if (each,) == EVERYTHING else resting_on(each, names))
-    return tuple(name for name in names if name in found)
+            affected.update(names if (each,) == EVERYTHING else resting_on(each, names))
+    return tuple(name for name in names if name in affected)

@@ -46,52 +46,55 @@ def calibrate(
     """
     record = one_run(records, ONE_RUN)
 
-    def run(given: Record, settings: AoaSettings, said: Progress) -> task.Measurement:
-        return task.measure(given, settings, methods, compare, said)
+    def run(given: Record, settings: AoaSettings, say: Progress) -> task.Measurement:
+        return task.measure(given, settings, methods, compare, say)
 
     return _result(calibrations([record], study, progress, run)[0], by_point)
 
 
-def _result(found: task.Measurement, by_point: bool) -> Result:
+def _result(measurement: task.Measurement, by_point: bool) -> Result:
     """A measurement as a result."""
     from inercal.aoa.result.columns import angles_record, points_record
     from inercal.aoa.result.display import delays, displayed, rest_of_fit, use_of_fit
     from inercal.aoa.result.tables import answer, on_terminal
 
-    estimate, angles = found.estimate, found.angles
+    estimate, angles = measurement.estimate, measurement.angles
 
     def tables() -> list[str]:
-        listed = [*answer(estimate, found.points if by_point else (), found.settings), *on_terminal(estimate)]
+        listed = [
+            *answer(estimate, measurement.points if by_point else (), measurement.settings),
+            *on_terminal(estimate),
+        ]
         words = [rest_of_fit(estimate), delays(estimate), use_of_fit(estimate)]
         return [*(f"{table.title}\n{table.text()}" for table in listed), *words]
 
     def page() -> str:
         from inercal.aoa import figures
 
-        return figures.page(found)
+        return figures.page(measurement)
 
     def rows() -> Record:
         if by_point:
-            return points_record(found.points, found.recording, found.settings)
-        return angles_record(found.recording, angles, found.settings)
+            return points_record(measurement.points, measurement.recording, measurement.settings)
+        return angles_record(measurement.recording, angles, measurement.settings)
 
     def picture() -> Picture:
         from inercal.aoa import figures
 
-        return figures.main(found)
+        return figures.main(measurement)
 
     view = View(displayed(estimate), _answer(estimate.result), tables, page, picture, rows)
-    return Result(estimate, view, found)
+    return Result(estimate, view, measurement)
 
 
-def _answer(told: dict[str, Any] | Any) -> str:
+def _answer(result: dict[str, Any] | Any) -> str:
     """The range of the angle and its uncertainty, in a line."""
-    ends, u = told["angle"]["range"], told["angle"]["u"]["median"]
+    ends, u = result["angle"]["range"], result["angle"]["u"]["median"]
     if ends is None:
         return "no angles"
     low, high = np.degrees(ends)
-    known = "" if u is None else f", u {np.degrees(u):.2g} deg (median)"
-    return f"theta from {low:.4g} to {high:.4g} deg{known}, by {told['method']}"
+    u_words = "" if u is None else f", u {np.degrees(u):.2g} deg (median)"
+    return f"theta from {low:.4g} to {high:.4g} deg{u_words}, by {result['method']}"
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:

@@ -29,8 +29,8 @@ def calibrate(
     from inercal.estimate.repeat import combine_runs
     from inercal.face.runs import calibrations, with_span
 
-    found = calibrations(records, study, progress, calibrate_run)
-    runs = [each.estimate for each in found]
+    calibrated = calibrations(records, study, progress, calibrate_run)
+    runs = [each.estimate for each in calibrated]
     estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
     shown = estimate.shown()
 
@@ -39,15 +39,17 @@ def calibrate(
         from inercal.report.coefficients import repeats
         from inercal.report.html import render
 
-        if len(found) == 1:
-            return figures.page(found[0])
+        if len(calibrated) == 1:
+            return figures.page(calibrated[0])
         return render(shown, repeats(shown), "Calibration of an inertial measurement unit")
 
-    return Result(estimate, of_coefficients(shown, page), found[0] if len(found) == 1 else tuple(found))
+    return Result(
+        estimate, of_coefficients(shown, page), calibrated[0] if len(calibrated) == 1 else tuple(calibrated)
+    )
 
 
 def of_temperature(model: TemperatureModel) -> Result:
-    """What a sensor does with temperature, as a result."""
+    """The temperature model of a sensor as a result."""
     from inercal.report.html import render
 
     def page() -> str:
@@ -84,9 +86,9 @@ def loaded(estimate: Estimate) -> Result:
     from inercal.report.html import render
 
     def page() -> str:
-        drawn = [correlation(shown)] if len(estimate.names) > 1 else []
-        drawn += [budget(shown)] if estimate.names and estimate.budget else []
-        return render(shown, drawn, f"inercal {estimate.command}")
+        pictures = [correlation(shown)] if len(estimate.names) > 1 else []
+        pictures += [budget(shown)] if estimate.names and estimate.budget else []
+        return render(shown, pictures, f"inercal {estimate.command}")
 
     shown = estimate.shown()
     return Result(estimate, of_coefficients(shown, page))

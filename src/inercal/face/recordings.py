@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from inercal.records.maps import RecordMap
 
 GIVEN = Source("arrays", "")
-"""What a record of arrays says of where it comes from."""
+"""Source of a record of arrays."""
 
 _SI = {"acc": "m/s^2", "a": "m/s^2", "gyro": "rad/s", "wc": "rad/s", "rate": "rad/s", "y": "rad/s"}
 _SI |= {"phi": "rad", "th": "rad", "theta": "rad", "temperature": "degC"}
@@ -38,7 +38,7 @@ def read(
     begin: str | float | None = None,
     end: str | float | None = None,
 ) -> Record:
-    """Read one or several files into a record, and say what is suspicious about them.
+    """Read one or several files into a record, with findings about whatever is suspicious.
 
     Parameters
     ----------
@@ -157,13 +157,13 @@ def _of_table(table: Any) -> Iterator[tuple[str, ArrayLike, str | None]]:
     if not hasattr(table, "keys"):
         kind = type(table).__name__
         raise RecordError("record", f"found {kind}, expected a DataFrame, a Dataset, or arrays by keyword")
-    known = 0
+    numeric = 0
     for title in table.keys():  # noqa: SIM118  (of a DataFrame too)
         name, unit = titled(str(title))
         if is_channel(name) or _is_triad(name):
-            known += 1
+            numeric += 1
             yield name, np.asarray(table[title]), unit
-    if not known:
+    if not numeric:
         names = ", ".join(str(title) for title in list(table.keys())[:8]) or "none"
         raise RecordError("record", f'found the columns {names}, expected channels such as "acc_x [m/s^2]"')
 
@@ -223,10 +223,10 @@ def _time(t: ArrayLike | None, rate: float | str | None, rows: int, unit: str | 
         stamps = np.asarray(t, dtype=float)
         if stamps.ndim != 1:
             raise RecordError("record", f"t: found the shape {stamps.shape}, expected (n,)")
-        known = parse_unit(unit or "s", "t")
-        if problem := misfit("t", known):
+        time_unit = parse_unit(unit or "s", "t")
+        if problem := misfit("t", time_unit):
             raise RecordError("record", f"t: {problem}")
-        return np.ascontiguousarray(stamps * known.factor) if known.factor != 1.0 else stamps
+        return np.ascontiguousarray(stamps * time_unit.factor) if time_unit.factor != 1.0 else stamps
     if rate is None:
         raise RecordError("record", 'found no time, expected t=(n,) in seconds or rate="100 Hz"')
     hertz = parse_quantity(rate, "frequency", "rate").value if isinstance(rate, str) else float(rate)
@@ -241,10 +241,10 @@ def _column(name: str, values: Array, unit: str | None, t: Array) -> Column:
         raise RecordError(
             "record", f"{name}: found {len(values)} values, expected {len(t)} as there are times"
         )
-    known = _unit(name, unit)
-    if problem := misfit(name, known):
+    column_unit = _unit(name, unit)
+    if problem := misfit(name, column_unit):
         raise RecordError("record", f"{name}: {problem}")
-    return Column(name, known, np.ascontiguousarray(values), t, GIVEN)
+    return Column(name, column_unit, np.ascontiguousarray(values), t, GIVEN)
 
 
 def _unit(name: str, unit: str | None) -> Unit:
@@ -262,9 +262,9 @@ def _sensor(name: str) -> str:
 
 def _known(units: Mapping[str, str], names: Sequence[str]) -> None:
     """Refuse a unit of something that is not in the record."""
-    known = {*names, *map(_sensor, names)}
+    channels = {*names, *map(_sensor, names)}
     for name in units:
-        if name not in known:
+        if name not in channels:
             raise RecordError(
                 "record", f"units: found {name}, expected one of {', '.join(names)}, or their sensor"
             )

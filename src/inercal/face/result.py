@@ -1,4 +1,4 @@
-"""What the verbs give back: an estimate with its evidence, ready to be looked at, saved and handed on."""
+"""Results of the verbs: an estimate with its evidence, ready to be looked at, saved and handed on."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How a result is shown, to everyone who looks: at a prompt, in a notebook, in a terminal, on a page.
+    """View of a result at a prompt, in a notebook, in a terminal, on a page.
 
     ``shown`` is the estimate in the units of the command line; ``answer`` says the main number in a line; ``tables``
     are those that the command prints; ``page`` is its report; ``picture`` is the one that answers the question;
@@ -45,7 +45,7 @@ class View:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """What was found: an ``estimate`` in SI, and the ``evidence`` behind it for whoever wants to look deeper.
+    """A result: an ``estimate`` in SI, and the ``evidence`` behind it for whoever wants to look deeper.
 
     Whatever people look at (`repr`, `table`, `plot`, `report`, ``result["K1_x"]``) is in the units of the command
     line, and names them; ``values`` and ``estimate`` are in SI.
@@ -67,7 +67,7 @@ class Result:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is to be known about the recording and the result."""
+        """Findings about the recording and the result."""
         return self.estimate.findings
 
     @property
@@ -91,8 +91,8 @@ class Result:
         if name in self.estimate.names:
             return self.view.shown[name]
         near = difflib.get_close_matches(str(name), self.names, n=1, cutoff=0.4)
-        known = f"found {', '.join(self.names[:12])}" if self.names else "there are none"
-        raise InputError(repr(name), f"no such coefficient, {f'did you mean {near[0]}?' if near else known}")
+        others = f"found {', '.join(self.names[:12])}" if self.names else "there are none"
+        raise InputError(repr(name), f"no such coefficient, {f'did you mean {near[0]}?' if near else others}")
 
     def __contains__(self, name: str) -> bool:
         """True if there is such a coefficient."""
@@ -180,7 +180,7 @@ class Result:
             raise MissingExtraError("Result.to_xarray", "xarray") from error
         of, names = self.estimate, list(self.names)
         each = ("parameter",)
-        known = xarray.Dataset(
+        dataset = xarray.Dataset(
             {
                 "value": (each, of.values),
                 "u": (each, of.u),
@@ -192,9 +192,9 @@ class Result:
             attrs={"command": of.command, "status": of.status.value, "message": of.message},
         )
         return (
-            known
+            dataset
             if self.view.rows is None
-            else known.merge(self.view.rows().to_xarray(), combine_attrs="override")
+            else dataset.merge(self.view.rows().to_xarray(), combine_attrs="override")
         )
 
     def __repr__(self) -> str:
@@ -216,18 +216,18 @@ class Result:
         """For a notebook: the verdict, the picture, the table."""
         picture = self.view.picture()
         mood = {Status.OK: "#2E7D4F", Status.ILL_CONDITIONED: "#B07A00"}.get(self.status, "#C03A2B")
-        told = "".join(
+        items = "".join(
             f"<li><code>{html.escape(each.code)}</code> {html.escape(each.message)}</li>"
             for each in self.findings
         )
         findings = (
-            f"<details><summary>{counted(len(self.findings), 'finding')}</summary><ul>{told}</ul></details>"
+            f"<details><summary>{counted(len(self.findings), 'finding')}</summary><ul>{items}</ul></details>"
         )
         return (
             f'<div style="max-width:52em"><p style="margin:.4em 0"><strong style="color:{mood}">'
             f"{self.status.value}</strong>: {html.escape(self.message)}</p>"
             f'<img src="{picture.uri}" alt="{html.escape(self.view.answer)}" style="max-width:100%">'
-            f"{self._rows_as_html()}{findings if told else ''}</div>"
+            f"{self._rows_as_html()}{findings if items else ''}</div>"
         )
 
     def _rows_as_html(self) -> str:
@@ -262,8 +262,10 @@ def coefficients(shown: Estimate) -> str:
         return "no coefficients"
     value, U = rounded(first.value, first.u, first.U)[::2]
     unit = "" if first.unit == "1" else f" {first.unit}"
-    known = f"{first.name} = {value} ± {U}{unit}" if np.isfinite(first.u) else f"{first.name} = {value}{unit}"
-    return f"{counted(len(shown.names), 'coefficient')}, the first {known} (± U, k = {first.k:.2f})"
+    first_text = (
+        f"{first.name} = {value} ± {U}{unit}" if np.isfinite(first.u) else f"{first.name} = {value}{unit}"
+    )
+    return f"{counted(len(shown.names), 'coefficient')}, the first {first_text} (± U, k = {first.k:.2f})"
 
 
 def _cut(text: str) -> str:

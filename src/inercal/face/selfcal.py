@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import InputError
+from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, with_span, without_coefficients
+from inercal.face.runs import Progress, calibrations, with_span
 from inercal.face.study import Study
 from inercal.records.record import Record
 from inercal.selfcal import task
@@ -38,38 +39,38 @@ def calibrate(
     if len(records) > 1 and compare:
         raise InputError("compare", f"found {len(records)} runs, expected one")
 
-    def run(record: Record, settings: SelfcalSettings, said: Progress) -> task.Calibration:
-        return task.calibrate(record, settings, compare, said)
+    def run(record: Record, settings: SelfcalSettings, say: Progress) -> task.Calibration:
+        return task.calibrate(record, settings, compare, say)
 
-    found = calibrations(records, study, progress, run)
-    return _one(found[0]) if len(found) == 1 else _repeated(found, records)
+    calibrated = calibrations(records, study, progress, run)
+    return _one(calibrated[0]) if len(calibrated) == 1 else _repeated(calibrated, records)
 
 
-def _one(found: task.Calibration) -> Result:
+def _one(calibration: task.Calibration) -> Result:
     """The result of one run."""
     from inercal.selfcal.result.columns import history_record
 
     def page() -> str:
         from inercal.selfcal import figures
 
-        return figures.page(found)
+        return figures.page(calibration)
 
     def more() -> list[str]:
-        return [f"{table.title}\n{table.text()}" for table in task.compared(found)]
+        return [f"{table.title}\n{table.text()}" for table in task.compared(calibration)]
 
     def rows() -> Record:
-        return history_record(found.filtered, found.recording, found.problem.world)
+        return history_record(calibration.filtered, calibration.recording, calibration.problem.world)
 
-    kept = found.filtered.history is not None
-    view = of_coefficients(found.estimate.shown(), page, more)
-    return Result(found.estimate, replace(view, rows=rows if kept else None), found)
+    kept = calibration.filtered.history is not None
+    view = of_coefficients(calibration.estimate.shown(), page, more)
+    return Result(calibration.estimate, replace(view, rows=rows if kept else None), calibration)
 
 
-def _repeated(found: Sequence[task.Calibration], records: Sequence[Record]) -> Result:
-    """What repeat runs say together."""
+def _repeated(calibrated: Sequence[task.Calibration], records: Sequence[Record]) -> Result:
+    """The estimate of repeat runs together."""
     from inercal.estimate.repeat import combine_runs
 
-    runs = [each.estimate for each in found]
+    runs = [each.estimate for each in calibrated]
     estimate = combine_runs(runs)
     shown = estimate.shown()
 
@@ -79,7 +80,7 @@ def _repeated(found: Sequence[task.Calibration], records: Sequence[Record]) -> R
 
         return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")
 
-    return Result(with_span(estimate, records[0]), of_coefficients(shown, page), tuple(found))
+    return Result(with_span(estimate, records[0]), of_coefficients(shown, page), tuple(calibrated))
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:
@@ -104,6 +105,7 @@ def prepare_design(study: Study) -> None:
 
 def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
     """Find the path that calibrates best; ``evidence`` is the `inercal.selfcal.before.path_design.Designed`."""
+    from inercal.records.read import source_of
     from inercal.selfcal.before.path_design import REFERENCES
     from inercal.selfcal.before.path_design import design as search
 
@@ -112,7 +114,14 @@ def design(study: Study, progress: Callable[[int, int], None] | None = None) -> 
         designed = search(study.settings, *(() if progress is None else (progress,)))
     timing = {"solve": time.perf_counter() - clock}
     result = without_coefficients(
-        "design selfcal", designed.message, designed.result, study, designed.findings, timing, REFERENCES
+        "design selfcal",
+        designed.message,
+        designed.result,
+        map(source_of, study.files),
+        designed.findings,
+        timing,
+        study.keys,
+        references=REFERENCES,
     )
 
     def page() -> str:

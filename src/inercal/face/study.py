@@ -24,7 +24,7 @@ _LOAD = {
     "selfcal": "load_selfcal_study",
     "aoa": "load_aoa_study",
 }
-"""What reads the file of each kind, in `inercal.studies.load`."""
+"""Reader of the file of each kind, in `inercal.studies.load`."""
 
 _SITE = ("latitude", "height", "gravity")
 """Keys of the table [site] that may stand alone."""
@@ -35,7 +35,7 @@ _UNREAD = {"aoa": "motion"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """What a task is told: its ``kind``, and its ``settings`` in SI, frozen.
+    """A study: its ``kind``, and its ``settings`` in SI, frozen.
 
     ``path`` is the file that it was read from, None of a study by keywords; ``keys`` are the keys that were given, as
     they were typed; ``files`` are the study and the files that it names.
@@ -66,7 +66,7 @@ class Study:
 
     @contextmanager
     def at_fault(self) -> Iterator[None]:
-        """Name the study where a task finds fault with a key of it; what is wrong with a recording stays as it is."""
+        """Name the study where a task refuses a key of it; refusals of a recording stay as they are."""
         try:
             yield
         except InputError as error:

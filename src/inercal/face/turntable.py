@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, one_run, without_coefficients
+from inercal.face.runs import Progress, calibrations, one_run
 from inercal.face.study import Study
 from inercal.records.record import Record
 from inercal.turntable import task
@@ -27,19 +28,19 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
     record = one_run(records, "calibrate each by itself")
-    found: Any = calibrations([record], study, progress, task.calibrate)[0]
+    calibration: Any = calibrations([record], study, progress, task.calibrate)[0]
 
     def page() -> str:
         from inercal.turntable import figures
 
-        return figures.page(found)
+        return figures.page(calibration)
 
     def more() -> list[str]:
         from inercal.turntable.display import tolerances
 
-        return [tolerances(found.estimate)]
+        return [tolerances(calibration.estimate)]
 
-    return Result(found.estimate, of_coefficients(found.shown, page, more), found)
+    return Result(calibration.estimate, of_coefficients(calibration.shown, page, more), calibration)
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:
@@ -50,6 +51,7 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 
 def design(study: Study, progress: Progress = lambda _: None) -> Result:
     """Find the positions that calibrate best; ``evidence`` is the `inercal.turntable.positions.planning.Designed`."""
+    from inercal.records.read import source_of
     from inercal.turntable.positions.planning import REFERENCES
     from inercal.turntable.positions.planning import design as planned
 
@@ -58,7 +60,14 @@ def design(study: Study, progress: Progress = lambda _: None) -> Result:
         designed = planned(study.settings, progress)
     timing = {"solve": time.perf_counter() - clock}
     result = without_coefficients(
-        "design positions", designed.message, designed.result, study, designed.findings, timing, REFERENCES
+        "design positions",
+        designed.message,
+        designed.result,
+        map(source_of, study.files),
+        designed.findings,
+        timing,
+        study.keys,
+        references=REFERENCES,
     )
 
     def page() -> str:
@@ -83,8 +92,9 @@ def sensitivity(
 ) -> Result:
     """Which error of the table matters; ``evidence`` is the `inercal.turntable.sensitivity.analysis.Analysed`.
 
-    Without ``maps`` indices of each position may be left out; ``say`` is told of what takes long.
+    Without ``maps`` indices of each position may be left out; ``say`` takes messages about long steps.
     """
+    from inercal.records.read import source_of
     from inercal.turntable.sensitivity.analysis import analyse, result, table
 
     with study.at_fault():
@@ -93,8 +103,9 @@ def sensitivity(
         "sensitivity",
         analysed.message,
         result(analysed),
-        study,
+        map(source_of, study.files),
         timing={"solve": analysed.solve},
+        settings=study.keys,
         references=analysed.references,
     )
 

@@ -43,7 +43,7 @@ def calibrate(
     compare : bool
         Also run the other estimators of a platform, or the other methods of an angle of attack.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Returns
     -------
@@ -73,20 +73,22 @@ def calibrate(
     keys = {"latitude": latitude, "height": height, "gravity": gravity, "method": method}
     given = {key: value for key, value in keys.items() if value is not None}
     if study is None:
-        told = _imu_study(runs[0], given)
+        study = _imu_study(runs[0], given)
     elif given:
         raise StudyError(
             next(iter(given)), "found beside a study, expected it there, as by ic.study(path, ...)"
         )
     else:
-        told = study_of(study)
-    system = import_module(f"inercal.face.{told.kind}")
+        study = study_of(study)
+    system = import_module(f"inercal.face.{study.kind}")
     if hasattr(system, "prepare"):
-        system.prepare(told, compare)
+        system.prepare(study, compare)
     elif compare:
-        raise InputError("compare", f"found with a study of kind {told.kind}, expected one of selfcal or aoa")
-    found: Result = system.calibrate(runs, told, compare, progress)
-    return found
+        raise InputError(
+            "compare", f"found with a study of kind {study.kind}, expected one of selfcal or aoa"
+        )
+    result: Result = system.calibrate(runs, study, compare, progress)
+    return result
 
 
 def _imu_study(record: Record, given: dict[str, str]) -> Study:
@@ -125,10 +127,10 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
     >>> list(record.columns)[:3]
     ['wc_x', 'wc_y', 'wc_z']
     """
-    told = study_of(study)
+    study = study_of(study)
     if not isinstance(rng, np.random.Generator):
         raise InputError("rng", f"found {type(rng).__name__}, expected numpy.random.default_rng(seed)")
-    made: Record = _of_system(told, "simulate", "turntable, selfcal or aoa")(told, rng)
+    made: Record = _of_system(study, "simulate", "turntable, selfcal or aoa")(study, rng)
     return made
 
 
@@ -144,7 +146,7 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     Returns
     -------
     Result
-        Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is what was found.
+        Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is the best plan.
 
     Raises
     ------
@@ -159,23 +161,25 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     >>> len(ic.design(table, "positions").evidence.plan)
     12
     """
-    told = study_of(study)
+    study = study_of(study)
     kinds = {"positions": "turntable", "selfcal": "selfcal"}
-    if what is not None and kinds.get(what) != told.kind:
+    if what is not None and kinds.get(what) != study.kind:
         raise InputError(
-            "design", f"found {what!r} of a study of kind {told.kind}, expected {_designs(told.kind)}"
+            "design", f"found {what!r} of a study of kind {study.kind}, expected {_designs(study.kind)}"
         )
-    if told.kind not in kinds.values():
-        raise InputError("design", f"found a study of kind {told.kind}, expected one of turntable or selfcal")
-    system = import_module(f"inercal.face.{told.kind}")
-    if told.kind == "selfcal":
-        system.prepare_design(told)
-    found: Result = system.design(told)
-    return found
+    if study.kind not in kinds.values():
+        raise InputError(
+            "design", f"found a study of kind {study.kind}, expected one of turntable or selfcal"
+        )
+    system = import_module(f"inercal.face.{study.kind}")
+    if study.kind == "selfcal":
+        system.prepare_design(study)
+    result: Result = system.design(study)
+    return result
 
 
 def _designs(kind: str) -> str:
-    """What can be designed of a kind."""
+    """The designs of a kind, in words."""
     return {"turntable": "'positions'", "selfcal": "'selfcal'"}.get(
         kind, "a study of kind turntable or selfcal"
     )
@@ -202,17 +206,17 @@ def sensitivity(study: Study | str | Path) -> Result:
     >>> print(ic.sensitivity(table).table().splitlines()[0].split())
     ['S', 'ST', 'S', 'ax', 'S', 'ay', 'S', 'az', 'S', 'wx', 'S', 'wy']
     """
-    told = study_of(study)
-    found: Result = _of_system(told, "sensitivity", "turntable")(told)
-    return found
+    study = study_of(study)
+    result: Result = _of_system(study, "sensitivity", "turntable")(study)
+    return result
 
 
-def _of_system(told: Study, verb: str, expected: str) -> Callable[..., Any]:
-    """What does it for the kind of a study; raises `InputError` where nothing does."""
-    found: Callable[..., Any] | None = getattr(import_module(f"inercal.face.{told.kind}"), verb, None)
-    if found is None:
-        raise InputError(verb, f"found a study of kind {told.kind}, expected one of {expected}")
-    return found
+def _of_system(study: Study, verb: str, expected: str) -> Callable[..., Any]:
+    """The function of a verb for the kind of a study; raises `InputError` where there is none."""
+    function: Callable[..., Any] | None = getattr(import_module(f"inercal.face.{study.kind}"), verb, None)
+    if function is None:
+        raise InputError(verb, f"found a study of kind {study.kind}, expected one of {expected}")
+    return function
 
 
 def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 25.0) -> Result:

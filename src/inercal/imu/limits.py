@@ -55,7 +55,7 @@ class Limits:
     """Variance of an output, over that of the calm parts, below which the instrument is held still."""
 
     calm_quantile: float = 0.2
-    """Quantile of the windowed variance that stands for rest: holds are more than a fifth of such a recording."""
+    """Quantile of the windowed variance that stands for rest: holds are more than a fifth of a recording."""
 
     upright_cosine: float = 0.9
     """Cosine of the largest angle from upright (26 deg) in a hold that counts as a position."""
@@ -108,7 +108,7 @@ class Limits:
     """Deviation, over its standard uncertainty, beyond which a motion was not the turn."""
 
     turn_chi2: float = 16.0
-    """Difference of the squares of such deviations from which the motion with the larger one is not chosen."""
+    """Difference of the squared deviations from which the motion with the larger one is not chosen."""
 
     slight_turn_difference: float = 1e-3
     """Difference of two motions, as a part of the turn, that needs no finding."""

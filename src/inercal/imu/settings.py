@@ -1,15 +1,19 @@
-"""What a calibration of an IMU is told."""
+"""Settings of a calibration of an IMU, and those of its methods, in SI."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from inercal.arrays import Array
 from inercal.geometry.site import Site
-from inercal.imu.aided_settings import AidedSettings
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.keys import RELATIVE_U, TIME, option, quantity
+from inercal.keys import RELATIVE_U, TIME, Bounds, option, quantity, within
+from inercal.rigs.chain import Chain
 from inercal.units import Quantity
 
 MASKED = ("saturation",)
@@ -17,6 +21,58 @@ MASKED = ("saturation",)
 
 COMMAND = "calibrate imu"
 """The command behind every method of this room, as its results have it."""
+
+_TURN = Bounds(
+    lambda angle: math.radians(10.0) <= abs(angle) <= math.radians(36000.0),
+    "an angle of 10 deg to 36000 deg, negative for turns against the right-hand rule",
+)
+
+
+@dataclass(frozen=True)
+class FerrarisSettings:
+    """Options of the Ferraris calibration: six positions, each axis up and down, and a turn about each axis.
+
+    Attributes
+    ----------
+    turn, alignment
+        As their keys say [rad]; independent from turn to turn, and from position to position in either of the two
+        directions across it.
+    turn_u : float
+        Standard uncertainty of ``turn`` [rad].
+    sections : mapping
+        Where the sections are, by name: (start, end) in seconds of the record's time axis as floats, or in samples
+        (from 0, the end not included) as integers, or the label of its rows. Empty: from the labels of the record
+        that are names of sections, or detected.
+    """
+
+    turn: float = quantity(
+        "angle of the turns, positive about the positive axis by the right-hand rule, perhaps with its standard "
+        "uncertainty", "angle", "360 deg", example="360(0.5) deg", bounds=_TURN, u="turn_u",
+    )  # fmt: skip
+    turn_u: float = 0.0
+    alignment: float | None = quantity(
+        "standard uncertainty of the direction of each position and of the axis of each turn; from the scatter of the "
+        "positions if absent", "angle", example="0.5 deg",
+        bounds=within(0.0, math.radians(20.0), "a standard uncertainty up to 20 deg"),
+    )  # fmt: skip
+    sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class AidedSettings:
+    """Options of a reference-aided calibration, in SI.
+
+    Attributes
+    ----------
+    chain : Chain
+        The table from n (north, west, up) to the nominal axes of the instrument, with its errors; its joints are
+        columns of the record. Errors of scope ``sample`` are left to the scatter of the data.
+    azimuth_u : float or None
+        Standard uncertainty [rad] of the azimuth in the chain's base; None: the azimuth is not known.
+    """
+
+    chain: Chain = field()
+    azimuth_u: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,3 +110,27 @@ class ImuSettings:
     method: FerrarisSettings | AidedSettings | None = None
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
+
+
+def mounting_of(axes: tuple[str, str, str]) -> Array | None:
+    """Rotation (3, 3) whose columns are the instrument's x, y, z in the frame of the inner axis.
+
+    Parameters
+    ----------
+    axes : three of ``+x -x +y -y +z -z``
+        The axis of the table, at zero angles, along which each axis of the instrument points.
+
+    Returns
+    -------
+    (3, 3), or None where the three make no right-handed frame
+    """
+    columns = [float(f"{axis[0]}1") * np.eye(3)["xyz".index(axis[1])] for axis in axes]
+    rotation = np.stack(columns, axis=1)
+    return rotation if np.linalg.det(rotation) > 0.5 else None
+
+
+def mountings() -> dict[tuple[str, ...], Array]:
+    """The 24 ways to mount an instrument square on a table, as rotations by axes."""
+    axes = [f"{sign}{axis}" for axis in "xyz" for sign in "+-"]
+    made = {each: mounting_of((each[0], each[1], each[2])) for each in itertools.permutations(axes, 3)}
+    return {each: rotation for each, rotation in made.items() if rotation is not None}

@@ -7,9 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from inercal.findings import Finding
-from inercal.imu.aided_settings import AidedSettings
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import AidedSettings, FerrarisSettings, ImuSettings
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
@@ -33,7 +31,7 @@ def calibrate(
     settings : ImuSettings
         Site and options; ``settings.method`` are those of a method other than multi-position.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Returns
     -------

@@ -45,8 +45,8 @@ class NoiseCoefficients:
     ``values`` (p,), ``covariance`` (p, p) and ``dof`` (p,) belong to ``names``, units those of the samples and
     seconds; value ± Student t at that dof times u is the coverage interval. ``bounds`` gives each coefficient that
     was looked for and not seen its upper limit (one-sided, 95 %). ``fit_range`` (shortest, longest averaging time
-    used) [s]; ``chi2`` and ``chi2_dof`` the squared residuals in units of their covariance; ``findings`` what is to
-    be said of the fit.
+    used) [s]; ``chi2`` and ``chi2_dof`` the squared residuals in units of their covariance; ``findings`` are
+    about the fit.
     """
 
     names: tuple[str, ...]

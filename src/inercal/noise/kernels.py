@@ -47,7 +47,7 @@ def mean_square_with_gaps(
 ) -> tuple[float, int, float, float]:
     """The same of D, m times the difference of adjacent means over the samples present, and how many there are.
 
-    And what it is expected to be of white samples of variance 1, and of differences of such (quantisation): each run
+    Also its expectations for white samples of variance 1 and for their differences (quantisation): each run
     of present samples within a mean has two ends that no neighbour cancels, of weight 1 in m over those present; where
     a run goes on into the other mean, its ends there add up.
 

@@ -107,7 +107,7 @@ def noise_of(record: Record) -> Noise:
     noise_coefficients(allan_deviation(np.sin(np.arange(64.0) ** 2), 1.0))  # loads or compiles kernels
     clock = time.perf_counter()
     channels: list[ChannelNoise] = []
-    said: dict[tuple[str, str], list[str]] = {}
+    channels_of: dict[tuple[str, str], list[str]] = {}
     findings: list[Finding] = []
     disturbed: dict[str, Unrest] = {}
     for columns in groups:
@@ -116,15 +116,15 @@ def noise_of(record: Record) -> Noise:
         for at, column in enumerate(columns):
             fit, own = _fitted(curve, at)
             for each in own:
-                said.setdefault((each.code, each.message), []).append(column.name)
+                channels_of.setdefault((each.code, each.message), []).append(column.name)
             channels.append(ChannelNoise(column.name, column.sensor, column.unit.si, curve, at, fit))
-            found = unrest(samples[:, at], interval)
-            if found is not None:
-                where = f"{found.first:.1f} s to {found.last:.1f} s from the start"
-                harm = (column.name,) if found.felt else ()
-                findings.append(Finding("not_at_rest", f"{column.name} {found.words}", where, harm))
-                disturbed[column.name] = found
-    of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in said.items()]
+            disturbance = unrest(samples[:, at], interval)
+            if disturbance is not None:
+                where = f"{disturbance.first:.1f} s to {disturbance.last:.1f} s from the start"
+                harm = (column.name,) if disturbance.felt else ()
+                findings.append(Finding("not_at_rest", f"{column.name} {disturbance.words}", where, harm))
+                disturbed[column.name] = disturbance
+    of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in channels_of.items()]
     estimate = _assemble(record, channels, [*of_fits, *findings], disturbed)
     return Noise(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
 
@@ -166,7 +166,7 @@ def _on_a_grid(columns: list[Column]) -> tuple[float, Array]:
 
 
 def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, tuple[Finding, ...]]:
-    """The fit of one channel, None where it shows nothing, and what is to be said of it."""
+    """The fit of one channel, None where it shows nothing, and findings about it."""
     if not np.nanmax(curve.deviation[:, at], initial=0.0) > 0:
         return None, (Finding("resolution", "the output never changes, there is no noise to be seen"),)
     whole = noise_coefficients(curve, at)

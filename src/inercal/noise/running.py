@@ -1,6 +1,6 @@
 """Noise as it comes: the variance in a sliding window and the Allan variance, sample by sample.
 
-Compiled and without allocation; what is known so far lies in small arrays, which a step changes in place.
+Compiled and without allocation; the state lies in small arrays, which a step changes in place.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from inercal.records.column import Column
 from inercal.units import parse_quantity
 
 WHERE = "begin, end"
-"""What a sentence names that refuses a span."""
+"""Name of the place in a sentence that refuses a span."""
 
 
 def seconds(time: str | float | None, where: str) -> float | None:

@@ -1,4 +1,4 @@
-"""What ``inercal allan`` shows: coefficients in units of the field, the curves with their slopes, and a page."""
+"""Noise of an instrument, shown: coefficients in units of the field, the curves with their slopes, and a page."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ _LEGEND = ("measured", "fit", *SYMBOLS)
 def shown_units(unit: str) -> tuple[tuple[str, float], tuple[tuple[str, float], ...]]:
     """Units for people of samples in ``unit`` (SI) and of N, B, K, R, Q, each with its size in SI."""
     texts = [noise_shown(symbol, unit) for symbol in SYMBOLS]
-    known = unit in ("rad/s", "m/s^2")
-    shown = tuple((text, parse_unit(text).factor if known else 1.0) for text in texts)
+    physical = unit in ("rad/s", "m/s^2")
+    shown = tuple((text, parse_unit(text).factor if physical else 1.0) for text in texts)
     return shown[SYMBOLS.index("B")], shown  # B is in the unit of the samples
 
 
@@ -49,16 +49,16 @@ def cells(channel: ChannelNoise, noise: Noise) -> list[str]:
     """N, B, K, R and Q of a channel in units of the field: ``value ± u``, or ``< limit`` where they are not seen."""
     if channel.fit is None:
         return ["–"] * len(SYMBOLS)
-    found = []
+    texts = []
     for symbol, (_, size) in zip(SYMBOLS, shown_units(channel.unit)[1], strict=True):
         if symbol in channel.fit.names:
             p = noise.estimate[f"{symbol}_{channel.name}"]
             value, u = rounded(p.value / size, p.u / size)
-            found.append(f"{value} ± {u}")
+            texts.append(f"{value} ± {u}")
         else:
             limit = channel.fit.bounds[symbol] / size
-            found.append(f"< {rounded(limit, limit)[1]}")
-    return found
+            texts.append(f"< {rounded(limit, limit)[1]}")
+    return texts
 
 
 def of_a_sample(channel: ChannelNoise) -> str:
@@ -240,8 +240,8 @@ def _common_limits(
     """Limits of the vertical axes that show every channel's curve, and the residuals of what was fitted."""
     size = shown_units(channels[0].unit)[0][1]
     curves = np.concatenate([channel.deviation for channel in channels]) / size
-    known = curves[np.isfinite(curves) & (curves > 0)]
-    above = (0.5 * float(known.min()), 3.0 * float(known.max())) if known.size else None
+    positive = curves[np.isfinite(curves) & (curves > 0)]
+    above = (0.5 * float(positive.min()), 3.0 * float(positive.max())) if positive.size else None
     off = [_off(channel)[0][_used(channel)] for channel in channels if channel.fit is not None]
     largest = 1.3 * float(np.nanmax(np.abs(np.concatenate(off)), initial=10.0)) if off else 10.0
     return above, (max(-largest, -100.0), largest)

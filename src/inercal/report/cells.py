@@ -57,7 +57,7 @@ class Cell:
         return np.asarray(self.left + self.width * (x - low) / ((high - low) or 1.0))
 
     def up(self, y: Array) -> Array:
-        """Inches from the lower edge of the drawing; what has no logarithm is NaN, what is far off stays near by."""
+        """Inches from the lower edge of the drawing; NaN for a value without logarithm; values far off stay near by."""
         low, high = self.y
         if self.scale == "log":
             low, high = float(np.log10(low)), float(np.log10(high))
@@ -143,8 +143,8 @@ def _strokes(
     """Lines through the points of each stroke, all of one look, at once: `Axes.hlines` takes four times as long."""
     from matplotlib.collections import LineCollection
 
-    drawn = LineCollection(strokes, colors=colour, linewidths=width, zorder=zorder)
-    axes.add_collection(drawn, autolim=False)
+    lines = LineCollection(strokes, colors=colour, linewidths=width, zorder=zorder)
+    axes.add_collection(lines, autolim=False)
 
 
 def number(value: float, scale: str) -> str:
@@ -154,14 +154,14 @@ def number(value: float, scale: str) -> str:
 
 def line(axes: Axes, cell: Cell, x: Array, y: Array, **look: Any) -> None:
     """A line in a panel, cut off at its edges."""
-    (drawn,) = axes.plot(cell.across(x), cell.up(y), **look)
-    drawn.set_clip_path(_inside(axes, cell))
+    (curve,) = axes.plot(cell.across(x), cell.up(y), **look)
+    curve.set_clip_path(_inside(axes, cell))
 
 
 def band(axes: Axes, cell: Cell, x: Array, low: Array, high: Array, **look: Any) -> None:
     """A band between two lines, cut off at the edges of the panel."""
-    drawn = axes.fill_between(cell.across(x), cell.up(low), cell.up(high), lw=0, **look)
-    drawn.set_clip_path(_inside(axes, cell))
+    area = axes.fill_between(cell.across(x), cell.up(low), cell.up(high), lw=0, **look)
+    area.set_clip_path(_inside(axes, cell))
 
 
 def _inside(axes: Axes, cell: Cell) -> Any:

@@ -122,7 +122,7 @@ def dots(
 ) -> Picture:
     """Standard uncertainties (p,) of coefficients beside each other, on a logarithmic axis for each unit.
 
-    ``series`` are arrays by their labels; what is NaN has no mark. ``goal`` (p,) is marked by a bar.
+    ``series`` are arrays by their labels; NaN has no mark. ``goal`` (p,) is marked by a bar.
     """
     groups: dict[str, list[int]] = {}
     for k, unit in enumerate(units):
@@ -169,11 +169,11 @@ def limits(
     """
     rows = np.arange(len(names))
     far = np.zeros(len(names), dtype=bool) if alarm is None else alarm
-    known = np.isfinite(values) & np.isfinite(half)
+    finite = np.isfinite(values) & np.isfinite(half)
     marks: list[Mark] = [Strips((-band, band), alpha=0.1), Level(0.0, upright=True)]
-    for chosen, colour in ((known & ~far, COLOURS[0]), (known & far, ALARM)):
+    for chosen, colour in ((finite & ~far, COLOURS[0]), (finite & far, ALARM)):
         marks.append(Dots(values[chosen], rows[chosen], colour=colour, size=3.5, across=half[chosen]))
-    widest = float(np.max(np.abs(values) + half, initial=1.25 * band, where=known))
+    widest = float(np.max(np.abs(values) + half, initial=1.25 * band, where=finite))
     across = Axis(label, limits=(-1.08 * widest, 1.08 * widest))
     return draw(
         title,

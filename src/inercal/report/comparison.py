@@ -1,4 +1,4 @@
-"""What ``inercal compare`` shows of two calibrations: a table, a picture, and a page of them."""
+"""Two calibrations compared, shown: a table, a picture, and a page of them."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def _numbers(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _words(name: str) -> str:
-    """What a coefficient is."""
+    """The meaning of a coefficient, in words."""
     of = term(name)
     return "" if of is None else of.name
 
 
 def _mark(row: Mapping[str, Any]) -> str:
-    """Whether a coefficient moved, or is only beyond its own limit."""
+    """The mark of a coefficient that moved, or is only beyond its own limit."""
     return "moved" if row["moved"] else "> 1" if row["normalised_error"] > 1.0 else ""
 
 
@@ -93,8 +93,8 @@ def page(estimate: Estimate) -> str:
     facts = []
     for way in ("first", "second"):
         conditions = estimate.conditions[way]
-        known = (Path(given[way]).name, conditions["date"], temperature(conditions["temperature"]))
-        facts.append((way, "", ", ".join(filter(None, known))))
+        details = (Path(given[way]).name, conditions["date"], temperature(conditions["temperature"]))
+        facts.append((way, "", ", ".join(filter(None, details))))
     facts += [(name, "", text) for name, text in estimate.traceability.items() if text]
     return template(
         "comparison.html",

@@ -95,8 +95,8 @@ def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) ->
             line(axes, cell, np.full(2, t[0] + 0.012 * (t[-1] - t[0])), bar, color=INK, lw=1.6)
             if course.truth is not None:
                 line(axes, cell, t[[0, -1]], np.full(2, course.truth), color=ALARM, lw=0.9, ls=":")
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
+        image = svg(page)
+    return Picture(title, caption, image)
 
 
 def _span(course: Course, values: Array, u: Array) -> tuple[float, float]:
@@ -145,8 +145,8 @@ def falling(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Pi
                         ms=8,
                         mew=1.6,
                     )
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
+        image = svg(page)
+    return Picture(title, caption, image)
 
 
 @contextmanager
@@ -205,8 +205,8 @@ def panels_of_lines(title: str, caption: str, t: Array, panels: Mapping[str, Seq
         handles, labels = axes.get_legend_handles_labels()
         if len(labels) > 1:
             axes.legend(handles, labels, loc="upper right", ncols=6, borderaxespad=0.1)
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
+        image = svg(page)
+    return Picture(title, caption, image)
 
 
 def _limits(lines: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
@@ -223,7 +223,7 @@ def lines_by_group(
     """Lines over ``t`` (n,) [s], a panel with its own legend for each label of an axis, on a scale linear up to
     ``symlog`` and logarithmic beyond."""
     shown = few(len(t), 3 * _PIECES)
-    drawn = []
+    rows = []
     for label, lines in panels.items():
         values = [np.where(np.isfinite(each.values), each.values, np.nan)[shown] for each in lines]
         marks: list[Mark] = [Level(0.0)]
@@ -235,9 +235,9 @@ def lines_by_group(
         far = 1e9 * symlog
         limits = max(min(1.3 * least, -symlog), -far), min(max(1.3 * most, symlog), far)
         up = Axis(label, "symlog", limits, linear=symlog)
-        drawn.append([Panel(marks, Axis(margin=0.005), up, grid="y", legend="beside")])
-    drawn[-1] = [replace(drawn[-1][0], x=Axis("time [s]", margin=0.005))]
-    return draw(title, caption, drawn, 0.4 + 2.0 * len(panels))
+        rows.append([Panel(marks, Axis(margin=0.005), up, grid="y", legend="beside")])
+    rows[-1] = [replace(rows[-1][0], x=Axis("time [s]", margin=0.005))]
+    return draw(title, caption, rows, 0.4 + 2.0 * len(panels))
 
 
 def path(t: Array, angles: Array, joints: Sequence[str], title: str, caption: str) -> Picture:
@@ -245,9 +245,9 @@ def path(t: Array, angles: Array, joints: Sequence[str], title: str, caption: st
     shown = few(len(t), 400)
     marks: list[Mark] = []
     for k, (joint, turned) in enumerate(zip(joints, angles.T, strict=True)):
-        known = shown[np.isfinite(turned[shown])]
+        finite = shown[np.isfinite(turned[shown])]
         marks.append(Strips(turning(t, turned), COLOURS[k], 0.13))
-        marks.append(marks_of.Line(t[known], np.degrees(turned[known]), joint, COLOURS[k], 1.4))
+        marks.append(marks_of.Line(t[finite], np.degrees(turned[finite]), joint, COLOURS[k], 1.4))
     marks.append(Level(0.0, "", INK, 0.4))
     reach = np.degrees(angles[np.isfinite(angles)])
     ticks = _quarters(float(reach.min()), float(reach.max())) if len(reach) else None
@@ -268,8 +268,8 @@ def turning(
 
     The rate is that over a ``window`` [s]; rows that are NaN are left out.
     """
-    known = np.isfinite(angle)
-    t, angle = t[known], angle[known]
+    finite = np.isfinite(angle)
+    t, angle = t[finite], angle[finite]
     if len(t) < 2:
         return []
     ends = t[0] + window * np.arange(int((t[-1] - t[0]) / window) + 1)

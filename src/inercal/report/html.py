@@ -268,7 +268,7 @@ def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _Row:
 
 
 def _percent(share: float) -> str:
-    """A share in percent; what is tiny says so."""
+    """A share in percent; a tiny one as below 0.1 %."""
     percent = 100.0 * share
     return "< 0.1" if percent < 0.1 else f"{percent:.1f}" if percent < 10 else f"{percent:.0f}"
 
@@ -286,7 +286,7 @@ def _sentence(text: str) -> str:
 
 
 def _leaves(value: Any, keys: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:
-    """What is in nested tables, each leaf with the keys that lead to it; empty ones are left out."""
+    """Leaves of nested tables with the keys that lead to them; empty ones are left out."""
     if isinstance(value, Mapping):
         for key, item in value.items():
             yield from _leaves(item, (*keys, key))

@@ -32,8 +32,8 @@ def nis(t: Array, values: Array, dims: NDArray[np.int64]) -> Picture:
     """
     from scipy.special import chdtri
 
-    known = np.isfinite(values) & (dims > 0)
-    t, values, dims = t[known], np.clip(values[known], 0.0, 1e12), dims[known]
+    finite = np.isfinite(values) & (dims > 0)
+    t, values, dims = t[finite], np.clip(values[finite], 0.0, 1e12), dims[finite]
     window, tail = min(_WINDOW, len(values)), 0.5 * (1.0 - _BAND)
     title = "Normalised innovations squared"
     if not window:
@@ -101,14 +101,14 @@ def innovations(t: Array, values: Array, channels: Sequence[str]) -> Picture:
                 axes.vlines(right.across(lags[chosen]), feet, right.up(r[chosen]), color=colour, lw=1.4)
         for cell, label in ((left, "time [s]"), (right, "lag [rows]")):
             axes.text(cell.left + 0.5 * cell.width, 0.06, label, fontsize=7.5, ha="center", va="bottom")
-        drawn = svg(page)
+        image = svg(page)
     return Picture(
         "Innovations and whether they are white",
         "Left: measurement less what the filter expected, over its standard deviation; least and greatest value of "
         "pieces of the recording; band: ± 2. Right: correlation with itself some rows later; band: ± two standard "
         f"deviations of white noise, red beyond. Of {_LAGS} lags one or two lie beyond by chance; many, or a slow "
         f"fall, show what the model lacks. Beyond: {', '.join(beyond)}.",
-        drawn,
+        image,
     )
 
 
@@ -117,11 +117,11 @@ def autocorrelation(x: Array, lags: int) -> tuple[Array, NDArray[np.int64]]:
 
     NaN are left out in pairs; 0 where there are no pairs.
     """
-    known = np.isfinite(x)
-    values = np.where(known, x, 0.0)
-    power = float(np.mean(values[known] ** 2)) if known.any() else 1.0
+    finite = np.isfinite(x)
+    values = np.where(finite, x, 0.0)
+    power = float(np.mean(values[finite] ** 2)) if finite.any() else 1.0
     count = np.array(
-        [int((known[k:] & known[: len(x) - k]).sum()) for k in range(1, min(lags, len(x) - 1) + 1)]
+        [int((finite[k:] & finite[: len(x) - k]).sum()) for k in range(1, min(lags, len(x) - 1) + 1)]
     )
     sums = np.array([float(values[k:] @ values[: len(x) - k]) for k in range(1, len(count) + 1)])
     return sums / np.maximum(count, 1) / (power or 1.0), count.astype(np.int64)

@@ -1,4 +1,4 @@
-"""What ``inercal inspect`` shows of a recording: numbers, a line of blocks, figures, and a page of them."""
+"""A recording, shown: numbers, a line of blocks, figures, and a page of them."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ def summary(record: Record) -> tuple[ChannelSummary, ...]:
 def norms(record: Record) -> tuple[ChannelSummary, ...]:
     """The length of each whole triad of accelerometers or gyros in numbers: at rest that of ``acc`` is gravity."""
     counted = counted_rows(record.columns)
-    found = []
+    summaries = []
     for sensor in ("acc", "gyro"):
         axes = [record.columns[name] for axis in "xyz" if (name := f"{sensor}_{axis}") in record.columns]
         x = axes[0] if len(axes) == 3 else None
         if x is None or any(axis.t is not x.t or axis.unit != x.unit for axis in axes):
             continue
         length = replace(x, name=f"|{sensor}|", values=np.linalg.norm([axis.values for axis in axes], axis=0))
-        found.append(_summary(length, float("nan") if counted else _rate(x.t)))
-    return tuple(found)
+        summaries.append(_summary(length, float("nan") if counted else _rate(x.t)))
+    return tuple(summaries)
 
 
 def channels_table(record: Record) -> Table:
@@ -99,16 +99,16 @@ def channels_table(record: Record) -> Table:
 @np.errstate(over="ignore", invalid="ignore")
 def _summary(column: Column, rate: float) -> ChannelSummary:
     """One channel in numbers."""
-    known = column.values[np.isfinite(column.values)]
+    finite = column.values[np.isfinite(column.values)]
     numbers = (
-        known.mean() if known.size else np.nan,
-        known.std(ddof=1) if known.size > 1 else np.nan,
-        known.min() if known.size else np.nan,
-        known.max() if known.size else np.nan,
+        finite.mean() if finite.size else np.nan,
+        finite.std(ddof=1) if finite.size > 1 else np.nan,
+        finite.min() if finite.size else np.nan,
+        finite.max() if finite.size else np.nan,
     )
     total = len(column.values)
     return ChannelSummary(
-        column.name, column.unit.symbol, total, total - known.size, rate, *(float(x) for x in numbers)
+        column.name, column.unit.symbol, total, total - finite.size, rate, *(float(x) for x in numbers)
     )
 
 
@@ -130,13 +130,13 @@ def sparkline(values: Array, width: int = 24) -> str:
     >>> sparkline(np.array([0.0, 1.0, 2.0, np.nan, 7.0]))
     '▁▂▃ █'
     """
-    known = np.isfinite(values)
-    size = float(np.max(np.abs(values), initial=0.0, where=known))
-    if not known.any():
+    finite = np.isfinite(values)
+    size = float(np.max(np.abs(values), initial=0.0, where=finite))
+    if not finite.any():
         return " " * min(width, len(values))
     edges = np.linspace(0, len(values), min(width, len(values)), endpoint=False).astype(np.int64)
-    sums = np.add.reduceat(np.where(known, values, 0.0) / (size or 1.0), edges)
-    counts = np.add.reduceat(known.astype(float), edges)
+    sums = np.add.reduceat(np.where(finite, values, 0.0) / (size or 1.0), edges)
+    counts = np.add.reduceat(finite.astype(float), edges)
     means = np.divide(sums, counts, out=np.full(len(edges), np.nan), where=counts > 0)
     low, high = np.nanmin(means), np.nanmax(means)
     height = (means - low) / (high - low) if high > low else np.where(counts > 0, 0.5, np.nan)

@@ -1,4 +1,4 @@
-"""What a picture is made of, as plain data: marks, axes, panels.
+"""Parts of a picture as plain data: marks, axes, panels.
 
 What is NaN has no mark.
 """
@@ -178,7 +178,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Colours:
-    """How values are shown by colour: the ``name`` of the map, its ends, and the label of the scale."""
+    """Values by colour: the ``name`` of the map, its ends, and the label of the scale."""
 
     name: str
     low: float

@@ -63,11 +63,11 @@ def clauses(text: str) -> list[str]:
 
 def _tokens(text: str) -> list[_Token]:
     """The pieces of a text."""
-    found, end = [], 0
+    tokens, end = [], 0
     for match in _TOKEN.finditer(text):
-        found.append(_Token(match.lastgroup or "other", match.group(), text[end : match.start()]))
+        tokens.append(_Token(match.lastgroup or "other", match.group(), text[end : match.start()]))
         end = match.end()
-    return found
+    return tokens
 
 
 def _named(tokens: list[_Token]) -> frozenset[str]:
@@ -241,7 +241,7 @@ class _Row:
         return base + (self._bracket() if called and token.kind == "name" else "")
 
     def _power(self) -> str:
-        """What stands after a circumflex: a number with or without its sign, or a symbol."""
+        """The exponent after a circumflex: a number with or without its sign, or a symbol."""
         if self.k + 1 >= len(self.tokens) or self.tokens[self.k].text != "^":
             return ""
         self.k += 1
@@ -259,14 +259,14 @@ class _Row:
         return any(token.text == "|" for token in self.tokens[self.k + 1 :])
 
     def _size(self) -> str:
-        """What stands between two bars."""
+        """The expression between two bars."""
         end = next(j for j in range(self.k + 1, len(self.tokens)) if self.tokens[j].text == "|")
         inside = _Row(self.tokens[self.k + 1 : end], self.names).whole()
         self.k = end + 1
         return f"<mrow><mo>|</mo>{inside}<mo>|</mo></mrow>"
 
     def _bracket(self) -> str:
-        """What stands in brackets: a matrix, a row, words, or mathematics."""
+        """The content of brackets: a matrix, a row, words, or mathematics."""
         end = _closing(self.tokens, self.k)
         if end is None:
             return self._sign()

@@ -1,4 +1,4 @@
-"""Numbers of a signal for captions; what is not finite is left out."""
+"""Numbers of a signal for captions, from its finite values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def settled(t: Array) -> NDArray[np.bool_]:
 
 
 def known(x: Array) -> Array:
-    """What is a number."""
+    """The finite values."""
     return x[np.isfinite(x)]
 
 

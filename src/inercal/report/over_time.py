@@ -53,7 +53,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """What is marked along the time [s]: stretches (k, 2) in which samples were ``saturated``, in which there are none,
+    """Marks along the time [s]: stretches (k, 2) in which samples were ``saturated``, in which there are none,
     ``gaps``, and in which the model was ``moving``; times (k,) at which an estimator started anew, ``restarts``."""
 
     saturated: Array = field(default_factory=lambda: np.empty((0, 2)))
@@ -63,13 +63,13 @@ class Marks:
 
     @property
     def words(self) -> str:
-        """What the marks mean, as sentences; empty without any."""
-        told = (
+        """Sentences that explain the marks; empty without any."""
+        texts = (
             ("Red strip: saturated samples.", self.saturated),
             ("Grey strip: no rows.", self.gaps),
             ("Dashes: the filter started anew.", self.restarts),
         )
-        return "".join(f" {text}" for text, found in told if len(found))
+        return "".join(f" {text}" for text, stretches in texts if len(stretches))
 
 
 def stretches(t: Array, flags: Flags) -> Array:
@@ -118,8 +118,8 @@ def over_time(
             frame(axes, cell, times=k == len(panels) - 1, label=panel.label)
             _draw(axes, cell, panel, t, cuts, pieces)
             head(axes, cell, panel.title, [*panel.lines] if len(panel.lines) > 1 else [])
-        drawn = svg(page)
-    return Picture(title, caption, drawn)
+        image = svg(page)
+    return Picture(title, caption, image)
 
 
 def head(axes: Axes, cell: Cell, title: str, names: Sequence[str]) -> None:
@@ -192,29 +192,29 @@ def _limits(panel: Panel, late: Flags) -> tuple[float, float]:
 
 
 def _finite(x: Array) -> Array:
-    """What is a number, and one that can be drawn."""
+    """The values that are finite and can be drawn."""
     return x[np.abs(x) < 1e100]
 
 
 def _mark(axes: Axes, cell: Cell, marks: Marks) -> None:
     """Stretches behind the lines, and dashes where an estimator started anew."""
-    for found, colour, alpha in (
+    for stretches, colour, alpha in (
         (marks.moving, COLOURS[3], 0.14),
         (marks.gaps, QUIET, 0.35),
         (marks.saturated, ALARM, 0.22),
     ):
-        strips(axes, cell, found, cell.bottom, cell.height, colour, alpha)
+        strips(axes, cell, stretches, cell.bottom, cell.height, colour, alpha)
     feet = cell.across(marks.restarts)
     axes.vlines(feet, cell.bottom, cell.bottom + cell.height, color=INK, lw=0.7, ls=(0, (3, 2)))
 
 
 def strips(
-    axes: Axes, cell: Cell, found: Array, bottom: float, height: float, colour: str, alpha: float = 1.0
+    axes: Axes, cell: Cell, stretches: Array, bottom: float, height: float, colour: str, alpha: float = 1.0
 ) -> None:
     """Stretches (k, 2) of the time of a panel as strips of that ``height`` [inch], cut off at its ends."""
-    if not len(found):
+    if not len(stretches):
         return
-    places = np.clip(cell.across(found), cell.left, cell.left + cell.width)
+    places = np.clip(cell.across(stretches), cell.left, cell.left + cell.width)
     spans = [(float(a), float(b - a)) for a, b in places]
     axes.broken_barh(spans, (bottom, height), color=colour, alpha=alpha, lw=0, zorder=0.5)
 
@@ -235,7 +235,7 @@ def measured(t: Array, names: Sequence[str], missing: Flags, saturated: Flags, m
             for flags, colour in ((missing[:, k] & ~saturated[:, k], QUIET), (saturated[:, k], ALARM)):
                 strips(axes, cell, stretches(t, flags), bottom + 0.03, height - 0.06, colour)
             strips(axes, cell, marks.gaps, bottom + 0.02, height - 0.04, "white")
-        drawn = svg(page)
+        image = svg(page)
     lost = [
         f"{name} {_percent(flags)} {word}"
         for k, name in enumerate(names)
@@ -246,7 +246,7 @@ def measured(t: Array, names: Sequence[str], missing: Flags, saturated: Flags, m
         "What was measured",
         "Blue: samples that count; red: saturated, left out; grey: missing; white: no rows. A strip is wide enough to "
         f"be seen, however short. {'; '.join(lost) + '.' if lost else ''}".rstrip(),
-        drawn,
+        image,
     )
 
 

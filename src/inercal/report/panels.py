@@ -94,7 +94,7 @@ def draw(
 
 
 def _enlarged(panels: Sequence[Sequence[Panel]]) -> float:
-    """How much larger the dots of a legend are, so that their colours can be told apart."""
+    """Size of a legend's dots over that of the picture's, so that their colours can be told apart."""
     sizes = [
         mark.size
         for row in panels
@@ -145,11 +145,11 @@ def _panel(axes: Axes, panel: Panel, first: bool) -> None:
         axes.legend(loc="best", ncols=2)
 
 
-def _axis(drawn: DrawnAxis, axis: Axis, way: Literal["x", "y"], named: bool = True) -> None:
+def _axis(artist: DrawnAxis, axis: Axis, way: Literal["x", "y"], named: bool = True) -> None:
     """Limits, ticks and label of an axis; rows are counted from the top."""
     from matplotlib.ticker import MaxNLocator
 
-    axes = drawn.axes
+    axes = artist.axes
     set_limits, set_ticks = getattr(axes, f"set_{way}lim"), getattr(axes, f"set_{way}ticks")
     if axis.names:
         count = len(axis.names)
@@ -165,25 +165,25 @@ def _axis(drawn: DrawnAxis, axis: Axis, way: Literal["x", "y"], named: bool = Tr
     if axis.limits is not None:
         set_limits(*axis.limits)
     if axis.scale == "log":
-        few_powers(drawn, axis.powers)
+        few_powers(artist, axis.powers)
         set_ticks([], minor=True)
     elif axis.scale == "symlog":
         ticks = (
             list(axis.ticks)
             if axis.ticks is not None
-            else symlog_ticks(axis.linear, drawn.get_view_interval())
+            else symlog_ticks(axis.linear, artist.get_view_interval())
         )
         set_ticks(ticks, list(map(power_of_ten, ticks)))
         set_ticks([], minor=True)
     elif axis.ticks is not None:
         set_ticks(axis.ticks)
     elif axis.whole:
-        drawn.set_major_locator(MaxNLocator(integer=True))
+        artist.set_major_locator(MaxNLocator(integer=True))
     elif axis.few:
-        drawn.set_major_locator(MaxNLocator(4, prune="both"))
+        artist.set_major_locator(MaxNLocator(4, prune="both"))
         axes.ticklabel_format(axis=way, style="plain", useOffset=False)
     if axis.label and named:
-        drawn.set_label_text(axis.label)
+        artist.set_label_text(axis.label)
 
 
 def symlog_ticks(linear: float, limits: ArrayLike) -> list[float]:

@@ -23,7 +23,7 @@ _POINTS = 300
 """Points of a line, about evenly spread on its logarithmic axis."""
 
 _ALONE = 30.0
-"""How much a peak exceeds the median of its surroundings, in power."""
+"""Ratio of a peak to the median of its surroundings, in power."""
 
 
 def spectral_density(t: Array, values: Array) -> tuple[Array, Array]:
@@ -33,16 +33,16 @@ def spectral_density(t: Array, values: Array) -> tuple[Array, Array]:
     [s], or too much missing (NaN), are left out. Both empty where none is left. Source: Welch 1967.
     """
     none = np.empty(0)
-    known = np.isfinite(values)
-    if len(t) < _SHORTEST or known.sum() < _SHORTEST:
+    finite = np.isfinite(values)
+    if len(t) < _SHORTEST or finite.sum() < _SHORTEST:
         return none, none
     step = np.diff(t)
     even = float(np.median(step))
     length = int(2 ** np.clip(np.floor(np.log2(len(t) / 8.0)), np.log2(_SHORTEST), np.log2(LONGEST)))
     jumps = np.concatenate([[0], np.cumsum(np.abs(step - even) > 5.0 * even)])
-    lost = np.concatenate([[0], np.cumsum(~known)])
-    rows = np.flatnonzero(known)
-    filled = values if known.all() else np.interp(np.arange(len(t)), rows, values[rows])
+    lost = np.concatenate([[0], np.cumsum(~finite)])
+    rows = np.flatnonzero(finite)
+    filled = values if finite.all() else np.interp(np.arange(len(t)), rows, values[rows])
     window = np.hanning(length + 1)[:-1]
     ramp = np.linspace(-1.0, 1.0, length)
     total, count = np.zeros(length // 2 + 1), 0
@@ -100,8 +100,8 @@ def of_angle(t: Array, angle: Array, error: Array | None, innovations: Mapping[s
 
 def _known(signals: Mapping[str, Array], t: Array) -> dict[str, tuple[Array, Array]]:
     """Spectra of those signals that are long enough."""
-    found = {name: spectral_density(t, values) for name, values in signals.items()}
-    return {name: (f, density) for name, (f, density) in found.items() if len(f)}
+    spectra = {name: spectral_density(t, values) for name, values in signals.items()}
+    return {name: (f, density) for name, (f, density) in spectra.items() if len(f)}
 
 
 def spectra(

@@ -116,7 +116,7 @@ def envelope(t: Array, values: Array, pieces: int = 800) -> tuple[Array, Array]:
     Parameters
     ----------
     t, values : (n,)
-        Times and values; what is not finite, or beyond 1e100, leaves a gap.
+        Times and values; values that are not finite, or beyond 1e100, leave a gap.
     pieces : int
         Number of pieces; a signal of at most twice as many samples is returned as it is.
 

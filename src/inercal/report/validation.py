@@ -1,4 +1,4 @@
-"""What ``inercal validate`` shows: a line for each case, and a page for a laboratory's file."""
+"""A validation, shown: a line for each case, and a page for a laboratory's file."""
 
 from __future__ import annotations
 

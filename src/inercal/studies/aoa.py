@@ -55,14 +55,14 @@ _Instant = Annotated[Quantity, QuantityText("time", "5 s", lambda t: abs(t) < 1e
 
 def _certain(value: object) -> Quantity:
     """A known angle: its standard uncertainty is above zero."""
-    found = QuantityText(
+    quantity = QuantityText(
         "angle", "0.00(1) deg", lambda a: abs(a) <= math.pi, "an angle from -180 deg to 180 deg"
     ).parse(value)
-    if not found.u > 0.0:
+    if not quantity.u > 0.0:
         raise refusal(
             f"found {shown(value)}, expected it with its standard uncertainty, such as '0.00(1) deg'"
         )
-    return found
+    return quantity
 
 
 _SNAP = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*rad(?:\^2|²)\s*/\s*s(?:\^7|⁷)\s*")
@@ -72,14 +72,14 @@ def _snap(value: object) -> float:
     """A spectral density [rad^2/s^7], as a text with that unit."""
     match = _SNAP.fullmatch(value) if isinstance(value, str) else None
     try:
-        found = float(match[1]) if match else math.nan
+        density = float(match[1]) if match else math.nan
     except ValueError:
-        found = math.nan
-    if not 0.0 < found < math.inf:
+        density = math.nan
+    if not 0.0 < density < math.inf:
         raise refusal(
             f'found {shown(value)}, expected a spectral density above zero, such as "1e7 rad^2/s^7"'
         )
-    return found
+    return density
 
 
 _Snap = Annotated[
@@ -91,7 +91,7 @@ _Snap = Annotated[
 
 
 class StingTable(Strict):
-    """What carries the model."""
+    """Support of the model."""
 
     kind: Literal["sting"] = Field(description="a model that pitches about a pivot, on a sting")
 
@@ -107,7 +107,7 @@ class FlexureTable(Strict):
 
 
 class SensorPriorTable(table_of(Prior)):  # type: ignore[misc]
-    """What is not known of the sensors before the run: standard deviations; the usual ones if absent."""
+    """Standard deviations of the sensors' errors before the run; the usual ones if absent."""
 
     heave: FlexureTable = Field(
         default=FlexureTable(), title="Heave", description="flexure along z: 9 Hz, damping 0.3 if absent"
@@ -219,7 +219,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
 
 
 def _prior(table: SensorPriorTable) -> Prior:
-    """What is not known of the sensors."""
+    """Prior of the sensors."""
     usual = Prior()
     heave, axial = _flexure(table.heave, usual.heave), _flexure(table.axial, usual.axial)
     return settings_of(Prior, table, heave=heave, axial=axial)

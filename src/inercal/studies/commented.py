@@ -14,7 +14,7 @@ WIDTH = 110
 """Columns of a line, where a value leaves room for that."""
 
 COLUMN = 36
-"""Where comments begin."""
+"""Column at which comments begin."""
 
 
 def commented(
@@ -87,35 +87,35 @@ def _explained(text: str, comment: str) -> Iterator[str]:
 
 
 def _comment(field: Schema, definitions: Mapping[str, Schema], value: object, there: bool) -> str:
-    """What a key means, its other choices, and its default."""
-    found = {**_resolved(field, definitions), **field}
-    says = str(found.get("description", ""))
-    others = [] if isinstance(value, Mapping) else [one for one in _choices(found) if one != value]
+    """The comment of a key: its meaning, other choices, and default."""
+    schema = {**_resolved(field, definitions), **field}
+    says = str(schema.get("description", ""))
+    others = [] if isinstance(value, Mapping) else [one for one in _choices(schema) if one != value]
     if others and not all(str(one) in says for one in others):
         says += f"; or {', '.join(map(toml, others))}"
-    default = found.get("default", "")
+    default = schema.get("default", "")
     if not there and default not in ("", value) and not isinstance(default, bool):
         says += f"; {default if isinstance(default, str) else toml(default)} if absent"
     return says
 
 
-def _choices(found: Schema) -> list[Any]:
+def _choices(schema: Schema) -> list[Any]:
     """Words that a key may hold."""
-    if "enum" in found:
-        return list(found["enum"])
-    if "const" in found and isinstance(found["const"], str):
-        return [found["const"]]
-    return [word for one in found.get("anyOf", ()) for word in _choices(one)]
+    if "enum" in schema:
+        return list(schema["enum"])
+    if "const" in schema and isinstance(schema["const"], str):
+        return [schema["const"]]
+    return [word for one in schema.get("anyOf", ()) for word in _choices(one)]
 
 
 def example(field: Schema, definitions: Mapping[str, Schema]) -> Any:
     """A good value of a key: an example, the default, one that its type allows."""
-    found = {**_resolved(field, definitions), **field}
-    match found:
+    schema = {**_resolved(field, definitions), **field}
+    match schema:
         case {"examples": [first, *_]}:
             return first
         case {"type": "boolean"}:
-            return not found.get("default", False)
+            return not schema.get("default", False)
         case {"default": str() | int() | float() as default}:
             return default
         case {"const": const}:
@@ -127,10 +127,10 @@ def example(field: Schema, definitions: Mapping[str, Schema]) -> Any:
         case {"type": "array", "prefixItems": items}:
             return [example(each, definitions) for each in items]
         case {"type": "array", "items": each}:
-            return [example(each, definitions)] * found.get("minItems", 1)
+            return [example(each, definitions)] * schema.get("minItems", 1)
         case {"properties": keys}:
-            return {key: example(keys[key], definitions) for key in found.get("required", ())}
-    return found.get("minimum", 1)
+            return {key: example(keys[key], definitions) for key in schema.get("required", ())}
+    return schema.get("minimum", 1)
 
 
 def toml(value: object) -> str:

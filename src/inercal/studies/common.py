@@ -16,7 +16,7 @@ from inercal.studies.fields import QuantityText, Temperature
 from inercal.units import Quantity
 
 GRAVITY_ANOMALY = 3.5e-4
-"""What gravity differs from normal gravity by [m/s²]: rms free-air anomaly, about 35 mGal."""
+"""Standard uncertainty of normal gravity [m/s²]: rms free-air anomaly, about 35 mGal."""
 
 UNSTATED_HEIGHT = 300.0
 """Standard uncertainty of the height 0 m that is taken where none is given [m]."""
@@ -40,7 +40,7 @@ Gravity = Annotated[
 
 
 class SiteTable(Strict):
-    """Where the instrument stands."""
+    """Place of the instrument."""
 
     latitude: Latitude | None = Field(default=None, description="geodetic latitude, north positive")
     height: Height | None = Field(

@@ -51,7 +51,7 @@ class QuantityText:
     expected: str = ""
 
     def parse(self, text: object) -> Quantity:
-        """Read one value; what is wrong goes to pydantic, which knows the key."""
+        """Read one value; refusals go to pydantic, which knows the key."""
         try:
             quantity = parse_quantity(text, self.dimension, "quantity", self.example)
         except QuantityError as error:

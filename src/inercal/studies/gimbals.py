@@ -95,7 +95,7 @@ def gimbals_of(table: GimbalsTable) -> Gimbals:
 
 
 def base_of(table: GimbalsTable) -> Base:
-    """How the base stands."""
+    """Attitude of the base."""
     heading = None if table.heading == "unknown" else table.heading
     north, east = (0.0, 0.0) if table.tilt is None else table.tilt.values
     tilt_u = (0.0, 0.0) if table.tilt is None else tuple(each.u for each in table.tilt.quantities)
@@ -116,7 +116,7 @@ def limits_of(table: GimbalsTable, where: object) -> dict[str, tuple[float, floa
     StudyError
         Ends out of order.
     """
-    found: dict[str, tuple[float, float]] = {}
+    limits: dict[str, tuple[float, float]] = {}
     for name, joint in zip(JOINTS, GimbalLimitsTable.model_fields, strict=True):
         ends: Several | None = getattr(table.limits, joint)
         if ends is None:
@@ -126,5 +126,5 @@ def limits_of(table: GimbalsTable, where: object) -> dict[str, tuple[float, floa
             raise StudyError(
                 where, f"rig.limits.{joint}: found {shown(ends.typed)}, expected the lower end first"
             )
-        found[name] = (low, high)
-    return found
+        limits[name] = (low, high)
+    return limits

@@ -10,9 +10,7 @@ from pydantic import Field, model_validator
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
-from inercal.imu.aided_settings import AidedSettings
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import AidedSettings, FerrarisSettings, ImuSettings
 from inercal.studies.common import (
     Conditions,
     ConditionsTable,
@@ -38,7 +36,7 @@ _METHODS = {
 
 
 class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
-    """How to calibrate the IMU."""
+    """Settings of the calibration."""
 
     method: Literal["multiposition", "ferraris", "aided"] = Field(
         default="multiposition",

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from inercal._toml import Strict
-from inercal.imu.aided_settings import AidedSettings, mounting_of
+from inercal.imu.settings import AidedSettings, mounting_of
 from inercal.studies.fields import refusal
 from inercal.studies.rig import RigTable, chain_of
 

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 from inercal._toml import Strict
 from inercal.errors import QuantityError
 from inercal.imu.ferraris.names import NAMES
-from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.imu.settings import FerrarisSettings
 from inercal.studies.fields import refusal
 from inercal.studies.tables import settings_of, table_of
 from inercal.units import parse_quantity, shown
@@ -53,7 +53,7 @@ Section = Annotated[
 
 
 class SectionsTable(Strict):
-    """Where the sections are: times of the record's time axis, samples from 0, the end not included, or labels."""
+    """Places of the sections: times of the record's time axis, samples from 0, the end not included, or labels."""
 
     x_p: Section | None = Field(default=None, description="+x up: accelerometer x reads +g")
     x_a: Section | None = Field(default=None, description="-x up: accelerometer x reads -g")

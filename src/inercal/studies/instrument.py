@@ -58,7 +58,7 @@ class InstrumentTable(table_of(Instrument)):  # type: ignore[misc]
 
 @dataclass(frozen=True)
 class _Form:
-    """A way to state a term: dimension of what is above the bar, and power and dimension of what is below."""
+    """Unit of a term as a fraction: dimension above the bar, power and dimension below it."""
 
     above: str
     below: str = ""
@@ -66,7 +66,7 @@ class _Form:
 
 
 def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Instrument:
-    """The instrument in SI: what is stated in units of the output is in the SI unit of its dimension.
+    """The instrument in SI: a term in units of the output is in the SI unit of its dimension.
 
     Parameters
     ----------
@@ -82,20 +82,20 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
         A unit the kind cannot have, an unknown term, a value in a unit its term cannot have.
     """
     unit = _unit(table, where)
-    known = tuple(s for channel in CHANNELS[table.kind] for s in channel_model(table.kind, channel).symbols)
+    symbols = tuple(s for channel in CHANNELS[table.kind] for s in channel_model(table.kind, channel).symbols)
     for k, symbol in enumerate(table.terms or ()):
-        _check_symbol(symbol, known, f"instrument.terms.{k}", where)
+        _check_symbol(symbol, symbols, f"instrument.terms.{k}", where)
         if symbol in (table.terms or ())[:k]:
             raise StudyError(where, f"instrument.terms: found {symbol} twice, expected each term once")
     values, uncertainties = {}, {}
     for symbol, text in table.coefficients.items():
         key = f"instrument.coefficients.{symbol}"
-        _check_symbol(symbol, (*known, *RATE_TERMS) if table.kind == "gyro" else known, key, where)
+        _check_symbol(symbol, (*symbols, *RATE_TERMS) if table.kind == "gyro" else symbols, key, where)
         value, u = _coefficient(text, symbol, table.kind, unit, gravity, key, where)
         values[symbol] = value
         if u > 0.0:
             uncertainties[symbol] = u
-    found = settings_of(
+    instrument = settings_of(
         Instrument,
         table,
         unit=unit,
@@ -103,15 +103,15 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
         coefficients=values,
         coefficients_u=uncertainties,
     )
-    if found.sample_rate is not None and found.sample_rate * found.dwell > MOST_SAMPLES:
+    if instrument.sample_rate is not None and instrument.sample_rate * instrument.dwell > MOST_SAMPLES:
         raise StudyError(
             where,
-            f"instrument.sample_rate: found {found.sample_rate * found.dwell:.4g} samples in a dwell, "
+            f"instrument.sample_rate: found {instrument.sample_rate * instrument.dwell:.4g} samples in a dwell, "
             f"expected at most {MOST_SAMPLES:.0e}",
         )
     if table.noise is None:
-        return found
-    return replace(found, noise=_noise(table.noise, unit, found.dwell, where))
+        return instrument
+    return replace(instrument, noise=_noise(table.noise, unit, instrument.dwell, where))
 
 
 def _unit(table: InstrumentTable, where: object) -> Unit:
@@ -128,11 +128,11 @@ def _unit(table: InstrumentTable, where: object) -> Unit:
     return unit
 
 
-def _check_symbol(symbol: str, known: Sequence[str], key: str, where: object) -> None:
+def _check_symbol(symbol: str, symbols: Sequence[str], key: str, where: object) -> None:
     """Refuse a term the instrument does not have."""
-    if symbol not in known:
-        near = difflib.get_close_matches(symbol[:80], known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}?" if near else f"expected one such as {', '.join(known[:6])}"
+    if symbol not in symbols:
+        near = difflib.get_close_matches(symbol[:80], symbols, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"expected one such as {', '.join(symbols[:6])}"
         raise StudyError(where, f"{key}: unknown term {shown(symbol)}, {hint}")
 
 
@@ -142,7 +142,7 @@ def _coefficient(
     """Value and standard uncertainty of a term, in SI.
 
     A term of order n in a of a gyrowheel counts a in units of the site's gravity: per g^n it is converted by
-    (site gravity / 9.80665 m/s^2)^n, and what is stated in the output's unit alone is taken as it is.
+    (site gravity / 9.80665 m/s^2)^n, and a term in the output's unit alone is taken as it is.
     """
     forms, example = _forms(symbol, kind, unit)
     for form in forms:
@@ -196,7 +196,7 @@ _BAR = re.compile(r"(?P<above>.*?)\s*/\s*(?:(?P<g>g)|\((?P<below>[^()]+)\))(?:\^
 
 
 def _parse(text: object, form: _Form) -> tuple[Quantity, float] | None:
-    """What is above the bar, and the factor to SI of the unit below it; None if the text has another form."""
+    """The part above the bar, and the factor to SI of the unit below it; None if the text has another form."""
     above, below, power = text, "", 0
     if form.below:
         plain = text.replace("²", "^2").replace("³", "^3") if isinstance(text, str) else ""

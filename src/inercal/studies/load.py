@@ -59,7 +59,7 @@ _OPEN = {"site.latitude": "48.1 deg"}
 
 
 def reader(kind: str) -> Callable[[Mapping[str, Any], str | Path], Any]:
-    """What makes settings of the parsed TOML of a study: of ``imu``, ``turntable``, ``selfcal`` or ``aoa``."""
+    """Readers of a study's parsed TOML: of ``imu``, ``turntable``, ``selfcal`` or ``aoa``."""
     module = importlib.import_module(f"inercal.studies.{kind}")
     read: Callable[[Mapping[str, Any], str | Path], Any] = getattr(module, f"{kind}_study")
     return read
@@ -128,11 +128,11 @@ def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Dotted keys and values of all texts in a table, in their order; however deep it is nested."""
     left = list(table.items())[::-1]
     while left:
-        name, found = left.pop()
-        if isinstance(found, Mapping):
-            left += [(f"{name}.{key}", value) for key, value in list(found.items())[::-1]]
-        elif isinstance(found, str):
-            yield name, found
+        name, entry = left.pop()
+        if isinstance(entry, Mapping):
+            left += [(f"{name}.{key}", value) for key, value in list(entry.items())[::-1]]
+        elif isinstance(entry, str):
+            yield name, entry
 
 
 def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
@@ -173,7 +173,7 @@ def _refuse_unfilled(data: Mapping[str, Any], path: str | Path) -> None:
 
 
 def unfilled(data: Mapping[str, Any], value: str) -> dict[str, Any]:
-    """The study with ``value`` in place of what is still to be filled in, in its tables."""
+    """The study with ``value`` in every place still to be filled in."""
     return {
         name: {key: value if each == UNKNOWN else each for key, each in table.items()}
         if isinstance(table, Mapping)
@@ -188,7 +188,7 @@ def put(data: dict[str, Any], override: str, folder: Path) -> None:
     Raises
     ------
     StudyError
-        No key and value, or a key inside what is no table.
+        No key and value, or a key inside a value that is no table.
     """
     where = f"--set {shown(override)}"
     name, equals, text = override.partition("=")

@@ -92,7 +92,7 @@ def motion_of(table: MotionTable, where: str | Path) -> MotionPlan:
 
 
 class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
-    """What a simulation adds to the rigid, well-known model; nothing if absent."""
+    """Disturbances that a simulation adds to the rigid, well-known model; none if absent."""
 
     pitch: Stated[AngleShaking] | None = Field(
         default=None,
@@ -129,7 +129,7 @@ class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
 def disturbances_of(
     table: AoaDisturbancesTable, layout: Layout, sensors: dict[str, Calibration], where: object
 ) -> Disturbances:
-    """What a simulation adds, in SI.
+    """Disturbances of a simulation, in SI.
 
     Raises
     ------
@@ -137,20 +137,21 @@ def disturbances_of(
         Frequencies out of order, heights for another number of accelerometers, clipping without a range.
     """
     shaking = {key: getattr(table, key) for key in ("pitch", "heave", "axial", "roll", "yaw")}
-    found = settings_of(Disturbances, table, **shaking)
+    disturbances = settings_of(Disturbances, table, **shaking)
     for key, each in shaking.items():
         if isinstance(each, Shaking):
             _ordered(each.low, each.high, f"disturbances.{key}", where)
-    if table.heights is not None and len(found.heights) != len(layout.names):
+    if table.heights is not None and len(disturbances.heights) != len(layout.names):
         raise StudyError(
             where,
-            f"disturbances.heights: found {len(found.heights)}, expected one for each of {', '.join(layout.names)}",
+            f"disturbances.heights: found {len(disturbances.heights)}, expected one for each of "
+            f"{', '.join(layout.names)}",
         )
     if table.clip and all(each.range is None for each in sensors.values()):
         raise StudyError(
             where, "disturbances.clip: found true, but no range of a sensor, expected one under [sensors]"
         )
-    return found
+    return disturbances
 
 
 def _ordered(low: float, high: float, key: str, where: object) -> None:

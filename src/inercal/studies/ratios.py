@@ -30,10 +30,10 @@ class Ratio:
 
 
 class _RatioText:
-    """What the fields here have in common: read by `parse`, written back as typed."""
+    """Base of the fields here: read by `parse`, written back as typed."""
 
     def parse(self, typed: object) -> Ratio:
-        """Read one value; what is wrong goes to pydantic, which knows the key."""
+        """Read one value; refusals go to pydantic, which knows the key."""
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(
@@ -57,16 +57,16 @@ class ScaleText(_RatioText):
 
     def parse(self, typed: object) -> Ratio:
         """Read one scale."""
-        found = next(self._readings(typed), None)
-        if found is None:
+        ratio = next(self._readings(typed), None)
+        if ratio is None:
             others = ", ".join(f'"{text}"' for text in self.examples[1:])
             raise refusal(
                 f"found {shown(typed)}, expected a number other than 0, or one such as {others}; without an uncertainty"
             )
-        return found
+        return ratio
 
     def _readings(self, typed: object) -> Iterator[Ratio]:
-        """What the text may mean; nothing that is not finite, zero, or uncertain."""
+        """Readings of the text that are finite, not zero, and exact."""
         for quantity, up, electric in self._ratios(typed):
             value = quantity.value if up else 1.0 / quantity.value if quantity.value else math.inf
             if quantity.u == 0.0 and value != 0.0 and math.isfinite(value):
@@ -101,7 +101,7 @@ class ScaleText(_RatioText):
 
 @dataclass(frozen=True)
 class SlopeText(_RatioText):
-    """A change with temperature: ``10 ug/K``; ``dimension`` of what is above the bar, ``example`` a good value."""
+    """A change with temperature: ``10 ug/K``; ``dimension`` above the bar, ``example`` a good value."""
 
     dimension: str
     example: str
@@ -156,7 +156,7 @@ def _bare(text: str) -> str:
 
 
 def _dimension(text: str) -> str:
-    """Dimension of a unit; empty for what is none."""
+    """Dimension of a unit; empty for a text that is none."""
     try:
         return parse_unit(text).dimension if text.strip() else ""
     except QuantityError:

@@ -66,7 +66,7 @@ _SCOPE = "how long a value lasts: until the next sample, position or mounting, o
 
 
 class _Distributed(Strict):
-    """What both kinds of error have in common."""
+    """Keys of both kinds of error."""
 
     @model_validator(mode="after")
     def _one_distribution(self) -> _Distributed:
@@ -226,7 +226,7 @@ def chain_of(
     StudyError
         An error that this kind of table does not have, or one without any distribution.
     """
-    known = {slot.name: slot for slot in slots(table.kind)}
+    by_name = {slot.name: slot for slot in slots(table.kind)}
     given: dict[str, Any] = {name: getattr(table.errors, name) for name in table.errors.model_fields_set}
     usual = given.pop("default", None)
     default = None if usual is None else usual.distribution()
@@ -234,24 +234,24 @@ def chain_of(
         raise StudyError(where, f"{key}.errors.default: found no distribution, expected {_EXPECTED}")
     scopes: dict[str, Scope] = {}
     if usual is not None and usual.scope is not None:
-        scopes = dict.fromkeys(known, Scope(usual.scope))
+        scopes = dict.fromkeys(by_name, Scope(usual.scope))
     errors: dict[str, Distribution] = {}
     for name, error in given.items():
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+        if name not in by_name:
+            near = difflib.get_close_matches(name, by_name, n=1, cutoff=0.0)[0]
             raise StudyError(
                 where, f"{key}.errors.{name}: unknown error of a {table.kind}, did you mean {near}?"
             )
         if error == "none":
             continue
-        distribution = error.distribution() or (None if known[name].is_offset else default)
+        distribution = error.distribution() or (None if by_name[name].is_offset else default)
         if distribution is None:
             raise StudyError(where, f"{key}.errors.{name}: found no distribution, expected {_EXPECTED}")
         errors[name] = distribution
         if error.scope is not None:
             scopes[name] = Scope(error.scope)
     if default is not None:
-        unnamed = (slot.name for slot in known.values() if not slot.optional and slot.name not in given)
+        unnamed = (slot.name for slot in by_name.values() if not slot.optional and slot.name not in given)
         errors |= dict.fromkeys(unnamed, default)
     base = (table.base.azimuth, table.base.tilt_north, table.base.tilt_west)
     return turntable(
@@ -267,7 +267,7 @@ def limits_of(table: RigTable, chain: Chain, where: object) -> dict[str, tuple[f
     StudyError
         Limits of a joint the table does not have, or ends out of order.
     """
-    found = {}
+    limits = {}
     for joint in LimitsTable.model_fields:
         ends = getattr(table.limits, joint)
         if ends is None:
@@ -280,5 +280,5 @@ def limits_of(table: RigTable, chain: Chain, where: object) -> dict[str, tuple[f
                 where,
                 f"rig.limits.{joint}: found {low.text!r} to {high.text!r}, expected the lower end first",
             )
-        found[joint] = (low.value, high.value)
-    return found
+        limits[joint] = (low.value, high.value)
+    return limits

@@ -156,7 +156,7 @@ class HarmonicTable(Strict):
 
 
 class DisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
-    """What a simulation adds to the model; nothing if absent."""
+    """Disturbances that a simulation adds to the model; none if absent."""
 
     harmonics: list[HarmonicTable] = Field(
         default=[],
@@ -219,7 +219,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
 
 
 def _site(table: SiteTable, path: str | Path) -> Site:
-    """The site, whose gravity is uncertain by what is typed alone.
+    """The site; its gravity is as uncertain as typed.
 
     Scale errors of parts in 1e7 are found against gravity; the uncertainty that other studies take for granted where
     none is typed would hide all that the noise does, so it is left to a finding.
@@ -269,7 +269,7 @@ def _filter(table: Any) -> Filter:
 
 
 def _disturbances(table: Any) -> Disturbances:
-    """What a simulation adds."""
+    """Disturbances of a simulation."""
     return settings_of(
         Disturbances,
         table,

@@ -56,7 +56,7 @@ def _bias_like(*examples: str) -> Any:
 
 
 class _SensorTable(Strict):
-    """What accelerometers and gyros have in common; ``scale``, ``bias``, ``bias_slope`` and ``range`` differ."""
+    """Keys of accelerometers and gyros; ``scale``, ``bias``, ``bias_slope`` and ``range`` differ."""
 
     scale_slope: _Relative | None = Field(
         default=None, description="relative change of the scale with temperature; 0 if absent"
@@ -117,8 +117,8 @@ class AccelerometerTable(_SensorTable):
     def _one_direction(self) -> AccelerometerTable:
         """Refuse two directions, and none."""
         if (self.axis is None) == (self.angle is None):
-            found = "neither axis nor angle" if self.axis is None else "both axis and angle"
-            raise refusal(f'found {found}, expected one of them, such as axis = "+x" or angle = "0 deg"')
+            given = "neither axis nor angle" if self.axis is None else "both axis and angle"
+            raise refusal(f'found {given}, expected one of them, such as axis = "+x" or angle = "0 deg"')
         return self
 
 
@@ -257,7 +257,7 @@ def _without_u(quantity: Quantity, key: str, where: str | Path) -> Quantity:
 
 
 def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, Per, str]:
-    """Scale, bias, what the column holds, and what is said against it, from a calibration of ours: output = K0 + K1 a,
+    """Scale, bias, quantity of the column, and a caution, from a calibration of ours: output = K0 + K1 a,
     or D_F + S w."""
     from inercal.estimate.files import load
 
@@ -267,10 +267,10 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
         estimate = load(Path(where).parent / table.calibration)
     except InputError as error:
         raise StudyError(where, f"{key}: {error}") from error
-    found, ended = estimate.parameters, estimate.status
-    said = " ".join(estimate.message.split())  # one line, whoever wrote the file
-    caution = "" if ended is Status.OK else f"{table.calibration} ended {ended.value}: {said}"
-    axes = [axis for axis in "xyz" if {f"{slope}_{axis}", f"{offset}_{axis}"} <= found.keys()]
+    coefficients, ended = estimate.parameters, estimate.status
+    message = " ".join(estimate.message.split())  # one line, whoever wrote the file
+    caution = "" if ended is Status.OK else f"{table.calibration} ended {ended.value}: {message}"
+    axes = [axis for axis in "xyz" if {f"{slope}_{axis}", f"{offset}_{axis}"} <= coefficients.keys()]
     if not axes:
         raise StudyError(
             where,
@@ -285,7 +285,7 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
         raise StudyError(
             where, f"sensors.{name}.channel: found {table.channel!r}, expected one of {', '.join(axes)}"
         )
-    gain, zero = found[f"{slope}_{axis}"], found[f"{offset}_{axis}"]
+    gain, zero = coefficients[f"{slope}_{axis}"], coefficients[f"{offset}_{axis}"]
     unit = parse_unit(zero.unit, f"{where}: {key}")
     if unit.dimension not in ELECTRIC and unit.dimension != (measured := _dimension(name)):
         raise StudyError(
@@ -304,7 +304,7 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
 
 
 def _dimension(name: str) -> str:
-    """What a sensor measures."""
+    """Quantity that a sensor measures."""
     return "rate" if name in GYROS else "acceleration"
 
 

@@ -1,4 +1,4 @@
-"""What a new study of each kind states: the keys in force; `inercal new` adds all others as comments."""
+"""New studies of each kind: the keys in force; `inercal new` adds all others as comments."""
 
 from typing import Final
 

@@ -42,15 +42,15 @@ def settings_of(settings: type[T], table: Any, **more: Any) -> T:
     hints = get_type_hints(settings)
     values: dict[str, Any] = {}
     for field, key in keys_of(settings):
-        stated = getattr(table, key.name or field.name)
+        typed = getattr(table, key.name or field.name)
         if key.several:
-            values[field.name] = tuple(each.value for each in stated or ())
-        elif isinstance(stated, Quantity) and "Quantity" not in str(hints[field.name]):
-            values[field.name] = stated.value
+            values[field.name] = tuple(each.value for each in typed or ())
+        elif isinstance(typed, Quantity) and "Quantity" not in str(hints[field.name]):
+            values[field.name] = typed.value
             if key.u:
-                values[key.u] = stated.u
-        elif stated is not None:
-            values[field.name] = Path(stated) if "Path" in str(hints[field.name]) else stated
+                values[key.u] = typed.u
+        elif typed is not None:
+            values[field.name] = Path(typed) if "Path" in str(hints[field.name]) else typed
     return settings(**values | more)
 
 
@@ -71,7 +71,7 @@ Stated = Annotated[T, _Reader()]
 
 
 def as_typed(data: Mapping[str, Any]) -> dict[str, Any]:
-    """What a study gives, ready for JSON: values as typed, dates as texts."""
+    """The keys of a study, ready for JSON: values as typed, dates as texts."""
 
     def plain(value: Any) -> Any:
         if isinstance(value, Mapping):

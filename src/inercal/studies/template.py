@@ -95,7 +95,7 @@ def _starting(kind: Kind, channels: Mapping[str, Unit | None]) -> dict[str, Any]
 
 
 def _hidden() -> str:
-    """What a template leaves out: more sensors, and errors that a table of two axes does not have."""
+    """Keys that a template leaves out: more sensors, and errors that a table of two axes does not have."""
     two, three = (
         {slot.name for slot in slots(kind)} for kind in ("two_axis_turntable", "three_axis_turntable")
     )
@@ -103,20 +103,20 @@ def _hidden() -> str:
 
 
 def _with_instrument(body: str, lines: str, given: Mapping[str, Any]) -> str:
-    """The study with examples for the kind of its instrument, and what is given of it."""
+    """The study with examples for the kind of its instrument, and its given keys."""
     values = {**given, **given.get("coefficients", {})}
     values.pop("coefficients", None)
     for key, value in values.items():
-        found = re.search(rf"(?m)^(?:# )?{re.escape(key)} = .*?(?: +# (.*))?$", lines)
-        if found is not None:
-            stated = "\n".join(line(key, value, found[1] or "", True))
-            lines = lines[: found.start()] + stated + lines[found.end() :]
+        place = re.search(rf"(?m)^(?:# )?{re.escape(key)} = .*?(?: +# (.*))?$", lines)
+        if place is not None:
+            text = "\n".join(line(key, value, place[1] or "", True))
+            lines = lines[: place.start()] + text + lines[place.end() :]
             continue
         inner = ".coefficients" if key in given.get("coefficients", {}) else ""
         heading = re.search(rf"(?m)^\[instrument{inner}\].*\n", lines)
         assert heading is not None
-        stated = "\n".join(line(key, value, "", True))
-        lines = f"{lines[: heading.end()]}{stated}\n{lines[heading.end() :]}"
+        text = "\n".join(line(key, value, "", True))
+        lines = f"{lines[: heading.end()]}{text}\n{lines[heading.end() :]}"
     start = re.search(r"(?m)^(# )?\[instrument\]", body)
     end = re.search(r"(?m)^(# )?\[design\]", body)
     assert start is not None

@@ -82,10 +82,12 @@ def instrument_lines(channels: Mapping[str, Unit | None]) -> str:
     ]
     if kind in _RESPONSE:
         response = _RESPONSE[kind].format(**words)
-        stated = (
+        response_words = (
             f'"stated", which needs {response} below' if raw else f'"stated": {response} of the table below'
         )
-        lines.append(_example("earth_rate", '"fitted"', f"or {stated}; if absent where the plan allows"))
+        lines.append(
+            _example("earth_rate", '"fitted"', f"or {response_words}; if absent where the plan allows")
+        )
     lines += [
         "",
         f"{'[instrument.coefficients]':35s} # true values to simulate; stated ones of what is not fitted",

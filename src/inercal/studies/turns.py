@@ -40,7 +40,7 @@ class MoveTexts:
     """Makes a pydantic field read a turn or a rest."""
 
     def parse(self, typed: object) -> TypedMove:
-        """Read one; what is wrong goes to pydantic, which knows the key."""
+        """Read one; refusals go to pydantic, which knows the key."""
         match typed:
             case ["rest", str(time)]:
                 return TypedMove(Rest(_TIME.parse(time).value), ["rest", time])
@@ -77,7 +77,7 @@ class MoveTexts:
 
 
 class PlanTable(Strict):
-    """What the gimbals are commanded: turns one after the other, or a path by its name."""
+    """Commands to the gimbals: turns one after the other, or a path by its name."""
 
     turns: list[Annotated[TypedMove, MoveTexts()]] | None = Field(
         default=None,
@@ -108,8 +108,8 @@ def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
         case PlanTable(turns=list(turns), path=None):
             plan = Plan(tuple(each.move for each in turns))
         case _:
-            found = "both turns and path" if table.turns else "neither turns nor path"
-            raise StudyError(where, f"plan: found {found}, expected one of them")
+            given = "both turns and path" if table.turns else "neither turns nor path"
+            raise StudyError(where, f"plan: found {given}, expected one of them")
     if table.rate is not None:
         plan = replace(plan, rate=table.rate.value)
     if table.step is not None:

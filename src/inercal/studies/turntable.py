@@ -136,13 +136,13 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
 
 
 def _analysis(table: AnalysisTable, where: object) -> Analysis:
-    """How to analyse; each output once."""
+    """Settings of an analysis; each output once."""
     _once(table.outputs, "analysis.outputs", where)
     return settings_of(Analysis, table, outputs=tuple(table.outputs))
 
 
 def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> Design:
-    """How to search for positions."""
+    """Settings of a search for positions."""
     constraint = None
     if table.sensitivity is not None:
         limit = table.sensitivity
@@ -167,15 +167,15 @@ def _rate_test(table: RateTestTable, chain: Chain, where: object) -> RateTest:
     return settings_of(RateTest, table, at=at)
 
 
-def _known(names: Sequence[str], known: Sequence[str], key: str, where: object) -> None:
+def _known(names: Sequence[str], choices: Sequence[str], key: str, where: object) -> None:
     """Refuse a name the table does not have."""
     for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
+        if name not in choices:
+            near = difflib.get_close_matches(name[:80], choices, n=1, cutoff=0.5)
             hint = (
                 f"did you mean {near[0]}?"
                 if near
-                else f"expected {', '.join(known) or 'errors in rig.errors'}"
+                else f"expected {', '.join(choices) or 'errors in rig.errors'}"
             )
             raise StudyError(where, f"{key}: found {name!r}, {hint}")
 

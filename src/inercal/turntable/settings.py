@@ -1,4 +1,4 @@
-"""What an analysis, a design, a simulation or a calibration on a turntable is told."""
+"""Settings of an analysis, a design, a simulation or a calibration on a turntable."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Instrument:
     terms : tuple of str or None
         Terms to be estimated, for any of its channels; None: those usual for the kind.
     coefficients : mapping
-        Stated values of terms: the truth of a simulation, and in a calibration what is not fitted. In the units
+        Stated values of terms: the truth of a simulation, and in a calibration the terms not fitted. In the units
         of the term table, with that SI unit for ``output``.
     coefficients_u : mapping
         Their standard uncertainties, where stated.

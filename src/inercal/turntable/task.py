@@ -29,7 +29,7 @@ def calibrate(
     settings : TurntableSettings
         Site, table with its errors, instrument; with a ``rate_test``, the record is one.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Returns
     -------

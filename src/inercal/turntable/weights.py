@@ -21,7 +21,7 @@ class Weights:
     """Covariance of the readings.
 
     ``within`` (n, c, c) covariance redrawn at each position, noise and table; ``common`` (n, c, q) derivatives
-    with respect to what is constant, in its standard deviations: errors of the table, then inputs beside it.
+    with respect to the constants, in their standard deviations: errors of the table, then inputs beside it.
     """
 
     within: Array
@@ -35,7 +35,7 @@ class Weights:
 
 @dataclass(frozen=True, eq=False)
 class Whitened:
-    """A regression in readings of unit covariance, with the prior of what is constant as rows of its own.
+    """A regression in readings of unit covariance, with the prior of the constants as rows of its own.
 
     ``inverse`` (n, c, c) of the roots of ``within``, by which the readings are multiplied; ``right`` (n c,) the
     readings; ``rows`` (n c + q, p + q) the regressors and columns of ``common``, each over its ``length`` (p + q,).

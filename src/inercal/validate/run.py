@@ -108,7 +108,7 @@ def validate(executor: Executor, progress: Callable[[int, int], None] | None = N
 
 
 def _find_all(numbers: Iterable[int]) -> list[Numbers]:
-    """What the cases of some systems, by number, found."""
+    """Results of the cases of some systems, by number."""
     systems = list(SYSTEMS)
     return [find(case) for number in numbers for case in cases_of(systems[number])]
 
@@ -147,7 +147,7 @@ def _versions() -> dict[str, str]:
 
 
 def _machine() -> dict[str, Any]:
-    """What the numbers were computed on."""
+    """Machine that computed the numbers."""
     return {
         "system": platform.platform(),
         "processor": platform.processor() or platform.machine(),

@@ -21,9 +21,8 @@ from inercal.imu.aided.model import side_of, unknowns
 from inercal.imu.aided.outcome import assemble, without_fit
 from inercal.imu.aided.table import Motion, motion_of, shifted, times
 from inercal.imu.aided.walk import whiten
-from inercal.imu.aided_settings import AidedSettings
 from inercal.imu.limits import LIMITS
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import AidedSettings, ImuSettings
 from inercal.records.places import counted
 from inercal.records.record import Record
 
@@ -56,7 +55,7 @@ def calibrate_aided(
     options : AidedSettings
         The table.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Returns
     -------
@@ -106,7 +105,7 @@ def calibrate_aided(
     elif wrong:
         bad = Status.INCONSISTENT, _contradiction(wrong, blocks, motion)
     if bad is not None:
-        estimate = without_fit(record, settings, *bad, said=(*findings, *motion.findings))
+        estimate = without_fit(record, settings, *bad, earlier=(*findings, *motion.findings))
         return AidedCalibration(timed(estimate, clock), motion, rests)
     progress("fitting all sensors")
     layout = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)

@@ -25,12 +25,14 @@ _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 def pictures(calibration: AidedCalibration) -> list[Picture]:
     """Draw what there is to see of a calibration, of any status; without a fit there is only the table."""
     names = calibration.estimate.names
-    drawn = [*([values(calibration.estimate)] if names else []), _test(calibration)]
+    pictures = [*([values(calibration.estimate)] if names else []), _test(calibration)]
     if calibration.fit is not None:
-        drawn += [_biases(calibration.fit, calibration.rests, triad) for triad in calibration.fit.identified]
+        pictures += [
+            _biases(calibration.fit, calibration.rests, triad) for triad in calibration.fit.identified
+        ]
     if names:
-        drawn += [correlation(calibration.estimate), budget(calibration.estimate)]
-    return drawn
+        pictures += [correlation(calibration.estimate), budget(calibration.estimate)]
+    return pictures
 
 
 def _test(calibration: AidedCalibration) -> Picture:

@@ -21,7 +21,7 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.imu.aided.blocks import Blocks, Reference
 from inercal.imu.aided.table import Motion, error_nodes
-from inercal.imu.aided_settings import AidedSettings
+from inercal.imu.settings import AidedSettings
 
 Indices = NDArray[np.int64]
 

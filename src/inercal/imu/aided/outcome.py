@@ -55,7 +55,7 @@ def assemble(
     fit: Fit,
     lag: float,
     settings: ImuSettings,
-    said: list[Finding],
+    earlier: list[Finding],
 ) -> Estimate:
     """Put the estimate together."""
     triads = tuple(fit.identified)
@@ -85,7 +85,12 @@ def assemble(
         values,
         combine(names, [*sources_a, *sources_b]),
         judged,
-        findings=(*settled(record.findings, *MASKED), *said, *motion.findings, *findings(fit, lag, faulty)),
+        findings=(
+            *settled(record.findings, *MASKED),
+            *earlier,
+            *motion.findings,
+            *findings(fit, lag, faulty),
+        ),
         statistics=_statistics(fit, rests),
         result={
             "method": "aided",
@@ -99,36 +104,36 @@ def assemble(
 
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
-    """What the estimate rests on."""
+    """The basis of the estimate."""
     return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
 
 
 def without_fit(
-    record: Record, settings: ImuSettings, status: Status, message: str, said: Sequence[Finding] = ()
+    record: Record, settings: ImuSettings, status: Status, message: str, earlier: Sequence[Finding] = ()
 ) -> Estimate:
     """The estimate of a test that cannot be fitted: no parameters, but why."""
     return Estimate.without(
         _basis(record, settings),
         status,
         message,
-        findings=(*settled(record.findings, *MASKED), *said),
+        findings=(*settled(record.findings, *MASKED), *earlier),
         result={"method": "aided", "rests": []},
     )
 
 
 def _statistics(fit: Fit, rests: Array) -> dict[str, float]:
     """Numbers about the fit."""
-    found: dict[str, float] = {"rests": float(len(rests))}
+    statistics: dict[str, float] = {"rests": float(len(rests))}
     for triad, prefix in (("acc", ""), ("gyro", "gyro_")):
         if triad in fit.identified:
             sensors = of_triad(fit, triad)
             squares = [np.mean(sensor.residual**2) for sensor in sensors]
-            found |= {
+            statistics |= {
                 f"{prefix}dof": float(3 * (len(sensors[0].residual) - 1) - len(fit.identified[triad].names)),
                 f"{prefix}condition": fit.identified[triad].condition,
                 f"{prefix}residual_rms": float(np.sqrt(np.mean(squares))),
             }
-    return found
+    return statistics
 
 
 def _with_u(fit: Fit, group: str, offset: float = 0.0) -> dict[str, list[float]]:

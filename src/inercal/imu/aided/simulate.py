@@ -18,7 +18,7 @@ from inercal.rigs.chain import Chain
 from inercal.units import parse_unit
 
 Program = Sequence[tuple[str, float, float]]
-"""What the table does: ``("rest", 0, duration)`` or (joint, angle [rad], duration), durations in seconds."""
+"""Moves of the table: ``("rest", 0, duration)`` or (joint, angle [rad], duration), durations in seconds."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What to say of a calibration on a table: its status in words, and its findings."""
+"""Verdict of a calibration on a table: its status in words, and its findings."""
 
 from __future__ import annotations
 
@@ -56,21 +56,24 @@ def verdict(
                 "instrument that is not fixed to it, outputs that saturate or are not linear)",
             )
     for triad in triads:
-        known = fit.identified[triad]
-        weak = [name for name in known.names if _relative(name, values, u) > LIMITS.unknown_coefficient_u]
+        identified = fit.identified[triad]
+        weak = [
+            name for name in identified.names if _relative(name, values, u) > LIMITS.unknown_coefficient_u
+        ]
         if weak:
             return (
                 Status.UNOBSERVABLE,
                 f"the test says next to nothing of {counted_names(weak)} ({_least(fit, triad)}): {_cure(fit, triad)}",
             )
     for triad in triads:
-        known = fit.identified[triad]
-        if known.condition > WORST_BY_SIZE:
-            term = known.leading_term()
+        identified = fit.identified[triad]
+        if identified.condition > WORST_BY_SIZE:
+            term = identified.leading_term()
             return (
                 Status.ILL_CONDITIONED,
                 f"the test hardly fixes {term} ({' ± '.join(rounded(values[term], u[term]))}; weak combination "
-                f"{known.weakest()}, condition {known.condition:.0f}; {_least(fit, triad)}): {_cure(fit, triad)}",
+                f"{identified.weakest()}, condition {identified.condition:.0f}; {_least(fit, triad)}): "
+                f"{_cure(fit, triad)}",
             )
     if not fit.converged:
         return Status.NOT_CONVERGED, "the fit of all sensors together did not settle: look at the residuals"
@@ -82,7 +85,7 @@ def verdict(
 
 
 def _cure(fit: Fit, triad: str) -> str:
-    """What to do for a triad of which the test says too little."""
+    """The remedy for a triad that the test leaves too uncertain."""
     clipped = of_triad(fit, triad)[0].side.blocks.clipped
     if clipped:
         what = "turn slower" if triad == "gyro" else "avoid knocks"
@@ -141,7 +144,7 @@ def _least(fit: Fit, triad: str) -> str:
 
 
 def _unit_words(fit: Fit, triad: str) -> str:
-    """What is wrong with the unit of outputs that are physical: their scale factors should be near nominal."""
+    """Findings about the unit of physical outputs, whose scale factors should be near nominal."""
     unit = of_triad(fit, triad)[0].side.blocks.triad.unit
     if unit.dimension in ("count", "voltage"):
         return ""

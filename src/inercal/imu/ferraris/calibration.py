@@ -24,8 +24,7 @@ from inercal.imu.ferraris.verdict import (
     unused_labels,
     wrong_axes,
 )
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import FerrarisSettings, ImuSettings
 from inercal.records.column import Triad
 from inercal.records.record import Record
 
@@ -62,7 +61,7 @@ def calibrate_ferraris(
     options : FerrarisSettings
         The turns, alignment and sections.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Returns
     -------

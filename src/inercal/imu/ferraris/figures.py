@@ -34,12 +34,12 @@ _GAP = 0.5
 def pictures(calibration: FerrarisCalibration) -> list[Picture]:
     """Draw what there is to see of a calibration, of any status; without all sections there is one picture."""
     estimate, scatter = calibration.estimate, calibration.scatter
-    drawn = [*([values(estimate)] if estimate.names else []), _sections(calibration)]
+    pictures = [*([values(estimate)] if estimate.names else []), _sections(calibration)]
     if scatter is not None:
-        drawn += [_positions(calibration, scatter), _turns(calibration)]
+        pictures += [_positions(calibration, scatter), _turns(calibration)]
     if estimate.names:
-        drawn += [correlation(estimate), budget(estimate)]
-    return drawn
+        pictures += [correlation(estimate), budget(estimate)]
+    return pictures
 
 
 def _sections(calibration: FerrarisCalibration) -> Picture:
@@ -91,7 +91,7 @@ def _pieces(triad: Triad) -> Iterator[tuple[Array, Array]]:
 
 
 def _positions(calibration: FerrarisCalibration, scatter: Scatter) -> Picture:
-    """What the two positions of each axis leave over on the other two."""
+    """Residuals of the two positions of each axis on the other two."""
     assert calibration.solution is not None
     assert calibration.readings is not None
     gravity = float(calibration.readings.inputs.gravity)
@@ -104,12 +104,12 @@ def _positions(calibration: FerrarisCalibration, scatter: Scatter) -> Picture:
         Level(0.0),
         Dots(np.arange(len(pairs)), [tilts[pair] for pair in pairs]),
     ]
-    said = "as stated" if math.isinf(scatter.tilt_dof) else "as these six scatter"
+    basis = "as stated" if math.isinf(scatter.tilt_dof) else "as these six scatter"
     return draw(
         "Scatter of the positions",
         "Mean output of the two opposite positions of an axis, less the bias, on the other two axes, as an angle of "
         "gravity: half the difference of the directions of the two positions from upright. Band: ± one standard "
-        f"deviation for positions upright to {math.degrees(scatter.tilt):.2g}° each ({said}), the alignment on which "
+        f"deviation for positions upright to {math.degrees(scatter.tilt):.2g}° each ({basis}), the alignment on which "
         "the uncertainties of the misalignments rest. What both positions of a pair have in common does not show here.",
         [[Panel(marks, Axis(names=labels, size=7.5), Axis("left over [°]"), grid="y")]],
         2.1,
@@ -119,11 +119,11 @@ def _positions(calibration: FerrarisCalibration, scatter: Scatter) -> Picture:
 def _turns(calibration: FerrarisCalibration) -> Picture:
     """The calibrated rate about the three axes in each turn."""
     assert calibration.solution is not None
-    gyro, found, rows = calibration.gyro, calibration.solution, calibration.sections.gyro
+    gyro, matrices, rows = calibration.gyro, calibration.solution, calibration.sections.gyro
     panels = []
     for name in TURNS:
         t = gyro.t[rows[name]]
-        rate = np.degrees(found.gyro.correct(gyro.values[rows[name]]))
+        rate = np.degrees(matrices.gyro.correct(gyro.values[rows[name]]))
         lines = [
             Line(*envelope(t - t[0], rate[:, k]), f"about {axis}", _OF_AXES[k])
             for k, axis in enumerate("xyz")

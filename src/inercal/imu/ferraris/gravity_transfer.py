@@ -126,7 +126,7 @@ class _Problem:
         return solve(residuals, jacobian, x, _NAMES, typical)
 
     def miss(self, fit: NonlinearFit, miss: float) -> float:
-        """Standard deviation of a miss by the residuals and by what is to be expected."""
+        """Standard deviation of a miss by the residuals, and that to be expected."""
         rows = 3 * len(self.ways)
         J, left = fit.jacobian[:rows], miss * fit.residuals[:rows]
         # a miss has two dimensions; the fit takes what the data determine of the parameters

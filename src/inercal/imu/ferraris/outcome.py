@@ -19,8 +19,7 @@ from inercal.imu.ferraris.names import POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.sections import Sections
 from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_covariance, type_a, type_b
 from inercal.imu.ferraris.verdict import too_few, verdict
-from inercal.imu.ferraris_settings import FerrarisSettings
-from inercal.imu.settings import COMMAND, MASKED, ImuSettings
+from inercal.imu.settings import COMMAND, MASKED, FerrarisSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
 from inercal.records.record import Record
@@ -61,7 +60,7 @@ def assemble(
     from_outside = type_b(errors, settings.site, settings.time_base_u, options, acc_unit, gyro_unit)
     if sections.turns is not None:
         from_outside += doubtful_turns(errors, sections.turns.doubt)
-    known = combine(NAMES, [*from_data, *from_outside])
+    uncertainty = combine(NAMES, [*from_data, *from_outside])
     residual = np.sum([source.covariance for source in from_data], axis=0)
     gain = np.abs(np.diag(errors.solution.force_gain))
     left = scatter.left["acc"] / gain
@@ -70,7 +69,7 @@ def assemble(
         NAMES,
         [_unit(name, acc_unit, gyro_unit) for name in NAMES],
         values,
-        known,
+        uncertainty,
         verdict(readings, scatter, against, options),
         findings=(*settled(record.findings, *MASKED), *findings),
         statistics={
@@ -88,7 +87,7 @@ def assemble(
             "found_by": sections.found_by,
             "sections": _section_table(triads[0], sections),
             "positions": _position_table(left),
-            "least_squares": _least_squares_table(values, known.u, errors),
+            "least_squares": _least_squares_table(values, uncertainty.u, errors),
             "u_residual": dict(zip(NAMES, np.sqrt(np.diag(residual)).tolist(), strict=True)),
             "u_noise": dict(zip(NAMES, np.sqrt(np.diag(noise_covariance(errors))).tolist(), strict=True)),
             "unit": {"acc": acc_unit, "gyro": gyro_unit},
@@ -97,7 +96,7 @@ def assemble(
 
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
-    """What the estimate rests on."""
+    """The basis of the estimate."""
     return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
 
 
@@ -148,7 +147,7 @@ def _section_table(acc: Triad, sections: Sections) -> list[Mapping[str, Any]]:
 
 
 def _position_table(left: Array) -> list[Mapping[str, Any]]:
-    """What the two positions of each axis leave over on the other two [m/s^2]."""
+    """Residuals of the two positions of each axis on the other two [m/s^2]."""
     return [
         {"positions": f"{axis}_p, {axis}_a"}
         | {f"on_{i}_m_s2": float(value) for i, value in zip("xyz", row, strict=True)}

@@ -14,9 +14,9 @@ from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Inputs
 from inercal.imu.ferraris.names import POSITIONS, TURNS
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.limits import LIMITS
 from inercal.imu.recording import clipped_rows, coarse_steps
+from inercal.imu.settings import FerrarisSettings
 from inercal.noise.dwell_means import AllanFit, fit_pooled
 from inercal.records.column import Triad
 
@@ -132,11 +132,11 @@ def _of_turn(
     gains = (f"S_{axis}", *(f"T_{i}{axis}" for i in "xyz" if i != axis))
     steps = np.diff(t)
     if not np.all((steps > 0.0) & (steps <= longest)):
-        said = f"samples are missing in the turn {name}: its angle is not known"
-        yield Finding("poor_section", said, where, gains)
+        text = f"samples are missing in the turn {name}: its angle is not known"
+        yield Finding("poor_section", text, where, gains)
     if clipped:
-        said = f"the gyro saturates in the turn {name}: its integral is too small"
-        yield Finding("saturation", said, where, gains)
+        text = f"the gyro saturates in the turn {name}: its integral is too small"
+        yield Finding("saturation", text, where, gains)
     largest = float(np.max(np.abs(rate)))
     edges = [float(np.max(np.abs(part.mean(axis=0)))) for part in (rate[:_EDGE], rate[-_EDGE:])]
     if max(edges) > LIMITS.cut_rate * largest:

@@ -16,8 +16,8 @@ from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
-from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.limits import LIMITS
+from inercal.imu.settings import FerrarisSettings
 
 DOF = 6
 """Equations left over in the positions of either sensor."""

@@ -13,7 +13,7 @@ from inercal.errors import RecordError, StudyError
 from inercal.imu.ferraris.detection import detect
 from inercal.imu.ferraris.names import NAMES, TURNS
 from inercal.imu.ferraris.which_turn import Choice, choose
-from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.imu.settings import FerrarisSettings
 from inercal.records.column import Triad
 from inercal.records.places import counted, counted_names, places
 from inercal.records.record import Record
@@ -67,10 +67,10 @@ def find_sections(record: Record, acc: Triad, gyro: Triad, options: FerrarisSett
         turns = choose(acc, gyro, seen, options)
         spans = seen.positions | {TURNS[axis]: (m.start, m.stop) for axis, m in turns.motions.items()}
         rows = {name: np.arange(start, stop) for name, (start, stop) in spans.items()}
-    known = {name: _recorded(name, found, acc) for name, found in rows.items()}
-    other = {name: _recorded(name, _on(gyro, acc, found), gyro) for name, found in known.items()}
+    of_acc = {name: _recorded(name, span, acc) for name, span in rows.items()}
+    of_gyro = {name: _recorded(name, _on(gyro, acc, span), gyro) for name, span in of_acc.items()}
     strange = () if options.sections else tuple(sorted(filter(_is_strange, set(record.labels))))
-    return Sections(known, other, found_by, turns, strange)
+    return Sections(of_acc, of_gyro, found_by, turns, strange)
 
 
 def _canonical(label: str) -> str:

@@ -19,7 +19,7 @@ from inercal.imu.ferraris.method import Matrices, derivatives
 from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.scatter import Scatter
-from inercal.imu.ferraris_settings import FerrarisSettings
+from inercal.imu.settings import FerrarisSettings
 
 _AXIS = np.repeat(np.arange(3), 2)
 

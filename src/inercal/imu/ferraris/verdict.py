@@ -1,4 +1,4 @@
-"""What to say of a Ferraris calibration: contradictions, findings, status in words."""
+"""Verdict of a Ferraris calibration: contradictions, findings, status in words."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from inercal.imu.ferraris.names import NAMES, POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.scatter import Scatter
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.limits import LIMITS
 from inercal.imu.recording import unit_words
+from inercal.imu.settings import FerrarisSettings
 from inercal.records.column import Triad
 from inercal.records.places import counted_names
 
@@ -25,7 +25,7 @@ from inercal.records.places import counted_names
 def too_few(sections: Sections) -> str:
     """Which sections there are not, and what to do."""
     missing = sections.missing
-    found = len(NAMES) - len(missing)
+    present = len(NAMES) - len(missing)
     wanted = ", ".join(f"{name} ({in_words(name)})" for name in missing)
     how = {
         "labels": "label it in the recording",
@@ -34,7 +34,7 @@ def too_few(sections: Sections) -> str:
     }[sections.found_by]
     plural = how if len(missing) == 1 else how.replace(" it", " them")
     strange = f" (found the labels {counted_names(sections.strange)})" if sections.strange else ""
-    return f"found {found} of the nine sections, not {wanted}: {plural}{strange}"
+    return f"found {present} of the nine sections, not {wanted}: {plural}{strange}"
 
 
 def unused_labels(sections: Sections) -> list[Finding]:
@@ -50,16 +50,16 @@ def unused_labels(sections: Sections) -> list[Finding]:
 
 def contradictions(
     triads: tuple[Triad, Triad],
-    found: Matrices,
+    matrices: Matrices,
     misses: tuple[float, float] | None,
     options: FerrarisSettings,
 ) -> Iterator[Finding]:
-    """What in the data contradicts the sections or the stated turn: findings that make a result inconsistent."""
-    for triad, model in zip(triads, (found.accelerometer, found.gyro), strict=True):
+    """Contradictions of the data to the sections or the stated turn, which make a result inconsistent."""
+    for triad, model in zip(triads, (matrices.accelerometer, matrices.gyro), strict=True):
         wrong = unit_words(triad, replace(model, scale=np.abs(model.scale)))
         if wrong:
             yield Finding("unit_suspect", wrong, harm=EVERYTHING)
-    sign = np.sign(np.diag(found.rate_gain))
+    sign = np.sign(np.diag(matrices.rate_gain))
     if np.ptp(sign) > 0.0:
         odd = 1.0 if np.sum(sign > 0.0) == 1 else -1.0
         axis = "xyz"[int(np.argmax(sign == odd))]
@@ -99,8 +99,8 @@ def wrong_axes(x: Inputs, weights: Array) -> Iterator[Finding]:
             shows = "show" if sensor == "acc" else "shows"
             seen = int(np.argmax(np.abs(by_axis[:, j])))
             if abs(by_axis[seen, j]) < LIMITS.faint_response:
-                said = f"{what} {shows} hardly on any axis of {sensor}: check the sections"
-                yield Finding("contradiction", said, harm=EVERYTHING)
+                text = f"{what} {shows} hardly on any axis of {sensor}: check the sections"
+                yield Finding("contradiction", text, harm=EVERYTHING)
             elif seen != j:
                 yield Finding(
                     "channel_swap",
@@ -117,25 +117,25 @@ def wrong_axes(x: Inputs, weights: Array) -> Iterator[Finding]:
 
 
 def sense_finding(
-    found: Matrices, misses: tuple[float, float] | None, options: FerrarisSettings
+    matrices: Matrices, misses: tuple[float, float] | None, options: FerrarisSettings
 ) -> Iterator[Finding]:
     """A gyro that runs against the stated sense on all axes: negative scale factors, and what they may mean.
 
     A negative sense of the turns is no default: it was stated on purpose, and is believed.
     """
-    if np.any(np.diag(found.rate_gain) > 0.0):
+    if np.any(np.diag(matrices.rate_gain) > 0.0):
         return
-    said = "all three gyro axes run against the stated sense of the turns, so that the scale factors S are negative: "
+    text = "all three gyro axes run against the stated sense of the turns, so that the scale factors S are negative: "
     if misses is None:
         yield Finding(
             "sign_suspect",
-            said
+            text
             + "the gyro counts against the right-hand rule, or the turns were made the other way (then change "
             "the sign of imu.ferraris.turn); the recording lacks the motion between the positions that would tell",
             harm=() if options.turn < 0.0 else ("gyro",),
         )
     else:
-        yield Finding("sign_suspect", said + "the gyro counts against the right-hand rule", harm=())
+        yield Finding("sign_suspect", text + "the gyro counts against the right-hand rule", harm=())
 
 
 def scatter_findings(scatter: Scatter, options: FerrarisSettings) -> Iterator[Finding]:

@@ -14,8 +14,8 @@ from inercal.imu.ferraris.detection import Detected
 from inercal.imu.ferraris.gravity_transfer import Carried, carry
 from inercal.imu.ferraris.motions import Motion
 from inercal.imu.ferraris.names import POSITIONS, TURNS
-from inercal.imu.ferraris_settings import FerrarisSettings
 from inercal.imu.limits import LIMITS
+from inercal.imu.settings import FerrarisSettings
 from inercal.records.column import Triad
 
 ASK = "label it, or state it under imu.ferraris.sections"

@@ -50,7 +50,7 @@ def calibrate_multiposition(
     settings : ImuSettings
         Site and options.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Returns
     -------

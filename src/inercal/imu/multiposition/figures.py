@@ -36,17 +36,17 @@ def pictures(calibration: MultipositionCalibration) -> list[Picture]:
         Of any status; without poses there is one picture, without a gyro there are none of turns.
     """
     estimate, poses, gyro = calibration.estimate, calibration.poses, calibration.gyro
-    drawn = [] if poses is None else [_sphere(poses)]
-    drawn += [values(estimate)] if estimate.names else []
-    drawn.append(_rest(calibration))
+    pictures = [] if poses is None else [_sphere(poses)]
+    pictures += [values(estimate)] if estimate.names else []
+    pictures.append(_rest(calibration))
     if poses is not None:
-        drawn.append(_residuals(poses, estimate.statistics["scatter"]))
+        pictures.append(_residuals(poses, estimate.statistics["scatter"]))
     if gyro is not None:
         durations = np.array([turn["duration_s"] for turn in estimate.result["turns"]])
-        drawn.append(_misses(gyro, durations, estimate.statistics["scatter"]))
+        pictures.append(_misses(gyro, durations, estimate.statistics["scatter"]))
     if estimate.names:
-        drawn += [correlation(estimate), budget(estimate)]
-    return drawn
+        pictures += [correlation(estimate), budget(estimate)]
+    return pictures
 
 
 def _rest(calibration: MultipositionCalibration) -> Picture:

@@ -58,9 +58,9 @@ def assemble(
     from_scatter = type_a(joint, scatter, gyro_unit)
     resolution = recording.resolution.get("gyro", np.zeros(3))
     from_outside = type_b(joint, settings.site, settings.time_base_u, resolution, gyro_unit)
-    known = combine(joint.names, [*from_scatter, *from_outside])
+    uncertainty = combine(joint.names, [*from_scatter, *from_outside])
     residual = np.sum([source.covariance for source in from_scatter], axis=0)
-    u = dict(zip(joint.names, known.u.tolist(), strict=True))
+    u = dict(zip(joint.names, uncertainty.u.tolist(), strict=True))
     noise = noise_covariance(joint, *_noise(recording, poses, joint))
     acc, gyro = poses.accelerometer, joint.gyro
     statistics = {
@@ -84,7 +84,7 @@ def assemble(
         joint.names,
         [_unit(name, recording) for name in joint.names],
         joint.values,
-        known,
+        uncertainty,
         verdict(recording, poses, joint.gyro, settings.site.gravity, u, findings),
         findings=(*settled(record.findings, *MASKED), *findings),
         statistics=statistics,
@@ -101,7 +101,7 @@ def assemble(
 
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
-    """What the estimate rests on."""
+    """The basis of the estimate."""
     return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
 
 
@@ -176,9 +176,9 @@ def _turn_table(joint: Joint) -> list[Mapping[str, Any]]:
 def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> Estimate:
     """The estimate of a recording whose poses fix nothing: no parameters, but why, and what to do."""
     y, window = recording.accelerometer.values, recording.window
-    found = {m: distinct(dwells_at(recording, m, False), y, window) for m in MULTIPLES}
-    best = max(found, key=lambda m: len(found[m]))
-    dwells = found[best]
+    candidates = {m: distinct(dwells_at(recording, m, False), y, window) for m in MULTIPLES}
+    best = max(candidates, key=lambda m: len(candidates[m]))
+    dwells = candidates[best]
     if len(dwells) < LIMITS.fewest_poses:
         status = Status.TOO_FEW_INTERVALS
         message = (

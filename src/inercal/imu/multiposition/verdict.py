@@ -1,4 +1,4 @@
-"""What to say of a calibration: its status in words, the pose that would cure a weak one, its findings."""
+"""Verdict of a calibration: its status in words, the pose that would cure a weak one, its findings."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
 
     One of the 26 along axes, edges and corners of a cube; ``gravity`` [m/s^2] is the size it would have there.
     """
-    known = fit.fit.identifiability
-    weak = known.directions[-1] / known.scale
+    identified = fit.fit.identifiability
+    weak = identified.directions[-1] / identified.scale
     grid = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
     grid /= np.linalg.norm(grid, axis=1, keepdims=True)
     there = AccelerometerFit(fit.model, gravity * grid, fit.fit)
     # residual |f| - g changes with the parameters as f does along its own direction
-    told = np.einsum("ni,nip,p->n", grid, there.force_sensitivity(), weak)
-    return np.asarray(grid[np.argmax(np.abs(told))])
+    gain = np.einsum("ni,nip,p->n", grid, there.force_sensitivity(), weak)
+    return np.asarray(grid[np.argmax(np.abs(gain))])
 
 
 def spread_words(means: Array) -> str:
-    """How the mean outputs of the poses are spread, in words, where they do not fill a sphere."""
+    """Spread of the mean outputs of the poses, in words, where they do not fill a sphere."""
     s = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)
     if s[1] < 0.05 * s[0]:
         return "along one line"
@@ -69,29 +69,29 @@ def verdict(
     u: dict[str, float],
     findings: list[Finding],
 ) -> tuple[Status, str]:
-    """Status and message; ``u`` the standard uncertainties by name, ``findings`` what was said already."""
+    """Status and message; ``u`` are the standard uncertainties by name, ``findings`` the earlier ones."""
     acc = poses.accelerometer
     of_gyro = None if gyro is None else gyro.model
     for triad, model in ((recording.accelerometer, acc.model), (recording.gyro, of_gyro)):
         wrong = "" if triad is None or model is None else unit_words(triad, model)
         if wrong:
             return Status.INCONSISTENT, wrong
-    known = acc.fit.identifiability
-    if known.condition > WORST_BY_SIZE:
-        term = known.leading_term()
-        value = float(acc.fit.x[known.names.index(term)])
+    identified = acc.fit.identifiability
+    if identified.condition > WORST_BY_SIZE:
+        term = identified.leading_term()
+        value = float(acc.fit.x[identified.names.index(term)])
         number = " ± ".join(rounded(value, u[term])) + (" rad" if term.startswith("M_") else "")
         # poses that leave a null space never come so far: see `inercal.imu.multiposition.poses`
         return (
             Status.ILL_CONDITIONED,
             f"the {len(poses.dwells)} poses hardly fix {term} ({number}; weak "
-            f"combination {known.weakest()}, condition {known.condition:.0f}): add poses with the specific "
+            f"combination {identified.weakest()}, condition {identified.condition:.0f}): add poses with the specific "
             f"force along {pose_words(curing_pose(acc, gravity))} and its opposite",
         )
     if gyro is None and recording.gyro is not None:
-        said = [finding.message for finding in findings if finding.code == "contradiction"]
-        if said:
-            return Status.INCONSISTENT, said[0]
+        contradictions = [finding.message for finding in findings if finding.code == "contradiction"]
+        if contradictions:
+            return Status.INCONSISTENT, contradictions[0]
         return (
             Status.TOO_FEW_INTERVALS,
             f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses; the gyro could not be "
@@ -99,17 +99,17 @@ def verdict(
         )
     if gyro is None:
         return Status.OK, f"{len(u)} coefficients of the accelerometers from {len(poses.dwells)} poses"
-    known = gyro.geometry
-    if known.condition > WORST_BY_SIZE:
-        term = known.leading_term()
+    identified = gyro.geometry
+    if identified.condition > WORST_BY_SIZE:
+        term = identified.leading_term()
         return (
-            Status.UNOBSERVABLE if known.rank < len(known.names) else Status.ILL_CONDITIONED,
-            f"the {len(gyro.miss)} turns hardly fix {term} (weak combination {known.weakest()}, condition "
-            f"{known.condition:.0f}): add turns of 90 deg and more about every axis, each held horizontal",
+            Status.UNOBSERVABLE if identified.rank < len(identified.names) else Status.ILL_CONDITIONED,
+            f"the {len(gyro.miss)} turns hardly fix {term} (weak combination {identified.weakest()}, condition "
+            f"{identified.condition:.0f}): add turns of 90 deg and more about every axis, each held horizontal",
         )
     return Status.OK, (
         f"{len(u)} coefficients from {len(poses.dwells)} poses and {len(gyro.miss)} turns; condition "
-        f"{acc.fit.identifiability.condition:.1f} (accelerometers), {known.condition:.1f} (gyro)"
+        f"{acc.fit.identifiability.condition:.1f} (accelerometers), {identified.condition:.1f} (gyro)"
     )
 
 
@@ -176,7 +176,7 @@ def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recor
 
 
 def axis_findings(turns: Turns, verticals: Array, bias: Array) -> Iterator[Finding]:
-    """Whether other signs or another order of the gyro's axes would make sense of the turns."""
+    """A finding where other signs or another order of the gyro's axes would make sense of the turns."""
     tried = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):

@@ -140,11 +140,11 @@ def _apart(fit: Cubic, both: bool) -> tuple[float, bool]:
 
 def _temperature(estimate: Estimate, file: Source) -> float:
     """The temperature in the conditions of a calibration [degC]."""
-    found = estimate.conditions.get("temperature")
-    if not found:
+    temperature = estimate.conditions.get("temperature")
+    if not temperature:
         raise InputError(
             file.path,
             'conditions.temperature: missing, expected that of the instrument (temperature = "23 degC" under '
             "[conditions] in the study)",
         )
-    return float(found["value"])
+    return float(temperature["value"])

@@ -55,16 +55,19 @@ def pictures(calibration: PositionCalibration | RateCalibration) -> list[Picture
         if not estimate.names:
             return []
         return [residuals_by_rate(estimate.result["rates"]), correlation(estimate), budget(estimate)]
-    found, fit, chain = calibration.readings, calibration.fitting.fit, calibration.fitting.model.chain
+    readings, fit, chain = calibration.readings, calibration.fitting.fit, calibration.fitting.model.chain
     plan = estimate.result["plan"]["name"]
     if fit is None:
-        return [_positions(found, gravity_reference() @ chain.attitude(found.angles), None, plan), rig(chain)]
-    directions = gravity_reference() @ fit.model.chain.attitude(found.angles)
-    factor, alone = found.unit.factor, estimate.u / calibration.estimate.u
+        return [
+            _positions(readings, gravity_reference() @ chain.attitude(readings.angles), None, plan),
+            rig(chain),
+        ]
+    directions = gravity_reference() @ fit.model.chain.attitude(readings.angles)
+    factor, alone = readings.unit.factor, estimate.u / calibration.estimate.u
     return [
-        _residuals(found, fit),
+        _residuals(readings, fit),
         values(estimate),
-        _positions(found, directions, fit.residuals / factor, plan),
+        _positions(readings, directions, fit.residuals / factor, plan),
         rig(chain),
         correlation(estimate),
         budget(estimate),
@@ -72,15 +75,15 @@ def pictures(calibration: PositionCalibration | RateCalibration) -> list[Picture
     ]
 
 
-def _residuals(found: Readings, fit: Regression) -> Picture:
+def _residuals(readings: Readings, fit: Regression) -> Picture:
     """Residual of each reading, with what noise and table explain."""
-    factor, n = found.unit.factor, len(found.y)
+    factor, n = readings.unit.factor, len(readings.y)
     few = n <= NUMBERED
     weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
     band = weight.std / factor
     numbers, edges = np.arange(1, n + 1), np.arange(n + 1) + 0.5
     panels = []
-    for k, channel in enumerate(found.channels):
+    for k, channel in enumerate(readings.channels):
         off = Dots(
             numbers,
             fit.residuals[:, k] / factor,
@@ -89,51 +92,51 @@ def _residuals(found: Readings, fit: Regression) -> Picture:
             bar=INK,
         )
         marks: list[Mark] = [Band(edges, -band[:, k], band[:, k], steps=True), Level(0.0), off]
-        up = Axis(f"{channel} [{plain_unit(found.unit.symbol)}]")
-        across = Axis("position" if k == len(found.channels) - 1 else "", margin=0.01)
+        up = Axis(f"{channel} [{plain_unit(readings.unit.symbol)}]")
+        across = Axis("position" if k == len(readings.channels) - 1 else "", margin=0.01)
         panels.append([Panel(marks, across, up, grid="y")])
     bars = "Bars: ± one standard deviation of the noise. " if few else ""
     rms = ", ".join(
-        f"{channel} {value:.2g} {plain_unit(found.unit.symbol)}"
+        f"{channel} {value:.2g} {plain_unit(readings.unit.symbol)}"
         for channel, value in zip(
-            found.channels, np.sqrt(np.mean(np.square(fit.residuals), axis=0)) / factor, strict=True
+            readings.channels, np.sqrt(np.mean(np.square(fit.residuals), axis=0)) / factor, strict=True
         )
     )
     return draw(
         "Residual of each position",
         f"Reading less the fitted model at the commanded angles. {bars}Band: ± one standard deviation of noise and "
         "errors of the table together. The fit draws the residuals towards zero: "
-        f"{counted(n, 'position')} of {counted(len(found.channels), 'channel')} leave "
+        f"{counted(n, 'position')} of {counted(len(readings.channels), 'channel')} leave "
         f"{counted(fit.dof, 'degree')} of freedom. Root mean square: {rms}.",
         panels,
-        0.5 + 1.5 * len(found.channels),
+        0.5 + 1.5 * len(readings.channels),
     )
 
 
-def _positions(found: Readings, directions: Array, residuals: Array | None, plan: str) -> Picture:
-    """Where gravity points to on the instrument, coloured by residual (n, c) where there is one."""
-    rows = found.channels if residuals is not None else ("",)
+def _positions(readings: Readings, directions: Array, residuals: Array | None, plan: str) -> Picture:
+    """Direction of gravity on the instrument, coloured by residual (n, c) where there is one."""
+    rows = readings.channels if residuals is not None else ("",)
     panels = [
         hemispheres(
             directions,
             None if residuals is None else residuals[:, k],
-            f"residual of {channel} [{plain_unit(found.unit.symbol)}]",
+            f"residual of {channel} [{plain_unit(readings.unit.symbol)}]",
         )
         for k, channel in enumerate(rows)
     ]
     coloured = "" if residuals is None else ", coloured by residual"
     return draw(
         "Positions",
-        f"Direction of gravity on the axes of the instrument in each of the {len(found.y)} positions ({plan}), on two "
-        f"hemispheres seen along −z (equal-area projection; circles at 30° and 60° from the pole){coloured}. Numbers "
-        "count the positions in order; near ones share a label.",
+        f"Direction of gravity on the axes of the instrument in each of the {len(readings.y)} positions ({plan}), on "
+        f"two hemispheres seen along −z (equal-area projection; circles at 30° and 60° from the pole){coloured}. "
+        "Numbers count the positions in order; near ones share a label.",
         panels,
         3.2 * len(rows),
     )
 
 
 def _tolerances(estimate: Estimate, factor: Array) -> list[Picture]:
-    """What each tolerance of the table does; ``factor`` (p,) takes uncertainties from SI to the shown units."""
+    """Effect of each tolerance of the table; ``factor`` (p,) takes uncertainties from SI to the shown units."""
     given, names = estimate.result, estimate.names
     factors = list(given["halved"])
     if not factors:

@@ -100,14 +100,14 @@ def _design_pictures(
 ) -> list[Picture]:
     """The chosen positions, the uncertainties by plan, and where they come from."""
     angles, chain = designed.plan.angles, settings.chain
-    drawn = [
+    pictures = [
         main(designed, settings),
         rig(chain),
     ]
     if len(chain.joints) == 2:
         panels = [[plane(angles, chain.joints)]]
-        drawn.append(draw("Angles of the table", "The same positions over both angles.", panels, 3.4))
-    drawn.append(
+        pictures.append(draw("Angles of the table", "The same positions over both angles.", panels, 3.4))
+    pictures.append(
         dots(
             "Uncertainties by plan",
             "Standard uncertainty of each coefficient that noise and errors of the table make expect. A plan that does "
@@ -119,7 +119,7 @@ def _design_pictures(
     )
     shared = [each for each in designed.judged if each.drift_shares]
     if shared:
-        drawn.append(
+        pictures.append(
             heat(
                 "Which tolerance matters for the drift",
                 "Share of each error of the table in the mean square error of the predicted output that the table "
@@ -130,4 +130,4 @@ def _design_pictures(
                 "share [%]",
             )
         )
-    return drawn
+    return pictures

@@ -40,7 +40,7 @@ PUBLISHED = (("ax", "dalpha_y2"), ("ay", "dalpha_x2"), ("az", "dphi_y1"))
 def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) -> str:
     """The report of a sensitivity analysis as one self-contained HTML page."""
     indices = analysed.indices
-    drawn = [
+    pictures = [
         ranking(indices, analysed.aggregate),
         mean_indices(indices, analysed.mean),
         maps(indices, analysed.joints, analysed.flagged),
@@ -49,7 +49,7 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
     ]
     order = np.argsort(-np.nan_to_num(analysed.aggregate.total), kind="stable")
     worst = sorted(analysed.flagged, key=lambda flag: flag.sum_first)
-    found = analysis_result(analysed)
+    result = analysis_result(analysed)
     return framed(
         "sensitivity.html",
         estimate,
@@ -72,7 +72,7 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
             )
             for k in order
         ],
-        pictures=[picture for picture in drawn if picture is not None],
+        pictures=[picture for picture in pictures if picture is not None],
         flagged=_flag_counts(analysed),
         sampled=indices.u_first is not None,
         joints=analysed.joints,
@@ -80,7 +80,7 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
         outputs=indices.outputs,
         names=indices.factors,
         tables=[
-            (title, np.asarray(found[kind][key]).tolist())
+            (title, np.asarray(result[kind][key]).tolist())
             for kind, words in (("mean", "mean over the positions"), ("weighted", "weighted by variance"))
             for key, title in (
                 ("first", f"First order S, {words}"),
@@ -88,13 +88,13 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
                 ("total_minus_first", f"Interactions ST − S, {words}"),
                 ("shapley", f"Shapley effects, {words}"),
             )
-            if key in found[kind]
+            if key in result[kind]
         ],
     )
 
 
 def _flag_counts(analysed: Analysed) -> list[tuple[str, int]]:
-    """How many positions are flagged by output."""
+    """Number of flagged positions by output."""
     outputs = [flag.output for flag in analysed.flagged]
     return [(name, outputs.count(name)) for name in analysed.indices.outputs if name in outputs]
 
@@ -149,14 +149,14 @@ def mean_indices(indices: Indices, mean: Averages) -> Picture:
 
 
 def interactions(indices: Indices, mean: Averages, weighted: Averages) -> Picture | None:
-    """What total-order indices have beyond first order, on a logarithmic scale.
+    """Excess of total-order over first-order indices, on a logarithmic scale.
 
     None where there is nothing, or where the indices are sampled and the differences are mostly their noise.
     """
     if indices.u_first is not None:
         return None
     beyond = [
-        np.where(found.total_minus_first > 0.0, found.total_minus_first, np.nan) for found in (mean, weighted)
+        np.where(each.total_minus_first > 0.0, each.total_minus_first, np.nan) for each in (mean, weighted)
     ]
     if not np.isfinite(beyond).any():
         return None
@@ -246,11 +246,11 @@ def maps(indices: Indices, joints: Sequence[str], flagged: Sequence[Flag]) -> Pi
 
 def _map(angles: Array, values: Array) -> Mark:
     """Values (n,) at pairs of angles (n, 2) [rad]: cells where these are an even grid, else points."""
-    found = _even_grid(angles)
-    if found is None:
+    grid = _even_grid(angles)
+    if grid is None:
         turns = np.degrees(angles) % 360.0
         return Dots(turns[:, 0], turns[:, 1], size=4.7, values=values)
-    (first, second), place = found
+    (first, second), place = grid
     cells = np.full(len(first) * len(second), np.nan)
     cells[place] = values
     left, right, low, high = (
@@ -280,6 +280,6 @@ def _percent(value: float) -> str:
 
 
 def _method_words(method: Mapping[str, Any]) -> str:
-    """How the indices were computed."""
+    """Method and settings of the indices."""
     others = ", ".join(f"{key} {value}" for key, value in method.items() if key != "name")
     return f"{method['name']} ({others})" if others else str(method["name"])

@@ -41,7 +41,7 @@ def calibrate_positions(
     settings : TurntableSettings
         Site, table with its errors, instrument.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Raises
     ------

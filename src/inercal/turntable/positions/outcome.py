@@ -75,29 +75,31 @@ def terms_of(fit: Regression) -> Terms:
 def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
     """Everything the terms are uncertain by: noise, each error of the table, the site, stated terms."""
     gain = np.einsum("pq,qnc->pnc", terms.slope, fit.gain)
-    found: list[TypeA | TypeB] = []
+    components: list[TypeA | TypeB] = []
     for k, channel in enumerate(fit.model.channels):
         sigma, dof = float(fit.noise[k]), float(fit.noise_dof[k])
         name = f"noise of {channel.channel}"
         if np.isinf(dof):
-            found.append(TypeB(name, sigma, unit, gain[..., k]))
+            components.append(TypeB(name, sigma, unit, gain[..., k]))
         else:
-            found.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
+            components.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
-        found.append(TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std))
+        components.append(
+            TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
+        )
     beside, columns = fit.model.beside(fit.angles, fit.c)
     for each, column in zip(beside, np.moveaxis(columns, -1, 0), strict=True):
         # readings made with another value than taken: the fit takes the difference for coefficients
         by_value = np.einsum("pnc,nc->p", gain, column)
-        found.append(TypeB(each.source, each.u, each.unit or unit_of_term(each.term, unit), by_value))
-    return found
+        components.append(TypeB(each.source, each.u, each.unit or unit_of_term(each.term, unit), by_value))
+    return components
 
 
-def assemble(record: Record, found: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
+def assemble(record: Record, readings: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
     """Put the estimate together."""
-    unit = found.unit.si
-    model, conditions = MODELS[settings.instrument.kind], _conditions(record, found, settings)
+    unit = readings.unit.si
+    model, conditions = MODELS[settings.instrument.kind], _conditions(record, readings, settings)
     basis = studied(COMMAND, settings, record.sources, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
     rank, terms_asked = worst_rank(fitting.identified)
@@ -105,7 +107,7 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         "rank": rank,
         "terms": terms_asked,
         "null_vectors": list(dict.fromkeys(words for each in fitting.identified for words in each.words)),
-        "plan": _plan(found, fitting, settings),
+        "plan": _plan(readings, fitting, settings),
         "instrument": settings.instrument.kind,
         "earth_rate": earth_rate_of(fitting.model),
     }
@@ -116,12 +118,12 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
             status,
             message,
             findings=findings,
-            statistics={"positions": float(len(found.y))},
+            statistics={"positions": float(len(readings.y))},
             result=result | {"tolerance_shares": {}},
         )
 
     if fitting.fit is None:
-        return nothing(*_without_fit(found, fitting, settings))
+        return nothing(*_without_fit(readings, fitting, settings))
     fit = fitting.fit
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         terms = terms_of(fit)
@@ -130,24 +132,26 @@ def assemble(record: Record, found: Readings, fitting: Fitting, settings: Turnta
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
     # stated noise is of type B, but not the same in repeat runs
-    known = combine(names, sources(fit, terms, unit))._replace(common=None)
-    findings += _too_large(fit) + of_site(names, known.budget, [each.source for each in fit.model.references])
+    uncertainty = combine(names, sources(fit, terms, unit))._replace(common=None)
+    findings += _too_large(fit) + of_site(
+        names, uncertainty.budget, [each.source for each in fit.model.references]
+    )
     return Estimate.of(
         basis,
         names,
         [unit_of_term(name, unit) for name in names],
         terms.values,
-        known,
-        _verdict(found, fitting),
+        uncertainty,
+        _verdict(readings, fitting),
         findings=findings,
-        statistics=_statistics(found, fitting, result["plan"]["condition"]),
+        statistics=_statistics(readings, fitting, result["plan"]["condition"]),
         result=result
         | _shares(fit, terms)
-        | {"table_errors": _table_errors(fit), "noise": _noise(found, fit, unit)},
+        | {"table_errors": _table_errors(fit), "noise": _noise(readings, fit, unit)},
     )
 
 
-def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
+def _verdict(readings: Readings, fitting: Fitting) -> tuple[Status, str]:
     """Status and its sentence."""
     from scipy.special import chdtrc
 
@@ -156,31 +160,31 @@ def _verdict(found: Readings, fitting: Fitting) -> tuple[Status, str]:
     worst = max(fitting.identified, key=lambda each: each.identifiability.condition).identifiability
     if worst.condition > WORST_BY_LENGTH:
         return Status.ILL_CONDITIONED, (
-            f"the {len(found.y)} positions fix {worst.weakest()} only weakly (condition number "
+            f"the {len(readings.y)} positions fix {worst.weakest()} only weakly (condition number "
             f"{worst.condition:.0f} of the scaled columns): add positions that change it"
         )
-    stated = np.isinf(fit.noise_dof).all()
-    if stated and fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < LIMITS.misfit_probability:
+    noise_stated = np.isinf(fit.noise_dof).all()
+    if noise_stated and fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < LIMITS.misfit_probability:
         return Status.INCONSISTENT, (
             f"the readings miss the model by {np.sqrt(fit.chi2 / fit.dof):.2g} times what the stated noise and table "
-            f"errors explain, most at {_farthest(found, fit)}: check it, both of these, signs and units, or fit more "
-            "terms"
+            f"errors explain, most at {_farthest(readings, fit)}: check it, both of these, signs and units, or fit "
+            "more terms"
         )
     return Status.OK, (
-        f"{counted(len(fit.c), 'coefficient')} from {counted(len(found.y), 'position')} of "
-        f"{counted(len(found.channels), 'channel')}"
+        f"{counted(len(fit.c), 'coefficient')} from {counted(len(readings.y), 'position')} of "
+        f"{counted(len(readings.channels), 'channel')}"
     )
 
 
-def _farthest(found: Readings, fit: Regression) -> str:
+def _farthest(readings: Readings, fit: Regression) -> str:
     """The reading with the largest residual for its uncertainty."""
     std = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).std
     k, c = np.unravel_index(int(np.argmax(np.abs(fit.residuals) / std)), fit.residuals.shape)
-    return f"position {k + 1} of {found.channels[c]}"
+    return f"position {k + 1} of {readings.channels[c]}"
 
 
 def _too_large(fit: Regression) -> list[Finding]:
-    """What is to be said where errors of the table bend the readings by more than their noise."""
+    """A finding where errors of the table bend the readings by more than their noise."""
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
     within = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).within
     # where no noise is left, squares a thousand times below what changes from position to position do not matter
@@ -194,65 +198,67 @@ def _too_large(fit: Regression) -> list[Finding]:
             bent.append(error.name)
     if not bent:
         return []
-    said = (
+    text = (
         f"{', '.join(bent)} may be so large that their squares bend the readings by more than the noise: the "
         "uncertainties hold for small errors"
     )
-    return [Finding("large_errors", said)]
+    return [Finding("large_errors", text)]
 
 
 def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collection[str]) -> list[Finding]:
-    """What is to be said where u of terms ``names`` is more of the ``sources`` of the site than of all else."""
+    """A finding where the ``sources`` of the site dominate u of terms ``names``."""
     site = [item for item in budget if item.source in sources]
     most = 1.0 - 1.0 / LIMITS.site_ratio**2  # of a variance
     ruled = [name for name in names if sum(item.share.get(name, 0.0) for item in site) > most]
     if not ruled:
         return []
     acting = [item.source for item in site if any(item.share.get(name) for name in ruled)]
-    said = (
+    text = (
         f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(acting)}): with an exact site it would "
         "be less than half"
     )
-    return [Finding("uncertain_site", said)]
+    return [Finding("uncertain_site", text)]
 
 
-def _dead(fit: Regression, known: NDArray[np.bool_]) -> str:
-    """That terms which are not ``known`` (p,) are relative to a scale factor of zero, in words."""
-    lost = ", ".join(name for name, each in zip(fit.model.symbols, known, strict=True) if not each)
+def _dead(fit: Regression, identified: NDArray[np.bool_]) -> str:
+    """That terms which are not ``identified`` (p,) are relative to a scale factor of zero, in words."""
+    lost = ", ".join(name for name, each in zip(fit.model.symbols, identified, strict=True) if not each)
     return f"{lost}: relative to a scale factor that is found as 0: does the output follow its input?"
 
 
-def _without_fit(found: Readings, fitting: Fitting, settings: TurntableSettings) -> tuple[Status, str]:
+def _without_fit(readings: Readings, fitting: Fitting, settings: TurntableSettings) -> tuple[Status, str]:
     """Status and sentence where nothing was fitted."""
-    enough = len(found.y) >= fewest_positions(fitting.model, settings)
+    enough = len(readings.y) >= fewest_positions(fitting.model, settings)
     if enough and not any(each.words for each in fitting.identified):
         return Status.NOT_CONVERGED, (
             "the weights of the readings do not settle: the terms come out so large that errors of the table, which "
             "they multiply, drown the readings; fit fewer terms, or check units and noise"
         )
-    return Status.UNOBSERVABLE, _unobservable(found, fitting, settings)
+    return Status.UNOBSERVABLE, _unobservable(readings, fitting, settings)
 
 
-def _unobservable(found: Readings, fitting: Fitting, settings: TurntableSettings) -> str:
+def _unobservable(readings: Readings, fitting: Fitting, settings: TurntableSettings) -> str:
     """Why nothing was fitted, and what would help."""
     words = [text for each in fitting.identified for text in each.words]
     fewest = fewest_positions(fitting.model, settings)
-    if len(found.y) < fewest:
+    if len(readings.y) < fewest:
         why = (
             ", of which one tells the noise, which is not stated" if settings.instrument.noise is None else ""
         )
         terms = max(len(channel.symbols) for channel in fitting.model.channels)
-        return f"found {counted(len(found.y), 'position')} for {terms} terms, expected at least {fewest}{why}"
+        return (
+            f"found {counted(len(readings.y), 'position')} for {terms} terms, expected at least {fewest}{why}"
+        )
     first = next(each for each in fitting.identified if each.words)
     rank, terms = first.identifiability.rank, len(first.identifiability.names)
     return (
-        f"the {len(found.y)} positions identify {rank} of {terms} terms: the readings do not change along "
+        f"the {len(readings.y)} positions identify {rank} of {terms} terms: the readings do not change along "
         f"{'; '.join(dict.fromkeys(words))} (each term by the output it causes at full input); add positions, or leave "
         "terms out"
     )
 
 
-def _statistics(found: Readings, fitting: Fitting, condition: float) -> Mapping[str, float]:
+def _statistics(readings: Readings, fitting: Fitting, condition: float) -> Mapping[str, float]:
     """Figures of the fit, and the condition number of its plan."""
     fit = fitting.fit
     assert fit is not None
@@ -262,7 +268,7 @@ def _statistics(found: Readings, fitting: Fitting, condition: float) -> Mapping[
         "column_condition": max(each.identifiability.condition for each in fitting.identified),
         "residual_rms": float(np.sqrt(np.mean(np.square(fit.residuals)))),
         "chi2": fit.chi2,
-        "positions": float(len(found.y)),
+        "positions": float(len(readings.y)),
     }
 
 
@@ -270,7 +276,7 @@ def _shares(fit: Regression, terms: Terms) -> dict[str, Any]:
     """Shares of the table's errors, and what the terms would be uncertain by were the table otherwise."""
     other = alternatives(fit, terms.slope)
     names = fit.model.symbols
-    stated = other.scopes["stated"]
+    of_table = other.scopes["stated"]
 
     def named(values: Array) -> dict[str, float]:
         return dict(zip(names, values.tolist(), strict=True))
@@ -278,13 +284,13 @@ def _shares(fit: Regression, terms: Terms) -> dict[str, Any]:
     return {
         "tolerance_shares": coefficient_shares(fit, terms.slope),
         "drift_shares": drift_shares(fit),
-        "halved": {name: named(u / stated) for name, u in other.halved.items()},
+        "halved": {name: named(u / of_table) for name, u in other.halved.items()},
         "scopes": {scope: named(u) for scope, u in other.scopes.items()},
     }
 
 
 def _table_errors(fit: Regression) -> list[dict[str, Any]]:
-    """What the test tells of the errors that stay constant; ``observed`` where u is below 0.9 of the prior."""
+    """Constant errors of the table after the test; ``observed`` where u is below 0.9 of the prior."""
     errors = [fit.model.chain.errors[k] for k in fit.constant]
     return [
         {
@@ -300,7 +306,7 @@ def _table_errors(fit: Regression) -> list[dict[str, Any]]:
     ]
 
 
-def _noise(found: Readings, fit: Regression, unit: str) -> list[dict[str, Any]]:
+def _noise(readings: Readings, fit: Regression, unit: str) -> list[dict[str, Any]]:
     """Noise of a reading by channel: as used, and as the scatter within the dwells would have it."""
     return [
         {
@@ -311,32 +317,32 @@ def _noise(found: Readings, fit: Regression, unit: str) -> list[dict[str, Any]]:
             "unit": unit,
         }
         for channel, used, within, dof in zip(
-            found.channels, fit.noise, found.u_mean, fit.noise_dof, strict=True
+            readings.channels, fit.noise, readings.u_mean, fit.noise_dof, strict=True
         )
     ]
 
 
-def _conditions(record: Record, found: Readings, settings: TurntableSettings) -> dict[str, Any]:
+def _conditions(record: Record, readings: Readings, settings: TurntableSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid."""
     ranges = {
         f"reading_of_{name}": [low, high]
         for name, low, high in zip(
-            found.channels, found.y.min(axis=0).tolist(), found.y.max(axis=0).tolist(), strict=True
+            readings.channels, readings.y.min(axis=0).tolist(), readings.y.max(axis=0).tolist(), strict=True
         )
     }
     return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
 
 
-def _plan(found: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:
+def _plan(readings: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:
     """The positions in figures, and their name where the record holds those of the study's plan."""
     plan, name = settings.plan.angles, "of the record"
-    if plan.shape == found.angles.shape:
-        apart = np.abs(np.remainder(plan - found.angles + np.pi, 2.0 * np.pi) - np.pi)
+    if plan.shape == readings.angles.shape:
+        apart = np.abs(np.remainder(plan - readings.angles + np.pi, 2.0 * np.pi) - np.pi)
         name = settings.plan.name if apart.max() < 1e-3 else name
-    condition, efficiency = in_basis(orthonormal(fitting.model, found.angles))
+    condition, efficiency = in_basis(orthonormal(fitting.model, readings.angles))
     return {
         "name": name,
-        "positions": len(found.y),
+        "positions": len(readings.y),
         "condition": condition,
         "d_efficiency": efficiency,
     }

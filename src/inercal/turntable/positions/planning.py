@@ -111,7 +111,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     settings : TurntableSettings
         The instrument with its expected coefficients and noise; the effect of the table's errors depends on them.
     progress : callable
-        Told, in words, what is being done.
+        Takes the progress in words.
 
     Raises
     ------

@@ -137,7 +137,7 @@ def check_rate_test(settings: TurntableSettings) -> None:
 
 
 def _excess(fit: RateFit) -> list[Finding]:
-    """A finding where the readings scatter about the fit by more than what is stated of them."""
+    """A finding where the readings scatter about the fit by more than their stated noise."""
     from scipy.special import chdtrc
 
     if fit.dof < 1 or np.isfinite(fit.noise_dof) or chdtrc(fit.dof, fit.chi2) >= LIMITS.misfit_probability:

@@ -37,37 +37,37 @@ REFERENCES = (
 
 def assemble(
     record: Record,
-    found: RateDwells,
+    dwells: RateDwells,
     settings: TurntableSettings,
     findings: Sequence[Finding],
     inputs: tuple[Input, ...],
     fits: tuple[RateFit, ...],
     full_scale: float,
-    known: Identifiability,
+    identified: Identifiability,
 ) -> Estimate:
     """Put the estimate together."""
-    unit = found.unit.si
+    unit = dwells.unit.si
     names = tuple(name for fit in fits for name in fit.names)
-    found_sources = sources(found, inputs, fits, unit)
+    found_sources = sources(dwells, inputs, fits, unit)
     # stated noise is of type B, but not the same in repeat runs
     uncertainty = combine(names, found_sources)._replace(common=None)
     values = np.concatenate([fit.values for fit in fits])
     u = uncertainty.u
     status = Status.OK
-    message = f"{counted(len(names), 'term')} from {counted(len(found.rate), 'stay')} at rates"
+    message = f"{counted(len(names), 'term')} from {counted(len(dwells.rate), 'stay')} at rates"
     for fit in fits:
         k = names.index(f"S_{fit.axis}")
         if abs(values[k]) < LIMITS.scale_sigmas * u[k]:
             status = Status.INCONSISTENT
             message = f"the output of gyro_{fit.axis} does not follow the rate: check channel, axis and units"
-    if status is Status.OK and known.condition > WORST_BY_LENGTH:
+    if status is Status.OK and identified.condition > WORST_BY_LENGTH:
         status = Status.ILL_CONDITIONED
-        weak = f"{known.weakest()} only weakly (condition number {known.condition:.0f})"
+        weak = f"{identified.weakest()} only weakly (condition number {identified.condition:.0f})"
         message = f"the rates fix {weak}: spread them wider"
     test = settings.rate_test
     assert test is not None
     return Estimate.of(
-        _basis(record, found, settings),
+        _basis(record, dwells, settings),
         names,
         [unit_of_term(name, unit) for name in names],
         values,
@@ -76,21 +76,21 @@ def assemble(
         findings=(*findings, *of_site(names, uncertainty.budget, ("latitude",))),
         statistics={
             "dof": float(min(fit.dof for fit in fits)),
-            "condition": known.condition,
+            "condition": identified.condition,
             "residual_rms": float(np.sqrt(np.mean([np.square(fit.residuals) for fit in fits]))),
             "chi2": float(sum(fit.chi2 for fit in fits)),
-            "stays": float(len(found.rate)),
+            "stays": float(len(dwells.rate)),
         },
         result={
-            "rank": known.rank,
+            "rank": identified.rank,
             "null_vectors": [],
-            "plan": _plan(found, test, full_scale),
+            "plan": _plan(dwells, test, full_scale),
             "tolerance_shares": _shares(settings, names, found_sources),
             "instrument": settings.instrument.kind,
             "rates": [
                 row
                 for given, fit in zip(inputs, fits, strict=True)
-                for row in _rows(found, given, fit, full_scale)
+                for row in _rows(dwells, given, fit, full_scale)
             ],
         },
     )
@@ -98,26 +98,26 @@ def assemble(
 
 def unobservable(
     record: Record,
-    found: RateDwells,
+    dwells: RateDwells,
     settings: TurntableSettings,
     findings: Sequence[Finding],
     rank: int,
     words: Sequence[str],
-    said: str,
+    message: str,
 ) -> Estimate:
     """An estimate without terms."""
     test = settings.rate_test
     assert test is not None
     return Estimate.without(
-        _basis(record, found, settings),
+        _basis(record, dwells, settings),
         Status.UNOBSERVABLE,
-        said,
+        message,
         findings=findings,
-        statistics={"stays": float(len(found.rate))},
+        statistics={"stays": float(len(dwells.rate))},
         result={
             "rank": rank,
             "null_vectors": list(words),
-            "plan": _plan(found, test, test.full_scale or float(np.abs(found.rate).max(initial=0.0))),
+            "plan": _plan(dwells, test, test.full_scale or float(np.abs(dwells.rate).max(initial=0.0))),
             "tolerance_shares": {},
             "instrument": settings.instrument.kind,
             "rates": [],
@@ -126,7 +126,7 @@ def unobservable(
 
 
 def sources(
-    found: RateDwells, inputs: Sequence[Input], fits: Sequence[RateFit], unit: str
+    dwells: RateDwells, inputs: Sequence[Input], fits: Sequence[RateFit], unit: str
 ) -> list[TypeA | TypeB]:
     """Everything the terms are uncertain by: noise of each gyro, errors of the table, its rate, the latitude.
 
@@ -135,7 +135,7 @@ def sources(
     ends = np.cumsum([0, *(len(fit.names) for fit in fits)])
     made: list[TypeA | TypeB] = []
     for fit, begin in zip(fits, ends, strict=False):
-        gain = np.zeros((ends[-1], len(found.rate)))
+        gain = np.zeros((ends[-1], len(dwells.rate)))
         gain[begin : begin + len(fit.names)] = fit.gain
         name = f"noise of gyro_{fit.axis}"
         if np.isinf(fit.noise_dof):
@@ -161,7 +161,7 @@ def sources(
     return made
 
 
-def _rows(found: RateDwells, given: Input, fit: RateFit, full_scale: float) -> list[dict[str, Any]]:
+def _rows(dwells: RateDwells, given: Input, fit: RateFit, full_scale: float) -> list[dict[str, Any]]:
     """Residual of the best straight line in each stay, with its standard uncertainty."""
     covariance = fit.noise**2 * fit.remainder @ fit.remainder.T
     for effect in given.effects:
@@ -170,12 +170,12 @@ def _rows(found: RateDwells, given: Input, fit: RateFit, full_scale: float) -> l
         covariance = covariance + fit.remainder @ part @ fit.remainder.T
     ppm = 1e6 / (abs(fit.scale) * full_scale)
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    output = found.y[:, found.channels.index(f"gyro_{fit.axis}")]
+    output = dwells.y[:, dwells.channels.index(f"gyro_{fit.axis}")]
     way = {1: "below", -1: "above", 0: "rest"}
     return [
         {
             "channel": f"gyro_{fit.axis}",
-            "rate_rad_s": float(found.rate[k]),
+            "rate_rad_s": float(dwells.rate[k]),
             "output": float(output[k]),
             "input_rad_s": float(given.x[k]),
             "residual": float(fit.residuals[k]),
@@ -184,27 +184,29 @@ def _rows(found: RateDwells, given: Input, fit: RateFit, full_scale: float) -> l
             "u_ppm_of_full_scale": float(u[k] * ppm),
             "reached_from": way[int(direction)],
         }
-        for k, direction in enumerate(approaches(found.rate))
+        for k, direction in enumerate(approaches(dwells.rate))
     ]
 
 
-def _plan(found: RateDwells, test: RateTest, full_scale: float) -> dict[str, Any]:
+def _plan(dwells: RateDwells, test: RateTest, full_scale: float) -> dict[str, Any]:
     """The test in figures."""
     return {
         "name": f"rates about {test.joint}",
-        "positions": len(found.rate),
+        "positions": len(dwells.rate),
         "joint": test.joint,
         "full_scale_rad_s": full_scale,
-        "turns": "assumed whole" if found.assumed else "from the angles",
+        "turns": "assumed whole" if dwells.assumed else "from the angles",
     }
 
 
 def _shares(
-    settings: TurntableSettings, names: Sequence[str], found: Sequence[TypeA | TypeB]
+    settings: TurntableSettings, names: Sequence[str], components: Sequence[TypeA | TypeB]
 ) -> dict[str, dict[str, float]]:
     """Share of each error of the table, by itself, in the table's part of each term's variance."""
     own = [
-        each for each in found if each.source in settings.chain.factors or each.source.startswith("cosine")
+        each
+        for each in components
+        if each.source in settings.chain.factors or each.source.startswith("cosine")
     ]
     parts = {each.source: np.diag(each.covariance) for each in own}
     whole = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(names))
@@ -215,8 +217,8 @@ def _shares(
     }
 
 
-def _basis(record: Record, found: RateDwells, settings: TurntableSettings) -> Basis:
-    """What every estimate of a rate test rests on."""
-    ranges = {"rate_rad_s": [float(found.rate.min()), float(found.rate.max())]}
+def _basis(record: Record, dwells: RateDwells, settings: TurntableSettings) -> Basis:
+    """The basis of every estimate of a rate test."""
+    ranges = {"rate_rad_s": [float(dwells.rate.min()), float(dwells.rate.max())]}
     conditions = conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
     return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)

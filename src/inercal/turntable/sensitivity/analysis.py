@@ -37,7 +37,7 @@ _BY_METHOD = {
     ),
     "local": ("JCGM 100:2008, Guide to the expression of uncertainty in measurement",),
 }
-"""What the methods of a study rest on besides."""
+"""Publications behind each method."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,1 +1,1 @@
-"""What is wrong with a test on a table, named."""
+"""Diagnosis of a test on a table: its faults by name."""

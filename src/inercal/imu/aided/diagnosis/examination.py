@@ -1,6 +1,6 @@
-"""What is wrong with a test on a table: all patterns of faults looked for in its residuals, and what each does.
+"""Small faults of a test on a table: their patterns in its residuals, and the effect of each.
 
-Signs, units and axes that are wrong altogether were told before the fit (`inercal.imu.aided.diagnosis.gross`). Each
+Wrong signs, units and axes were found before the fit (`inercal.imu.aided.diagnosis.gross`). Each
 pattern (`inercal.imu.aided.diagnosis.small`) is tested as an added variable, the score test of
 `inercal.estimate.hypotheses`: by how much the weighted sum of squares falls if its amplitudes are estimated with all
 the rest.
@@ -53,9 +53,9 @@ def misfits(fit: Fit, names: tuple[str, ...], rows: Array, motion: Motion, gravi
     """
     judge = whitening(fit)
     errors = list(constant_errors(fit, motion, gravity, judge))
-    found, _ = search(fit, lambda _: errors, judge, LIMITS.misfit_risk, LIMITS.misfits)
+    fitted, _ = search(fit, lambda _: errors, judge, LIMITS.misfit_risk, LIMITS.misfits)
     named = []
-    for each in found:
+    for each in fitted:
         without = each.hypothesis.without(fit, each.values)
         pairs = zip(fit.sensors, without.sensors, strict=True)
         patterns = [before.equation.residual - after.equation.residual for before, after in pairs]

@@ -1,4 +1,4 @@
-"""How well the outputs of an IMU fit the angles of a table: whitened residuals, and single blocks far off."""
+"""Fit quality of the outputs of an IMU on a table: whitened residuals, and single blocks far off."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Whitening:
 
     def residuals(self, case: Fit) -> Array:
         """(N,) residuals."""
-        known = self.fit.unknowns
-        prior = (known.mean - self.fit.x) / known.sd
+        unknowns = self.fit.unknowns
+        prior = (unknowns.mean - self.fit.x) / unknowns.sd
         outputs = [
             _whitened(sensor, sensor.equation.residual[:, None]).rows[1:, 0] for sensor in case.sensors
         ]
@@ -40,8 +40,8 @@ class Whitening:
         """Sum of squares."""
         return float(np.sum(self.residuals(case) ** 2))
 
-    def told(self, patterns: Sequence[Array]) -> Array:
-        """Combinations (q, m) of patterns (n, q) in the outputs of each sensor that the unknowns leave to be told."""
+    def observable(self, patterns: Sequence[Array]) -> Array:
+        """Combinations (q, m) of patterns (n, q) in the outputs of each sensor that the unknowns do not absorb."""
         rows = self._rows(patterns)
         size = np.linalg.norm(rows, axis=0)
         size[size == 0.0] = 1.0
@@ -60,7 +60,7 @@ class Whitening:
         return np.vstack([np.zeros((len(self.fit.x), patterns[0].shape[1])), *whitened])
 
     def _left(self, rows: Array) -> Array:
-        """What the unknowns leave of rows (N, ...)."""
+        """Residuals of rows (N, ...) after the unknowns."""
         return np.asarray(rows - self.basis @ (self.basis.T @ rows))
 
 
@@ -104,7 +104,7 @@ def variation(y: Array) -> float:
 
 def knocks(fit: Fit) -> dict[str, NDArray[np.bool_]]:
     """By triad, blocks (n,) far off the median of the five around them, one or two in a row, if these are few."""
-    found: dict[str, NDArray[np.bool_]] = {}
+    by_triad: dict[str, NDArray[np.bool_]] = {}
     for sensor in fit.sensors:
         blocks, residual = sensor.side.blocks, sensor.residual
         near = np.lib.stride_tricks.sliding_window_view(np.pad(residual, 2, mode="edge"), 5)
@@ -117,9 +117,9 @@ def knocks(fit: Fit) -> dict[str, NDArray[np.bool_]]:
                 limit = max(LIMITS.knock_sigmas * typical, least, LIMITS.knock_largest_share * np.max(size))
                 far |= kind & (size > limit)
         triad = blocks.triad.sensor
-        found[triad] = found.get(triad, False) | far
+        by_triad[triad] = by_triad.get(triad, False) | far
 
     def few(wrong: NDArray[np.bool_]) -> bool:
         return int(np.count_nonzero(wrong)) <= max(LIMITS.knocked_blocks, LIMITS.knocked_share * len(wrong))
 
-    return {triad: wrong if few(wrong) else np.zeros_like(wrong) for triad, wrong in found.items()}
+    return {triad: wrong if few(wrong) else np.zeros_like(wrong) for triad, wrong in by_triad.items()}

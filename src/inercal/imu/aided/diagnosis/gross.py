@@ -11,15 +11,15 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.imu.aided.blocks import Blocks, small_turn
 from inercal.imu.aided.table import Motion
-from inercal.imu.aided_settings import mountings
 from inercal.imu.limits import LIMITS
+from inercal.imu.settings import mountings
 
 _FACTORS = ((1.0, ""), (180.0 / np.pi, "57.3 times as large"), (np.pi / 180.0, "57.3 times as small"))
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How an output follows what the table says: ``scale`` [output per SI unit], and ``miss``, the rms it leaves over
+    """Agreement of an output with the table: ``scale`` [output per SI unit], and ``miss``, the rms it leaves over
     the rms of the output's variation."""
 
     scale: float
@@ -58,13 +58,13 @@ def tells(sensor: str, x: Array) -> bool:
 
 def lag(blocks: Blocks, motion: Motion) -> float:
     """Time [s] in whole blocks by which the angles come late, by when table and gyro turn; 0 unless clearly better."""
-    told = np.linalg.norm(expected(blocks, motion), axis=1)
+    commanded = np.linalg.norm(expected(blocks, motion), axis=1)
     seen = np.linalg.norm(blocks.y - np.median(blocks.y, axis=0), axis=1)
-    told, seen = told - told.mean(), seen - seen.mean()
-    size = np.linalg.norm(told) * np.linalg.norm(seen)
+    commanded, seen = commanded - commanded.mean(), seen - seen.mean()
+    size = np.linalg.norm(commanded) * np.linalg.norm(seen)
     if size == 0.0:
         return 0.0
-    both = np.correlate(told, seen, mode="full") / size
+    both = np.correlate(commanded, seen, mode="full") / size
     middle, length = len(seen) - 1, float(np.median(blocks.length))
     reach = min(int(LIMITS.longest_lag / length), len(seen) // 2)
     near = both[middle - reach : middle + reach + 1]
@@ -74,21 +74,21 @@ def lag(blocks: Blocks, motion: Motion) -> float:
 
 def cures(sides: list[Blocks], motion: Motion) -> Iterator[str]:
     """Sentences that would make sense of outputs that do not follow the table."""
-    found = []
+    ranked = []
     for words, other in _angles(motion):
         misses = [agreement(each.y, expected(each, other)).miss for each in sides]
         if max(misses) < LIMITS.agreement_miss:
-            found.append((sum(misses), words))
+            ranked.append((sum(misses), words))
     identity = ("+x", "+y", "+z")
-    told = [expected(each, motion) for each in sides]
+    inputs = [expected(each, motion) for each in sides]
     for axes, turn in mountings().items():
-        misses = [agreement(each.y, x @ turn).miss for each, x in zip(sides, told, strict=True)]
+        misses = [agreement(each.y, x @ turn).miss for each, x in zip(sides, inputs, strict=True)]
         if axes != identity and max(misses) < LIMITS.agreement_miss:
-            found.append((sum(misses), _mounted(motion, turn)))
-    if found:
-        yield from (words for _, words in sorted(found)[:3])
+            ranked.append((sum(misses), _mounted(motion, turn)))
+    if ranked:
+        yield from (words for _, words in sorted(ranked)[:3])
         return
-    for each, x in zip(sides, told, strict=True):
+    for each, x in zip(sides, inputs, strict=True):
         yield from _channels(each, x)
 
 
@@ -98,17 +98,17 @@ def _angles(motion: Motion) -> Iterator[tuple[str, Motion]]:
     for factor, size in _FACTORS:
         for order in itertools.permutations(range(len(joints))):
             for signs in itertools.product((1.0, -1.0), repeat=len(joints)):
-                said = []
+                texts = []
                 if size:
-                    said.append(f"the angles are {size} (check whether they are in deg or rad)")
+                    texts.append(f"the angles are {size} (check whether they are in deg or rad)")
                 if order != tuple(range(len(joints))):
-                    said.append(f"the columns {', '.join(joints)} are exchanged")
+                    texts.append(f"the columns {', '.join(joints)} are exchanged")
                 wrong = [name for name, sign in zip(joints, signs, strict=True) if sign < 0.0]
                 if wrong:
-                    said.append(f"the sign of {' and '.join(wrong)} is reversed")
-                if said and len(said) < 3:
+                    texts.append(f"the sign of {' and '.join(wrong)} is reversed")
+                if texts and len(texts) < 3:
                     angles = factor * motion.angles[:, order] * np.array(signs)
-                    yield " and ".join(said), replace(motion, angles=angles)
+                    yield " and ".join(texts), replace(motion, angles=angles)
 
 
 def _mounted(motion: Motion, turn: Array) -> str:

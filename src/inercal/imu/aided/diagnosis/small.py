@@ -32,29 +32,31 @@ Patterns = dict[int, Array]
 
 
 def constant_errors(fit: Fit, motion: Motion, gravity: float, judge: Whitening) -> Iterator[Hypothesis[Fit]]:
-    """All that is looked for, but for what no output would show."""
+    """All hypotheses that some output would show."""
     for name, code, patterns, words in _entries(fit, motion, gravity):
         width = next(iter(patterns.values())).shape[1]
         columns = [
             patterns.get(k, np.zeros((len(each.residual), width))) for k, each in enumerate(fit.sensors)
         ]
-        told = judge.told(columns)
-        if told.size:
-            yield _error(name, code, columns, told, words)
+        combinations = judge.observable(columns)
+        if combinations.size:
+            yield _error(name, code, columns, combinations, words)
 
 
 def _error(
-    name: str, code: str, columns: Sequence[Array], told: Array, words: Callable[[Array], str]
+    name: str, code: str, columns: Sequence[Array], combinations: Array, words: Callable[[Array], str]
 ) -> Hypothesis[Fit]:
-    """A fault of columns (n, q) in the output of each sensor; its parameters are those combinations that are told."""
+    """A fault of columns (n, q) in the output of each sensor; its parameters are ``combinations`` (q, m) of them."""
 
     def without(fit: Fit, values: Array) -> Fit:
-        return without_patterns(fit, [each @ (told @ values) for each in columns])
+        return without_patterns(fit, [each @ (combinations @ values) for each in columns])
 
     def says(fitted: Fitted[Fit]) -> str:
-        return words(told @ fitted.values)
+        return words(combinations @ fitted.values)
 
-    return Hypothesis(name, code, says, without, tuple(f"{name} {j + 1}" for j in range(told.shape[1])))
+    return Hypothesis(
+        name, code, says, without, tuple(f"{name} {j + 1}" for j in range(combinations.shape[1]))
+    )
 
 
 Entry = tuple[str, str, Patterns, Callable[[Array], str]]
@@ -63,9 +65,9 @@ Entry = tuple[str, str, Patterns, Callable[[Array], str]]
 
 def _entries(fit: Fit, motion: Motion, gravity: float) -> Iterator[Entry]:
     """Faults of the angles, the clock, the earth rate and the outputs."""
-    told = {triad: _at_fit(fit, motion, triad) for triad in fit.identified}
-    yield from _of_angles(fit, motion, gravity, told)
-    yield _of_clock(fit, motion, gravity, told)
+    outputs = {triad: _at_fit(fit, motion, triad) for triad in fit.identified}
+    yield from _of_angles(fit, motion, gravity, outputs)
+    yield _of_clock(fit, motion, gravity, outputs)
     if "gyro" in fit.identified:
         yield from _of_gyro(fit, gravity)
     for triad in fit.identified:
@@ -96,7 +98,7 @@ def gain(fit: Fit, triad: str) -> Array:
     return fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
 
 
-def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Iterator[Entry]:
+def _of_angles(fit: Fit, motion: Motion, gravity: float, outputs: dict[str, Array]) -> Iterator[Entry]:
     """Angles of a wrong scale, and with errors that come back in each turn; axes that are not where they should be."""
     for k, joint in enumerate(motion.chain.joints):
         angle = motion.angles[:, k]
@@ -105,9 +107,11 @@ def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array])
             angles = motion.angles.copy()
             angles[:, k] += STEP * wrong
             moved = replace(motion, angles=angles)
-            patterns.append({triad: (_at_fit(fit, moved, triad) - x) / STEP for triad, x in told.items()})
+            patterns.append({triad: (_at_fit(fit, moved, triad) - x) / STEP for triad, x in outputs.items()})
         for name, kind, words in ("zero", (0,), _zero), ("scale", (0, 1), _scale), ("round", (2, 3), _round):
-            changes = {triad: np.stack([patterns[each][triad] for each in kind], axis=-1) for triad in told}
+            changes = {
+                triad: np.stack([patterns[each][triad] for each in kind], axis=-1) for triad in outputs
+            }
             yield f"{name} of {joint}", "contradiction", _seen(fit, changes, gravity), partial(words, joint)
     elements = motion.chain.elements
     before = ""
@@ -115,11 +119,11 @@ def _of_angles(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array])
         if isinstance(element, Joint):
             # a turn of the base about up is that of the azimuth
             axes: tuple[Axis, ...] = ("x", "y", "z") if before else ("x", "y")
-            changes = {triad: np.zeros((*x.shape, len(axes))) for triad, x in told.items()}
+            changes = {triad: np.zeros((*x.shape, len(axes))) for triad, x in outputs.items()}
             for j, axis in enumerate(axes):
                 turned = Chain((*elements[:k], Fixed(elementary(axis, STEP)), *elements[k:]))
                 moved = replace(motion, chain=turned)
-                for triad, x in told.items():
+                for triad, x in outputs.items():
                     changes[triad][:, :, j] = (_at_fit(fit, moved, triad) - x) / STEP
             words = partial(_tilted, before, element.name)
             yield f"tilt of {element.name}", "contradiction", _seen(fit, changes, gravity), words
@@ -157,11 +161,11 @@ def _round(joint: str, a: Array) -> str:
     )
 
 
-def _of_clock(fit: Fit, motion: Motion, gravity: float, told: dict[str, Array]) -> Entry:
+def _of_clock(fit: Fit, motion: Motion, gravity: float, outputs: dict[str, Array]) -> Entry:
     """A clock of the angles that runs at another rate."""
     middle, span = float(np.mean(motion.t)), float(np.ptp(motion.t))
     moved = replace(motion, t=middle + (motion.t - middle) * (1.0 + STEP))
-    changes = {triad: ((_at_fit(fit, moved, triad) - x) / STEP)[:, :, None] for triad, x in told.items()}
+    changes = {triad: ((_at_fit(fit, moved, triad) - x) / STEP)[:, :, None] for triad, x in outputs.items()}
     return (
         "clock",
         "command_shift",
