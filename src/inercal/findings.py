@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import cast
 
 
 class Harm(enum.Enum):
@@ -118,6 +117,9 @@ EVERYTHING = ("*",)
 """The ``harm`` of a finding that may shift every value; an estimate puts its own names in its place."""
 
 
+_UNSTATED = ("?",)
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing worth knowing: a code of `CODES`, a sentence, and where it was seen.
@@ -130,21 +132,17 @@ class Finding:
     code: str
     message: str
     where: str = ""
-    harm: tuple[str, ...] = cast("tuple[str, ...]", None)
+    harm: tuple[str, ...] = _UNSTATED
 
     def __post_init__(self) -> None:
         """Refuse a code that is not in the table, and harm that its code rules out."""
         if self.code not in CODES:
             raise ValueError(f"unknown finding code {self.code!r}")
-        match CODES[self.code].harm:
-            case Harm.NEVER if self.harm:
-                raise ValueError(f"findings of the code {self.code!r} do no harm, found {self.harm}")
-            case Harm.NEVER:
-                object.__setattr__(self, "harm", ())
-            case Harm.BY_SIZE if self.harm is None:
-                object.__setattr__(self, "harm", EVERYTHING)
-            case Harm.ALWAYS if not self.harm:
-                object.__setattr__(self, "harm", EVERYTHING)
+        never = CODES[self.code].harm is Harm.NEVER
+        if self.harm is _UNSTATED or (CODES[self.code].harm is Harm.ALWAYS and not self.harm):
+            object.__setattr__(self, "harm", () if never else EVERYTHING)
+        if never and self.harm:
+            raise ValueError(f"findings of the code {self.code!r} do no harm, found {self.harm}")
 
 
 class Status(enum.Enum):
