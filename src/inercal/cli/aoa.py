@@ -58,7 +58,7 @@ class MethodOptions:
 
     @property
     def fusion(self) -> dict[str, bool]:
-        """Which options of the fusion were given."""
+        """Options of the fusion, and true where given."""
         return {"--states": self.states is not None, "--smooth": self.smooth}
 
     @property

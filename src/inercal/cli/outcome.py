@@ -75,8 +75,3 @@ def read_in(estimate: Estimate, read_s: float) -> Estimate:
 def timed(estimate: Estimate) -> Estimate:
     """The estimate with the time of the process until now."""
     return replace(estimate, timing={**estimate.timing, "total": process_age()})
-
-
-def printed(estimate: Estimate) -> str:
-    """The table of the coefficients; nothing where there are none."""
-    return estimate.table() if estimate.names else ""

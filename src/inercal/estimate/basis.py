@@ -37,7 +37,7 @@ class Settings(Protocol):
 
     @property
     def temperature(self) -> Quantity | None:
-        """That stated of the instrument."""
+        """Temperature of the instrument, as stated."""
 
     @property
     def traceability(self) -> Mapping[str, str]:

@@ -35,7 +35,7 @@ def save(path: str | Path, kind: str, fingerprint: str, state: object) -> None:
     ----------
     path : str or Path
     kind : str
-        What estimator the state is of, such as ``monitor``.
+        Estimator of the state, such as ``monitor``.
     fingerprint : str
         Of all on which the meaning of the state depends, by `fingerprint`.
     state : NamedTuple, dataclass or mapping

@@ -306,7 +306,7 @@ def _harmed(estimate: Estimate) -> tuple[str, ...]:
 
 
 def _conditions(estimate: Estimate) -> dict[str, Any]:
-    """When and at which temperature a calibration was made."""
+    """Date and temperature of a calibration."""
     return {key: estimate.conditions.get(key) for key in ("date", "temperature")}
 
 

@@ -26,19 +26,19 @@ class Coverage:
     Attributes
     ----------
     level : float
-        What the intervals claim, e.g. 0.95.
+        Probability that the intervals claim, e.g. 0.95.
     runs : int
         Number of runs.
     fraction : (m,)
         Share of the runs in which the interval of each coefficient held the truth.
     limits : (float, float)
-        Where every `fraction` has to lie.
+        Limits of every `fraction`.
     pooled : float
         Share over all runs and coefficients.
     pooled_limits : (float, float)
-        Where `pooled` has to lie.
+        Limits of `pooled`.
     design_effect : float
-        How many times larger the variance of `pooled` is than that of independent coefficients, 1 to m.
+        Ratio of the variance of `pooled` to that of independent coefficients, 1 to m.
     rms : (m,)
         Root mean square of error / standard uncertainty: near 1, more for few degrees of freedom.
     """
@@ -139,7 +139,7 @@ def coverage(
     dof : float, (runs,) or (runs, m), optional
         Degrees of freedom of `u`; infinite where `u` is known.
     level : float, optional
-        What the intervals claim.
+        Probability that the intervals claim.
     risk : float, optional
         Accepted probability of a false alarm.
 

@@ -64,11 +64,11 @@ class Hypothesis(Generic[Case]):
     bounds : (float, float) [SI]
         Values of the parameters that are believed.
     prior : float [SI]
-        Standard deviation of each parameter about 0; infinite where nothing is known of it.
+        Standard deviation of each parameter about 0; infinite without a prior.
     alternatives : float
         Number of hypotheses of which it was picked.
     times : int
-        How often it happened, each time picked of so many.
+        Number of its occurrences, each picked of so many.
     left_out : int
         Scalars that the case without it leaves out, each of which counts 1.
     where, harm
@@ -183,7 +183,7 @@ def search(
     systematic : Hypothesis, optional
         Systematic inputs, with their prior: fitted along with all, never a finding.
     choose : callable
-        Which fit is taken, the new hypothesis last in each, the likeliest fit first; None to end. The likeliest if
+        Choice of the fit, the new hypothesis last in each, the likeliest fit first; None to end. The likeliest if
         absent.
 
     Returns

@@ -55,7 +55,7 @@ class RunError(InercalError):
     run, seed : int
         Number of the run and seed of its campaign.
     cause : str
-        What went wrong. The ``__cause__`` is the exception itself, or its traceback from another process.
+        The failure. The ``__cause__`` is the exception itself, or its traceback from another process.
     """
 
     def __init__(self, run: int, seed: int, cause: str) -> None:
@@ -190,7 +190,7 @@ def run(
     task : callable
         ``task(rng)`` returns a mapping of names to numbers or arrays of fixed shape.
     runs : int
-        How many times.
+        Number of runs.
     seed : int
         Seed of the campaign, not negative. With `runs` it settles every digit of the answer.
     executor : Executor, optional
@@ -207,7 +207,7 @@ def run(
     Returns
     -------
     dict of str to (runs, ...) float64
-        What the task returned, run ``i`` at index ``i``.
+        Values that the task returned, run ``i`` at index ``i``.
 
     Raises
     ------

@@ -63,12 +63,12 @@ def apply(calibration: Result | Estimate | str | Path, record: Record, invert: b
     Returns
     -------
     Record
-        Specific force [m/s^2] and rate [rad/s]; what the calibration says of itself is among its findings.
+        Specific force [m/s^2] and rate [rad/s]; its findings include those of the calibration.
 
     Raises
     ------
     InputError
-        The calibration is not of such an instrument, or the record not of this one.
+        The calibration is of another instrument, or the record not of this one.
 
     Examples
     --------

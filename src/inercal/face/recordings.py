@@ -46,7 +46,7 @@ def read(
         Files with distinct channels are parts of one record; each keeps its own time axis, unless the stamps are
         equal.
     map : path or RecordMap, optional
-        Which column is which channel; not needed for files that say so themselves, as by a header
+        Map from columns to channels; not needed for files that say so themselves, as by a header
         ``t [s],acc_x [m/s^2]``.
     begin, end : str, float or None
         Part of the recording, from the first stamp of each clock: ``"12.5 s"``, or seconds.

@@ -213,7 +213,7 @@ class Result:
         )
 
     def _repr_html_(self) -> str:
-        """For a notebook: the verdict, the picture, the table."""
+        """The verdict, the picture and the table, for a notebook."""
         picture = self.view.picture()
         mood = {Status.OK: "#2E7D4F", Status.ILL_CONDITIONED: "#B07A00"}.get(self.status, "#C03A2B")
         items = "".join(
@@ -256,7 +256,7 @@ class Result:
 
 
 def coefficients(shown: Estimate) -> str:
-    """In a line: how many coefficients, and the first of them."""
+    """A line with the number of coefficients and the first of them."""
     first = next(iter(shown.parameters.values()), None)
     if first is None:
         return "no coefficients"

@@ -90,7 +90,7 @@ def sensitivity(
     say: Progress = lambda _: None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Result:
-    """Which error of the table matters; ``evidence`` is the `inercal.turntable.sensitivity.analysis.Analysed`.
+    """Influence of each error of the table; ``evidence`` is the `inercal.turntable.sensitivity.analysis.Analysed`.
 
     Without ``maps`` indices of each position may be left out; ``say`` takes messages about long steps.
     """

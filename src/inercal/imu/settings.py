@@ -40,7 +40,7 @@ class FerrarisSettings:
     turn_u : float
         Standard uncertainty of ``turn`` [rad].
     sections : mapping
-        Where the sections are, by name: (start, end) in seconds of the record's time axis as floats, or in samples
+        Places of the sections by name: (start, end) in seconds of the record's time axis as floats, or in samples
         (from 0, the end not included) as integers, or the label of its rows. Empty: from the labels of the record
         that are names of sections, or detected.
     """

@@ -52,8 +52,8 @@ class Sums:
     def with_gaps(self, n: int, white: Array, steps: Array) -> Sums:
         """The sums of ``n`` samples whose gaps enlarge the variance of N by ``white`` (k,), of Q by ``steps`` (k,).
 
-        What gaps add to Q has, on average over where they are, the covariance of white noise. But it comes in shots,
-        one of variance 2 Q^2 a gap, so that C varies with them: for gaps that are independent of each other, r a
+        The part that gaps add to Q has, on average over the places, the covariance of white noise. But it comes in
+        shots, one of variance 2 Q^2 a gap, so that C varies with them: for gaps that are independent of each other, r a
         sample, by r (2 Q^2)^2 times the sum over gaps of the squared weights in D and in D'. The mean of C^2 is larger
         than the square of the mean C by that, and the differences D to which a gap belongs are 2 m.
         """

@@ -136,7 +136,7 @@ class Curve:
         return Fit(tuple(seen.tolist()), squares, normal, (weights @ normal).T)
 
     def moves(self, fit: Fit, i: int) -> Array:
-        """By what the squares (p,) of ``fit.seen`` would fall, were term ``i`` fitted as well; 0 were it negative."""
+        """Decrease of the squares (p,) of ``fit.seen`` if term ``i`` were fitted too; 0 for a negative term."""
         apart, y, shared = self._apart(i, fit.squares)
         return max(float(apart @ y / (apart @ apart)), 0.0) * shared
 

@@ -105,9 +105,9 @@ def render(
     title : str
         Heading of the page.
     tables : sequence of Table
-        What else there is to tell, ahead of the other pictures.
+        Further tables, ahead of the other pictures.
     answer : sequence of Table
-        What was asked for, where that is not the coefficients: ahead of these.
+        The result where it is not the coefficients: ahead of these.
 
     A table of the result with the title of one of these is not shown again among the details.
 
@@ -165,9 +165,9 @@ def page(
     title : str
         Heading of the page.
     facts : sequence of (name, unit, text), optional
-        What was looked at, where there is no instrument to trace; `Estimate.traceability` if absent.
+        Subject of the page, where there is no instrument to trace; `Estimate.traceability` if absent.
     meaning : str
-        What the verdict says, ahead of the message of the estimate.
+        Verdict in words, ahead of the message of the estimate.
     pictures : sequence of Picture
         The first one answers the question of the page; a template shows the others below its tables.
     """
@@ -227,7 +227,7 @@ def _with_units(estimate: Estimate) -> dict[str, Any]:
 
 
 def _heading(estimate: Estimate) -> list[tuple[str, str, str]]:
-    """Who calibrated what, when, against which reference: the four that must be there, and any others."""
+    """Traceability: instrument, operator, date and reference, which must be there, and any others."""
     given = estimate.traceability
     first = ("instrument", "date", "operator", "reference")
     return [(key, "", given.get(key, "")) for key in first] + [

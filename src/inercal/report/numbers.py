@@ -25,7 +25,7 @@ def known(x: Array) -> Array:
 
 
 def span(x: Array) -> str:
-    """From the least to the greatest, in words."""
+    """The range, in words."""
     numbers = known(x)
     return f"{numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else "no number"
 

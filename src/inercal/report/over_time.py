@@ -220,7 +220,7 @@ def strips(
 
 
 def measured(t: Array, names: Sequence[str], missing: Flags, saturated: Flags, marks: Marks) -> Picture:
-    """When each of the sensors measured: ``missing`` and ``saturated`` (n, k) of ``names`` over ``t`` (n,) [s]."""
+    """Times in which each sensor measured: ``missing`` and ``saturated`` (n, k) of ``names`` over ``t`` (n,) [s]."""
     height = 0.17
     with grid(t, 1, 1, height * len(names), 0.1) as (page, axes, places):
         cell = replace(places[0], y=(0.0, float(len(names))))

@@ -14,7 +14,7 @@ from inercal.report.panels import draw
 from inercal.report.style import COLOURS, INK, QUIET
 
 _AZIMUTH, _ELEVATION = np.radians(40.0), np.radians(22.0)
-"""From where the rig is seen: turned from south to east, and above the horizon."""
+"""View of the rig: turned from south to east, and above the horizon."""
 
 _STEP = 0.34
 """Distance of a ring from the next one inside; the innermost has radius 1."""

@@ -32,7 +32,7 @@ def hemispheres(
     values : (n,), optional
         Numbers with a sign, as colour; all of one colour if absent.
     label : str
-        What the values are, with their unit.
+        Quantity of the values, with its unit.
     stars : (m, 3), optional
         Directions to be marked.
 

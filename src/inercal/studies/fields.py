@@ -36,11 +36,11 @@ class QuantityText:
     Parameters
     ----------
     dimension : str
-        What it measures, a key of the unit table: ``"time"``, ``"angle"``, ``"number"``, ...
+        Dimension, a key of the unit table: ``"time"``, ``"angle"``, ``"number"``, ...
     example : str
         A good value, shown in the JSON Schema.
     accepts : callable
-        Whether a value [SI] makes sense here.
+        True for a value [SI] that makes sense.
     expected : str
         The same in words, for the error message: "a time above zero".
     """
@@ -102,9 +102,9 @@ class SeveralTexts:
     ----------
     each : QuantityText
     of : str
-        What they belong to, in order, parted by commas: as many are expected.
+        Their names in order, parted by commas: as many are expected.
     one : bool
-        Whether a single text may stand for all.
+        True if a single text may stand for all.
     """
 
     each: QuantityText

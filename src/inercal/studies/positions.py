@@ -45,7 +45,7 @@ PlanName = Annotated[str, BeforeValidator(_known_plan), Field(json_schema_extra=
 
 
 class GridTable(Strict):
-    """All combinations of evenly spaced angles over full circles, the outer axis slowest."""
+    """Combinations of evenly spaced angles over full circles, the outer axis slowest."""
 
     phi1: Count = Field(description="number of outer angles", examples=[36])
     phi2: Count = Field(description="number of angles of the next axis", examples=[36])
@@ -173,7 +173,7 @@ def compared(names: Sequence[str] | None, chain: Chain, limits: Limits, where: o
 
 
 def _reached(plan: Plan, chain: Chain, limits: Limits) -> tuple[NDArray[np.bool_], Array]:
-    """Which positions (n,) the axes reach, and angles (n, joints) whole turns away that lie within the limits."""
+    """Positions (n,) that the axes reach, and angles (n, joints) whole turns away that lie within the limits."""
     ranges = [limits.get(joint) for joint in chain.joints]
     angles = plan.angles.copy()
     for k, ends in enumerate(ranges):

@@ -135,7 +135,7 @@ class GoalTable(_WANTED):  # type: ignore[misc]
 
 
 class FilterTable(table_of(Filter)):  # type: ignore[misc]
-    """Which estimator, and how."""
+    """Choice and settings of the estimator."""
 
     gating: Literal["off", "any", "two", "channel"] = Field(
         default="off",

@@ -280,7 +280,8 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
         raise StudyError(
             where, f"sensors.{name}.channel: missing, expected which of {', '.join(axes)} this sensor is"
         )
-    axis, sign = (axes[0], 1.0) if table.channel is None else (table.channel[-1], _sign(table.channel))
+    channel = table.channel or axes[0]
+    axis, sign = channel[-1], -1.0 if channel.startswith("-") else 1.0
     if axis not in axes:
         raise StudyError(
             where, f"sensors.{name}.channel: found {table.channel!r}, expected one of {', '.join(axes)}"
@@ -306,8 +307,3 @@ def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, 
 def _dimension(name: str) -> str:
     """Quantity that a sensor measures."""
     return "rate" if name in GYROS else "acceleration"
-
-
-def _sign(channel: str) -> float:
-    """-1 where the record turns the sign."""
-    return -1.0 if channel.startswith("-") else 1.0

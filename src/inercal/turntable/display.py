@@ -93,7 +93,7 @@ def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
 
 
 def tolerances(estimate: Estimate) -> str:
-    """For each coefficient the error of the table that matters most, and what halving that would bring, as text.
+    """The largest error of the table for each coefficient, and the effect of halving it, as text.
 
     Empty where the table has no errors or nothing was fitted.
     """

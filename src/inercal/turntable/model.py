@@ -62,7 +62,7 @@ class TableModel:
     chain : Chain
         The table with its errors.
     a_n : (3,)
-        What the monomials call a, in n: the gravity reference in units of the site's gravity for a gyrowheel,
+        The vector a of the monomials, in n: the gravity reference in units of the site's gravity for a gyrowheel,
         specific force [m/s^2] for the others.
     w_n : (3,)
         Earth rate [rad/s] in n.

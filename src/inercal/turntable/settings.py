@@ -140,7 +140,7 @@ class TurntableSettings:
     limits : mapping
         Allowed range (low, high) [rad] of a joint by its name.
     design : Design
-        How positions are searched.
+        Settings of a search for positions.
     traceability, temperature, given
         As in `inercal.imu.settings.ImuSettings`.
     """

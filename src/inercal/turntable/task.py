@@ -39,7 +39,7 @@ def calibrate(
     Raises
     ------
     InputError
-        The record has no angles or no outputs of such an instrument, or the study does not fit it.
+        The record has no angles or no outputs of the instrument, or the study does not fit it.
     """
     import scipy.special  # noqa: F401  (loading it is not part of the computation)
 

@@ -72,7 +72,7 @@ def levels(
     residual : (n,)
         Of a preliminary fit.
     columns : (n, p)
-        What the residuals may still change by, for unknowns of unit prior variance.
+        Changes of the residuals by unknowns of unit prior variance.
     prior : (p,)
         Prior means of these unknowns, beside the preliminary fit.
     t, length : (n,) s

@@ -34,7 +34,7 @@ ARM_U = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """All unknowns (P,) but the biases: where each group is, prior ``mean`` and ``sd``, both (P,).
+    """The unknowns (P,) without the biases: ``places`` of each group, prior ``mean`` and ``sd``, both (P,).
 
     The priors of ``stated`` groups are knowledge: earth rate, and the errors of the table.
     """
@@ -58,7 +58,7 @@ def unknowns(
     scales : mapping
         Scale factor [output per SI unit] to begin with, of ``acc`` and, where there is a gyro, ``gyro``.
     rests : int
-        How many rests the table has: its errors have a value in each.
+        Number of rests: errors of the table have a value in each.
     g_sensitivity : bool
     """
     groups: list[tuple[str, Array, Array, str]] = [

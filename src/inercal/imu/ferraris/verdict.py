@@ -23,7 +23,7 @@ from inercal.records.places import counted_names
 
 
 def too_few(sections: Sections) -> str:
-    """Which sections there are not, and what to do."""
+    """The missing sections, and the remedy."""
     missing = sections.missing
     present = len(NAMES) - len(missing)
     wanted = ", ".join(f"{name} ({in_words(name)})" for name in missing)

@@ -110,5 +110,5 @@ def _largest(about: Mapping[int, list[Motion]]) -> float:
 
 
 def _where(acc: Triad, motion: Motion) -> str:
-    """From when to when."""
+    """Begin and end of a motion, in words."""
     return f"t {acc.t[motion.start]:.2f} to {acc.t[motion.stop - 1]:.2f} s"

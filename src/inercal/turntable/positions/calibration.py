@@ -46,7 +46,7 @@ def calibrate_positions(
     Raises
     ------
     InputError
-        The record has no angles or no outputs of such an instrument, or the study does not fit it.
+        The record has no angles or no outputs of the instrument, or the study does not fit it.
     """
     progress("averaging over the positions")
     means = readings(record, settings.chain.joints, settings.instrument.kind)

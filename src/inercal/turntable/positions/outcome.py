@@ -221,7 +221,7 @@ def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collect
 
 
 def _dead(fit: Regression, identified: NDArray[np.bool_]) -> str:
-    """That terms which are not ``identified`` (p,) are relative to a scale factor of zero, in words."""
+    """A sentence: terms that are not ``identified`` (p,) are relative to a scale factor of zero."""
     lost = ", ".join(name for name, each in zip(fit.model.symbols, identified, strict=True) if not each)
     return f"{lost}: relative to a scale factor that is found as 0: does the output follow its input?"
 
@@ -238,7 +238,7 @@ def _without_fit(readings: Readings, fitting: Fitting, settings: TurntableSettin
 
 
 def _unobservable(readings: Readings, fitting: Fitting, settings: TurntableSettings) -> str:
-    """Why nothing was fitted, and what would help."""
+    """The reason why nothing was fitted, and the remedy."""
     words = [text for each in fitting.identified for text in each.words]
     fewest = fewest_positions(fitting.model, settings)
     if len(readings.y) < fewest:

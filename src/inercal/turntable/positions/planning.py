@@ -77,7 +77,7 @@ class Designed:
     unit : Unit
         Of the outputs, for people.
     message : str
-        What was searched, in words.
+        The search, in words.
     findings : tuple of Finding
         Findings about the plan.
     result : mapping

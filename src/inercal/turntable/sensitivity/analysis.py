@@ -13,7 +13,6 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.records.places import counted
-from inercal.rigs.chain import Chain
 from inercal.rigs.outputs import table_outputs
 from inercal.sensitivities import averages
 from inercal.sensitivities.averages import Averages, Flag
@@ -152,7 +151,7 @@ def analyse(
         clock = time.perf_counter()
         indices = local.analyse(chain, outputs, angles)
     solve = time.perf_counter() - clock
-    return Analysed(indices, chain.joints, _words(chain), note, solve)
+    return Analysed(indices, chain.joints, tuple(error.what for error in chain.errors), note, solve)
 
 
 def result(analysed: Analysed) -> dict[str, Any]:
@@ -162,7 +161,7 @@ def result(analysed: Analysed) -> dict[str, Any]:
     return {
         "factors": indices.factors,
         "outputs": indices.outputs,
-        "positions": _angles(analysed),
+        "positions": {joint: analysed.indices.angles[:, k] for k, joint in enumerate(analysed.joints)},
         "mean": {**_plain(analysed.mean), **_shapley(indices, averages.mean)},
         "weighted": {**_plain(analysed.weighted), **_shapley(indices, averages.weighted)},
         "aggregate": {"outputs": indices.outputs, "first": part.first, "total": part.total},
@@ -207,16 +206,6 @@ def table(analysed: Analysed) -> str:
             "S of an output: mean of its first-order indices over the positions",
         ]
     )
-
-
-def _words(chain: Chain) -> tuple[str, ...]:
-    """Each error in words."""
-    return tuple(error.what for error in chain.errors)
-
-
-def _angles(analysed: Analysed) -> dict[str, Array]:
-    """Angles of the positions [rad] by joint."""
-    return {joint: analysed.indices.angles[:, k] for k, joint in enumerate(analysed.joints)}
 
 
 def _plain(means: Averages) -> Mapping[str, Array]:
