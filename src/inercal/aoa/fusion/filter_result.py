@@ -1,4 +1,13 @@
-"""The fusion of a whole recording: angles with their uncertainties, what was learned of the sensors, innovations."""
+"""The fusion of a whole recording: angles with their uncertainties, what was learned of the sensors, innovations.
+
+The causal filter tells the roll, where gyros for roll and yaw track it, at each row. Smoothed, its states are kept at
+some thousand times only, and between them the roll follows what the gyros read,
+
+    phi' = p + (w sin phi - y cos phi) tan theta
+
+with the kept roll at its right side, and what this sum runs off by, from one kept time to the next, is spread evenly
+between: biases of the gyros are taken out by it, and oscillations that the kept times do not resolve are kept.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +31,9 @@ SETTLED = 2.0
 
 KEPT = 2000
 """Rows, about, of which all states are kept for pictures."""
+
+_STEEP = 50.0
+"""Largest tangent of theta: near 90 deg roll and yaw are one, and the roll is what the fusion says."""
 
 _BLOCK = 10_000
 """Rows of which all states are there at a time."""
@@ -164,3 +176,35 @@ def of_fusion(filtered: FilterResult, states: int) -> Angles:
     """The angles of the fusion with so many ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
     way = "smoothed" if filtered.smoothed else "fusion"
     return Angles(f"{way} {states}", filtered.theta, filtered.u, filtered.rate, filtered.rate_u)
+
+
+def tracked_roll(
+    recording: Recording, problem: FilterProblem, filtered: FilterResult
+) -> tuple[Array, Array] | None:
+    """Roll (n,) and its standard uncertainty (n,) [rad] at each row, NaN where theta is; None where it is not tracked.
+
+    Of smoothed angles the uncertainty is interpolated between the kept times.
+    """
+    if not problem.spatial:
+        return None
+    if filtered.roll is not None and filtered.roll_u is not None:
+        return filtered.roll, filtered.roll_u
+    k = problem.names.index("phi")
+    told = np.isfinite(filtered.states_u[:, k])
+    roll, roll_u = np.full((2, len(recording.t)), np.nan)
+    taken = later(recording.t)
+    taken = taken[np.isfinite(filtered.theta[taken])]
+    if not told.any() or not len(taken):
+        return roll, roll_u
+    t, kept = recording.t[taken], filtered.kept_t[told]
+    phi = np.unwrap(filtered.states[told, k])
+    coarse = np.interp(t, kept, phi)
+    tangent = np.tan(filtered.theta[taken])
+    tangent = np.where(np.abs(tangent) < _STEEP, tangent, 0.0)
+    p, y = np.nan_to_num(recording.turns[taken]).T
+    speed = p + (np.nan_to_num(recording.gyro[taken]) * np.sin(coarse) - y * np.cos(coarse)) * tangent
+    run = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+    fine = run + np.interp(t, kept, phi - np.interp(kept, t, run))
+    roll[taken] = np.remainder(fine + np.pi, 2.0 * np.pi) - np.pi
+    roll_u[taken] = np.interp(t, kept, filtered.states_u[told, k])
+    return roll, roll_u

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import compiled
-from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion import loop
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import roll_of
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
@@ -154,8 +154,8 @@ class Live:
         if not (state.started and t > state.t):
             return self._block(np.array([t]), row.copy())
         self._dt[0] = t - state.t
-        if steps := fading.due(state.t, t, state.since):
-            fading.fade(state.x, state.P, problem, steps)
+        if steps := fusion.fading_steps(state.t, t, state.since):
+            fusion.fade(state.x, state.P, problem, steps)
         done = self._advance(Belief(state.x, state.P, state.turns), *self._arguments)
         stamp = np.array([t])
         self._late = 0

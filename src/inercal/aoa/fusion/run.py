@@ -2,9 +2,19 @@
 
 The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
 as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors; with
-the prior where it was lost because sensors did not cease to contradict it. Over hours what it learned fades
-(`inercal.aoa.fusion.fading`).
-Rows must be later than those before them: `inercal.aoa.reading.clock` leaves out those that are not.
+the prior where it was lost because sensors did not cease to contradict it. Rows must be later than those before them:
+`inercal.aoa.reading.clock` leaves out those that are not.
+
+Linearised at a motion that is itself estimated, a row says a little too much of the constants, and always in the same
+sense. Within a minute that is small beside u. But a direction that a motion hardly tells (of one sine the gyro's scale,
+positions and heights together, which only harmonics part) is carried away, and the angle with it: in 600 s of 10 deg at
+1 Hz by one standard deviation of the prior at 1 kHz, by eight at 100 Hz. So from `MEMORY` on what the data told of the
+constants fades with that time constant, and what the prior told does not; in information, each `FADING_STEP`,
+
+    P'^-1 = (1 - e) P^-1 + e P0^-1        P'^-1 x' = (1 - e) P^-1 x + e P0^-1 x0
+
+with x0, P0 the prior. A constant that is well told stays as sure as `MEMORY` makes it, one that is badly told stays
+at its prior, and a bias that wanders is followed.
 """
 
 from __future__ import annotations
@@ -14,12 +24,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion import loop
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.model import GYRO_BIAS
 from inercal.aoa.fusion.problem import START, FilterProblem
 from inercal.aoa.reading.clock import HELD
 from inercal.arrays import Array
+
+MEMORY = 60.0
+"""Time [s] from the first row on in which nothing fades, and the time constant after it."""
+
+FADING_STEP = 10.0
+"""Interval [s] at which constants fade."""
+
+_FIRST = math.floor(MEMORY / FADING_STEP)
 
 _ACROSS = 0.1
 """Cosine of the roll below which the accelerometers across the body and the gyro do not show pitch."""
@@ -120,9 +138,9 @@ def advance(
             since = float(t[at]) if anew or math.isnan(since) else since
             starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew, since))
             dt[at] = 0.0
-        elif steps := fading.due(float(t[at - 1]) if at else before, float(t[at]), since):
-            fading.fade(x, P, problem, steps)
-        stop = fading.next_due(t, at, since)
+        elif steps := fading_steps(float(t[at - 1]) if at else before, float(t[at]), since):
+            fade(x, P, problem, steps)
+        stop = next_fading(t, at, since)
         part = Rows(dt[at:stop], rows[at:stop])
         done = loop.advance(Belief(x, P, turns), part, problem.model, out[at:stop], Kept(kept, every, at))
         # what is lost in the row in which it started is no angle
@@ -211,3 +229,43 @@ def _slope(t: Array, angles: Array) -> float:
         return 0.0
     t, angles = t[finite] - t[finite].mean(), np.unwrap(angles[finite])
     return float(t @ angles / (t @ t))
+
+
+def fading_steps(before: float, t: float, since: float) -> int:
+    """How many steps of fading come before the row at ``t`` [s], with ``before`` that of the row before it and
+    ``since`` that of the row from which the filter has learned."""
+    late, early = math.floor((t - since) / FADING_STEP), math.floor((before - since) / FADING_STEP)
+    return max(late, _FIRST) - max(early, _FIRST)
+
+
+def next_fading(t: Array, at: int, since: float) -> int:
+    """The first row after ``at`` of ``t`` (m,) [s], increasing, before which constants fade; m where none is."""
+    passed = max(math.floor((t[at] - since) / FADING_STEP), _FIRST) + 1
+    # rounding may have it a row earlier or later
+    k = max(at + 1, int(np.searchsorted(t, since + passed * FADING_STEP)) - 1)
+    while k < len(t) and not fading_steps(float(t[k - 1]), float(t[k]), since):
+        k += 1
+    return k
+
+
+def fade(x: Array, P: Array, problem: FilterProblem, steps: int) -> Array:
+    """Let the constants of the state ``x`` (n,), ``P`` (n, n) fade by so many steps, in place.
+
+    Returns F (n, n) of x' = F x + what the prior tells. States that move stay as they are.
+    """
+    kept = math.exp(-FADING_STEP * steps / MEMORY)
+    prior, F = problem.covariance, np.eye(len(x))
+    at = np.array([k for k in problem.nuisances.values() if prior[k, k] > 0.0], dtype=int)
+    if not len(at):
+        return F
+    scale, own = np.sqrt(np.diag(prior)[at]), np.ix_(at, at)
+    units = np.outer(scale, scale)
+    known, given = P[own] / units, prior[own] / units
+    mixed = known @ np.linalg.pinv(kept * given + (1.0 - kept) * known, hermitian=True)
+    F[own] -= (1.0 - kept) * mixed * np.outer(scale, 1.0 / scale)
+    x[at] = problem.mean[at] + F[own] @ (x[at] - problem.mean[at])
+    P[at] = F[own] @ P[at]
+    P[:, at] = P[at].T
+    faded = mixed @ given * units
+    P[own] = 0.5 * (faded + faded.T)
+    return F

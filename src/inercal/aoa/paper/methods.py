@@ -13,8 +13,8 @@ from inercal.aoa.angles import Angles, continuous
 from inercal.aoa.arms import all_weights, level_of, tangential_arms
 from inercal.aoa.paper import lever, static
 from inercal.aoa.paper.delay import aligned, relative_delay
-from inercal.aoa.paper.error_terms import in_motion
 from inercal.aoa.paper.lowpass import zero_phase
+from inercal.aoa.paper.residuals import error_terms
 from inercal.aoa.paper.static import spread
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
@@ -54,10 +54,10 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
     The gyro is shifted first, by its delay that the study states or that is estimated from the whole recording; the
     delay common to all sensors is made up for at the end by theta' tau. A roll is that which the study states.
 
-    Where accelerometers are missing in a row, what is left of them is used if the methods can, otherwise there is no
-    angle. Its uncertainty is of first order, by noise, biases and the prior of positions and gyro scale
-    (`inercal.aoa.paper.error_terms`), and terms that the methods leave in count as errors of their own size. Flexure
-    of the sting is not in it.
+    A row in which accelerometers are missing uses the others if the methods can; otherwise it has no angle. The
+    uncertainty is of first order, by noise, biases and the prior of positions and gyro scale
+    (`inercal.aoa.paper.residuals.error_terms`), and terms that the methods leave in count as errors of their own size.
+    Flexure of the sting is not in it.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
             w, al = np.nan_to_num(rate[rows]), np.nan_to_num(acceleration[rows])
             errors = [
                 (weight, dual @ matrix @ dual.T)
-                for weight, matrix in in_motion(
+                for weight, matrix in error_terms(
                     settings, methods.tangential, layout, level, w, al, compensated[rows], step
                 )
             ]

@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion
+from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import FilterProblem
-from inercal.aoa.fusion.roll import tracked
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import tare
@@ -87,7 +86,10 @@ def by_fusion(
     recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
 ) -> Angles:
     """The angles of the fusion, with the roll where gyros track it, and with what is stated in their uncertainty."""
-    angles, turned = of_fusion(filtered, settings.estimator.states), tracked(recording, problem, filtered)
+    angles, turned = (
+        of_fusion(filtered, settings.estimator.states),
+        tracked_roll(recording, problem, filtered),
+    )
     if turned is not None:
         angles = replace(angles, roll=turned[0], roll_u=turned[1])
     return _with_stated(
