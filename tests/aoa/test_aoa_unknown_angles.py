@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 from sting_study import BASE, DEG, G, layout, study
 
-from inercal.aoa.fusion.loop import root, told
+from inercal.aoa.fusion.loop import root, significant
 from inercal.aoa.paper.methods import measure as by_method
 from inercal.aoa.paper.static import gls
 from inercal.aoa.reading.pauses import at_rest
@@ -45,7 +45,7 @@ def test_a_clock_that_stands_shows_no_motion():
 
 @pytest.mark.parametrize("value", [1e-170, 1e-162, 0.0])
 def test_a_rate_whose_square_is_no_number_is_all_noise(value):
-    assert told(value, 1.0) == 0.0
+    assert significant(value, 1.0) == 0.0
 
 
 def test_what_has_no_variance_has_no_uncertainty():

@@ -8,8 +8,8 @@ filter's rows are gone through backward, each scalar with the row, gain and vari
 
 and between the row's last scalar and the next row x_s = x - P lam, P_s = P - P Lam P, of the filter's x and P after
 the row: those before it are so wide where the filter starts that digits would be lost. No covariance is inverted. The
-filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, to
-have its rows; so memory goes with the block and not with the recording. What is known of constants fades between blocks
+filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, for
+its rows; so memory grows with the block and not with the recording. Constants fade between blocks
 (`inercal.aoa.fusion.run`), lam := F^T lam there too.
 """
 
@@ -51,7 +51,7 @@ def smooth(
     t, rows
         As `inercal.aoa.fusion.run.advance` took them.
     starts : tuple of Start
-        Where the filter started: between two of them motion is not connected, while what is known of sensors is.
+        Starts of the filter: the motion is not continuous across them, the errors of the sensors are.
     kept : (k, 2 n) or None
         Receives states and standard deviations at each ``every``-th row.
     """

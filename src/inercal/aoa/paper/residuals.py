@@ -1,4 +1,4 @@
-"""What the paper's ways of freeing readings from lever-arm terms leave: in closed form, and as a covariance by row.
+"""Errors left by the paper's ways of freeing readings from lever-arm terms: in closed form, and as a covariance.
 
 The model oscillates, theta = theta_0 + theta_m sin Om t, with the peak rate X = theta_m Om; dA [m/s^2] and dw [rad/s]
 are the errors of an accelerometer and of the gyro, L = r_3 - r_1 the arm of the dual accelerometer. Source: Tan et al.
@@ -23,19 +23,19 @@ from inercal.aoa.settings import AoaSettings, Tangential
 from inercal.arrays import Array
 
 DECISION = 2.0 + math.sqrt(6.0)
-"""X/dw at which low pass and mechanical compensation leave as much: X^2/2 = 2 X dw + dw^2."""
+"""X/dw at which low pass and mechanical compensation leave the same error: X^2/2 = 2 X dw + dw^2."""
 
 _LARGEST = 20.0
 """Standard deviations that no sample exceeds."""
 
 
 def low_pass(r: float, peak_rate: float) -> float:
-    """r X^2/2: what is left of the centrifugal term where a low pass removes its cosine [m/s^2]."""
+    """r X^2/2 [m/s^2]: the rest of the centrifugal term where a low pass removes its cosine."""
     return 0.5 * r * peak_rate**2
 
 
 def mechanical(r: float, peak_rate: float, gyro_error: float) -> float:
-    """r (2 X dw + dw^2), at the peak of the rate: what is left where the gyro's square is added [m/s^2]."""
+    """r (2 X dw + dw^2) [m/s^2]: the rest, at the peak of the rate, where the gyro's square is added."""
     return r * (2.0 * peak_rate * gyro_error + gyro_error**2)
 
 
@@ -53,7 +53,7 @@ def decision_frequency(amplitude: float, gyro_error: float) -> float:
 
 
 def untreated(peak_rate: float, frequency: float) -> float:
-    """theta_m Om^2: the angular acceleration [rad/s^2] that is left in the tangential term where it is left alone."""
+    """theta_m Om^2: the angular acceleration [rad/s^2] in a tangential term that is not compensated."""
     return 2.0 * math.pi * frequency * peak_rate
 
 
@@ -87,7 +87,7 @@ def may_be_left(error: float, arm: float) -> float:
 
 
 def late(peak_rate: float, delay: float) -> float:
-    """Error of the angle [rad] of an output that is late by a ``delay`` [s]: theta' tau."""
+    """Error of the angle [rad] by a ``delay`` [s] of an output: theta' tau."""
     return peak_rate * delay
 
 
@@ -97,7 +97,7 @@ def sampled(
     """Largest error [rad] of the angle over ``samples`` of mechanical compensation by a gyro with white noise, no bias.
 
     2 r2 |w| dw n cos theta_0 / g about the ``mean`` theta_0, where the rate w of the sine is largest; n is the noise of
-    one sample over its deviation. Given is the level that is exceeded once on average.
+    one sample over its deviation. The level returned is exceeded once on average.
     """
     from scipy.optimize import brentq
     from scipy.special import ndtr
@@ -122,7 +122,7 @@ def error_terms(
     compensated: Array,
     step: float,
 ) -> Errors:
-    """All terms; first that which is the same in all rows.
+    """Error covariances of the readings; first the one that is the same in all rows.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ def error_terms(
     rate, acceleration : (n,) rad/s, rad/s^2
         0 where not known.
     compensated : (n,) 0 or 1
-        Where q w^2 was added to the readings, w that of the gyro; elsewhere it counts as an error of its own size, as
-        p al does where it was left in.
+        1 where q w^2 of the gyro was added to the readings; elsewhere the term counts as an error of its own size, as
+        does p al where it was left in.
     step : float
         Interval [s] of the gyro's samples, for their differences.
     """
