@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.figures import sensors
 from inercal.aoa.figures.innovations import consistency
 from inercal.aoa.figures.learned import coefficients, flexure, lever_arms
+from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
 from inercal.aoa.flow import alpha_beta, gives_alpha
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.result.display import delays, displayed
@@ -87,7 +87,7 @@ def pictures(measurement: Measurement) -> list[Picture]:
 def _sensors(measurement: Measurement) -> Picture:
     """Places of the sensors on the model."""
     layout, gyro = measurement.settings.layout, measurement.recording.gyro
-    return sensors.side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
+    return side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
 
 
 def _lost(recording: Recording) -> tuple[Flags, Flags]:
@@ -240,23 +240,23 @@ def _fitted(seen: Measurement) -> list[Picture]:
     values[0] -= 1.0
     u = np.array([[each.u for each in row] for row in rows])
     identified = np.array([[each.name not in fit.unseen for each in row] for row in rows])
-    return [sensors.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, identified)]
+    return [fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, identified)]
 
 
 def _points(measurement: Measurement) -> list[Picture]:
     """Means of the points at rest, and against the reference where there is one; nothing without any."""
-    points, reference = measurement.points, measurement.recording.reference
-    if not points:
+    all_points, reference = measurement.points, measurement.recording.reference
+    if not all_points:
         return []
     theta, u, left, scatter = np.degrees(
-        [[each.theta, each.u, each.u_scatter, each.scatter] for each in points]
+        [[each.theta, each.u, each.u_scatter, each.scatter] for each in all_points]
     ).T
     error = None
     if reference is not None:
-        true = [known(reference[each.start : each.stop]) for each in points]
+        true = [known(reference[each.start : each.stop]) for each in all_points]
         means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
         error = np.degrees(_apart(np.radians(theta), means))
-    return [sensors.points(theta, u, left, scatter, error)]
+    return [points(theta, u, left, scatter, error)]
 
 
 def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
@@ -274,7 +274,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
     panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
     return [
-        sensors.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
+        side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
         over_time(
             "Methods over time",
             f"The {what}, a panel for each method, each on a scale of its own: that which it spans after the first "
