@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sting_study import BASE, study
 
-from inercal.aoa.fusion import fading
+from inercal.aoa.fusion import run
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.live import Live
 from inercal.aoa.fusion.problem import problem
@@ -37,13 +37,13 @@ def test_information_of_the_data_fades_and_that_of_the_prior_does_not(seed, step
     x, P = learned(of, np.random.default_rng(seed))
     at = np.array(list(of.nuisances.values()))
     own, rest = np.ix_(at, at), [k for k in range(of.size) if k not in at]
-    e = 1.0 - math.exp(-fading.STEP * steps / fading.MEMORY)
+    e = 1.0 - math.exp(-run.FADING_STEP * steps / run.MEMORY)
     prior = np.linalg.inv(of.covariance[own])
     data = np.linalg.inv(P[own])
     expected = np.linalg.inv((1.0 - e) * data + e * prior)
     mean = expected @ ((1.0 - e) * data @ x[at] + e * prior @ of.mean[at])
     before, was = x.copy(), P.copy()
-    F = fading.fade(x, P, of, steps)
+    F = run.fade(x, P, of, steps)
     scale = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(P[own] / np.outer(scale, scale), expected / np.outer(scale, scale), atol=1e-6)
     np.testing.assert_allclose((x[at] - mean) / scale, 0.0, atol=1e-6 * np.max(np.abs(before[at] / scale)))
@@ -60,7 +60,7 @@ def test_without_data_the_prior_comes_back():
     of = problem(study(19))
     x, P = learned(of, np.random.default_rng(1))
     for _ in range(40):
-        fading.fade(x, P, of, 30)
+        run.fade(x, P, of, 30)
     at = np.array(list(of.nuisances.values()))
     scale = np.sqrt(np.diag(of.covariance))[at]
     of_prior = (P - of.covariance)[np.ix_(at, at)] / np.outer(scale, scale)
@@ -73,7 +73,7 @@ def test_what_is_known_exactly_stays_so():
     of = problem(replace(settings, noise=replace(settings.noise, gyro_bias=0.0)))
     x, P = of.mean.copy(), of.covariance.copy()
     x[of.nuisances["b_g"]] = 1.0
-    fading.fade(x, P, of, 100)
+    run.fade(x, P, of, 100)
     assert x[of.nuisances["b_g"]] == 1.0
     assert not P[of.nuisances["b_g"]].any()
 
@@ -82,17 +82,17 @@ def test_what_is_known_exactly_stays_so():
 def test_every_step_comes_once_wherever_blocks_end(intervals, since):
     t = since + np.concatenate([[0.0], np.cumsum(intervals)])
     t = np.unique(t)
-    one_by_one = [fading.due(float(a), float(b), since) for a, b in pairwise(t)]
-    assert sum(one_by_one) == fading.due(float(t[0]), float(t[-1]), since)
+    one_by_one = [run.fading_steps(float(a), float(b), since) for a, b in pairwise(t)]
+    assert sum(one_by_one) == run.fading_steps(float(t[0]), float(t[-1]), since)
     at = 0
     while at < len(t):
-        stop = fading.next_due(t, at, since)
+        stop = run.next_fading(t, at, since)
         assert stop > at
         assert not any(one_by_one[at : stop - 1])
         assert stop == len(t) or one_by_one[stop - 1] > 0
         at = stop
     first = [k for k, steps in enumerate(one_by_one) if steps]
-    assert not first or t[first[0] + 1] - since >= fading.MEMORY
+    assert not first or t[first[0] + 1] - since >= run.MEMORY
 
 
 def test_rows_blocks_and_the_smoother_go_on_alike():
@@ -121,7 +121,7 @@ def test_a_bias_that_changes_is_followed():
     state = estimate(replace(made.recording, acc=acc), of).state
     k = of.nuisances["b_2"]
     lag = made.errors["b_2"] + drift - state.x[k]
-    most = drift * (fading.MEMORY + fading.STEP) / 600.0
+    most = drift * (run.MEMORY + run.FADING_STEP) / 600.0
     assert -3.0 * math.sqrt(state.P[k, k]) < lag < most + 3.0 * math.sqrt(state.P[k, k])
     assert lag < 0.25 * drift, "what was learned in the first minutes alone is half of it off"
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
-from inercal.aoa.flow import alpha_beta, stated, theta_by_roll
+from inercal.aoa.flow import alpha_beta, gives_alpha, theta_by_roll
 from inercal.aoa.settings import Attitude
 from inercal.units import Quantity, parse_unit
 from rows import for_each
@@ -161,5 +161,5 @@ def test_an_unknown_theta_gives_no_angles():
 
 
 def test_alpha_is_told_from_theta_only_where_the_study_states_how_the_model_lies():
-    assert not stated(Attitude())
-    assert stated(Attitude(upwash=known(0.0)))
+    assert not gives_alpha(Attitude())
+    assert gives_alpha(Attitude(upwash=known(0.0)))

@@ -47,14 +47,14 @@ def spoiled(recording, rng):
     t[300:] += 0.02
     # to the nanosecond, as the filter takes intervals
     t = np.round(t * 1e9) / 1e9
-    acc, gyro, stated = recording.acc.copy(), recording.gyro.copy(), recording.stated.copy()
+    acc, gyro, stated = recording.acc.copy(), recording.gyro.copy(), recording.zero_angle.copy()
     acc[rng.random(acc.shape) < 0.05] = np.nan
     acc[150:170, 1] = np.nan
     gyro[200:230] = np.nan
     acc[250, 0] += 5.0
     stated[350:360] = recording.reference[350:360, None]
     stated[350:360, 1] = 1e-4
-    return replace(recording, t=t, acc=acc, gyro=gyro, stated=stated)
+    return replace(recording, t=t, acc=acc, gyro=gyro, zero_angle=stated)
 
 
 def trace(of, recording):
@@ -155,7 +155,7 @@ def test_across_a_restart_motion_is_forgotten_and_the_sensors_are_not(interrupte
     known = replace(told, noise=replace(told.noise, accelerometer_bias=1e-9 * G, gyro_bias=1e-9 * DEG))
     known = replace(known, estimator=Estimator(8))
     cut = replace(
-        recording, **{k: getattr(recording, k)[:700] for k in ("t", "acc", "gyro", "turns", "stated")}
+        recording, **{k: getattr(recording, k)[:700] for k in ("t", "acc", "gyro", "turns", "zero_angle")}
     )
     of = problem(known)
     whole, alone = estimate(recording, of, smoothed=True), estimate(cut, of, smoothed=True)
@@ -177,7 +177,7 @@ def test_after_a_gap_roll_is_what_is_stated():
     told = study(motion=replace(BASE, duration=4.0), disturbances=COUPLED)
     recording = simulate(told, np.random.default_rng(8)).recording
     rows = np.delete(np.arange(4000), np.s_[2000:2300])
-    columns = ("t", "acc", "gyro", "turns", "stated", "reference")
+    columns = ("t", "acc", "gyro", "turns", "zero_angle", "reference")
     recording = replace(recording, **{name: getattr(recording, name)[rows] for name in columns})
     of = problem(told, spatial=True)
     for smoothed in (False, True):
@@ -363,6 +363,6 @@ def test_a_stated_angle_calibrates_the_sensors():
     stated[:2000] = np.column_stack([simulated.theta[:2000], np.full(2000, 1e-6)])
     of = problem(told)
     without = estimate(simulated.recording, of)
-    found = estimate(replace(simulated.recording, stated=stated), of)
+    found = estimate(replace(simulated.recording, zero_angle=stated), of)
     assert (abs(found.theta - simulated.theta) < 4.0 * found.u)[2000:].all()
     assert found.u[-1] < 0.3 * without.u[-1]

@@ -26,7 +26,9 @@ ROWS = 400
 
 def rows_of(recording, chosen):
     """A recording of some rows of another."""
-    return Recording(*(getattr(recording, name)[chosen] for name in ("t", "acc", "gyro", "turns", "stated")))
+    return Recording(
+        *(getattr(recording, name)[chosen] for name in ("t", "acc", "gyro", "turns", "zero_angle"))
+    )
 
 
 def flawed(seed=1, spatial=False):
@@ -78,7 +80,7 @@ def test_sample_by_sample(spatial):
     parts = [
         live.feed(t, acc, gyro, *turns, *stated)
         for t, acc, gyro, turns, stated in zip(
-            recording.t, recording.acc, recording.gyro, recording.turns, recording.stated, strict=True
+            recording.t, recording.acc, recording.gyro, recording.turns, recording.zero_angle, strict=True
         )
     ]
     # the first row has no stamp and is answered at once; then twenty are held, one more among them runs backward
@@ -106,7 +108,7 @@ def test_in_blocks_of_any_size(sizes, seed, spatial):
         at += len(block.t)
         if len(block.t) == 1:
             parts.append(
-                live.feed(block.t[0], block.acc[0], block.gyro[0], *block.turns[0], *block.stated[0])
+                live.feed(block.t[0], block.acc[0], block.gyro[0], *block.turns[0], *block.zero_angle[0])
             )
         else:
             parts.append(live.feed_block(block))
@@ -163,7 +165,7 @@ def test_a_clock_that_was_set_back_is_said(at, size):
             Recording(
                 *(
                     np.concatenate([getattr(good, name), getattr(back, name)])
-                    for name in ("t", "acc", "gyro", "turns", "stated")
+                    for name in ("t", "acc", "gyro", "turns", "zero_angle")
                 )
             ),
             of,

@@ -15,7 +15,7 @@ from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.layout import Layout
 from inercal.aoa.settings import MotionPlan
-from inercal.aoa.simulate import drawn, simulate
+from inercal.aoa.simulate import drawn_biases, simulate
 
 REST = MotionPlan("static", duration=120.0, sample_rate=100.0, first=20.0 * DEG, last=20.0 * DEG)
 BUFFET = MotionPlan("buffet", duration=40.0, mean=45.0 * DEG, rms=0.2 * DEG, low=2.0, high=15.0)
@@ -31,7 +31,7 @@ FAST = replace(BASE, duration=3.0, sample_rate=10_000.0)
 def all_drawn(settings, rng):
     """Errors of all sensors, each from its prior."""
     prior, count = settings.prior, len(settings.layout.names)
-    errors, pivot = drawn(settings.noise, count, rng), prior.lever_common * rng.standard_normal()
+    errors, pivot = drawn_biases(settings.noise, count, rng), prior.lever_common * rng.standard_normal()
     for k in range(1, count + 1):
         errors[f"dr_{k}"] = pivot + prior.lever * rng.standard_normal()
         errors[f"zo_{k}"] = prior.height * rng.standard_normal()

@@ -10,7 +10,7 @@ from sting_study import BASE, DEG, SCENARIOS, clipped, scenario, study
 from inercal.aoa.paper.methods import MEASURED, label, low_passed, measure
 from inercal.aoa.reading.recording import plain
 from inercal.aoa.settings import Attitude, Disturbances, Methods, Prior, Timing
-from inercal.aoa.simulate import drawn, simulate
+from inercal.aoa.simulate import drawn_biases, simulate
 from inercal.errors import RecordError, StudyError
 from inercal.units import parse_quantity
 from rows import for_each
@@ -117,7 +117,7 @@ def test_uncertainty_is_what_the_angle_errs_by(methods):
     ratios = []
     for seed in range(100):
         rng = np.random.default_rng(seed)
-        truth = drawn(settings.noise, 3, rng) | {"k_g": prior.gyro_scale * rng.standard_normal()}
+        truth = drawn_biases(settings.noise, 3, rng) | {"k_g": prior.gyro_scale * rng.standard_normal()}
         common = prior.lever_common * rng.standard_normal()
         for k in range(1, 4):
             truth[f"dr_{k}"] = common + prior.lever * rng.standard_normal()

@@ -81,7 +81,7 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
         zero=Zero(0.0, 4.0, 0.0, 0.02 * DEG),
     )
     made = simulate(settings, np.random.default_rng(1)).recording
-    made.stated[2500] = made.reference[2500], 0.02 * DEG
+    made.zero_angle[2500] = made.reference[2500], 0.02 * DEG
     found = []
     monkeypatch.setattr("inercal.aoa.result.budget._items", lambda parts, names: found.extend(parts) or ())
     parts(made, of := problem(settings), settings, smoothed, np.full(len(made.t), True))
@@ -255,7 +255,7 @@ def test_starts_after_gaps_are_no_loss_of_the_angle():
     kept = np.flatnonzero((made.t % 2.0) < 1.4)
     gaps = replace(
         made, t=made.t[kept], acc=made.acc[kept], gyro=made.gyro[kept], turns=made.turns[kept],
-        stated=made.stated[kept], reference=made.reference[kept], point=None,
+        zero_angle=made.zero_angle[kept], reference=made.reference[kept], point=None,
     )  # fmt: skip
     result, found, _ = assembled(settings, gaps)
     assert len(found.starts) == 4

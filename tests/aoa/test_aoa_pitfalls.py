@@ -59,7 +59,7 @@ def kicked(settings):
     )
     joined = {
         name: np.concatenate([getattr(first, name), getattr(second, name)])
-        for name in ("acc", "gyro", "turns", "stated", "reference")
+        for name in ("acc", "gyro", "turns", "zero_angle", "reference")
     }
     return replace(second, t=np.append(first.t, 1.0 + second.t), **joined)
 
@@ -167,7 +167,7 @@ def test_saturated_samples_are_left_out():
 
 def without(recording, rows):
     """The recording without some of its rows."""
-    columns = ("t", "acc", "gyro", "turns", "stated", "reference")
+    columns = ("t", "acc", "gyro", "turns", "zero_angle", "reference")
     return replace(recording, **{name: np.delete(getattr(recording, name), rows, axis=0) for name in columns})
 
 

@@ -15,7 +15,7 @@ from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected, load
 from inercal.aoa.result.outcome import assemble, assemble_paper
 from inercal.aoa.settings import Calibration, MotionPlan
-from inercal.aoa.simulate import drawn, simulate
+from inercal.aoa.simulate import drawn_biases, simulate
 from inercal.errors import InputError, StudyError
 from inercal.estimate.basis import Basis
 from inercal.estimate.files import save
@@ -39,7 +39,7 @@ def run(settings, rng, path):
 
 def all_errors(rng):
     """All constants of the default study from its prior."""
-    truth = drawn(NOISE, 3, rng)
+    truth = drawn_biases(NOISE, 3, rng)
     pivot = 3e-3 * rng.standard_normal()
     for k in range(1, 4):
         truth |= {f"dr_{k}": pivot + 1e-3 * rng.standard_normal(), f"zo_{k}": 5e-3 * rng.standard_normal()}

@@ -70,7 +70,7 @@ def test_si_and_what_is_handed_on():
     assert found.findings == ()
     assert not found.masked.any()
     assert not found.spatial
-    assert np.isnan(np.hstack([found.turns, found.stated])).all()
+    assert np.isnan(np.hstack([found.turns, found.zero_angle])).all()
 
 
 def test_four_formats_are_one_recording(tmp_path):

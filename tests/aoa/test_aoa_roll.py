@@ -7,9 +7,8 @@ import pytest
 from sting_study import BASE, DEG, study
 
 from inercal.aoa.fusion import filter_result
-from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.filter_result import estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.fusion.roll import tracked
 from inercal.aoa.result.points import points
 from inercal.aoa.result.systematic import by_fusion
 from inercal.aoa.settings import Attitude, Disturbances, Oscillation
@@ -39,7 +38,7 @@ def test_the_roll_of_each_row_is_as_good_as_that_of_the_kept_ones(smoothed, monk
     _, made, of = turned()
     found = estimate(made, of, smoothed)
     assert len(found.kept_t) == 50
-    roll, u = tracked(made, of, found)
+    roll, u = tracked_roll(made, of, found)
     error = roll - true_roll(made.t)
     late = made.t > 2.0
     assert np.std(error[late]) < 0.03 * DEG
@@ -65,13 +64,13 @@ def test_no_gyros_track_no_roll_and_lost_rows_have_none():
     flat = replace(made, turns=np.full_like(made.turns, np.nan))
     of_pitch = problem(settings, flat.spatial)
     found = estimate(flat, of_pitch)
-    assert tracked(flat, of_pitch, found) is None
+    assert tracked_roll(flat, of_pitch, found) is None
     told = by_fusion(flat, settings, of_pitch, found)
     assert told.roll is None
     assert (told.u >= of_fusion(found, 19).u).all()
     t = made.t.copy()
     t[3000] = t[2990]
     back = replace(made, t=t)
-    roll, u = tracked(back, of, estimate(back, of))
+    roll, u = tracked_roll(back, of, estimate(back, of))
     assert np.isnan([roll[3000], u[3000]]).all()
     assert np.isfinite(np.delete(roll, 3000)).all()

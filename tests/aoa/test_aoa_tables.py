@@ -12,7 +12,7 @@ from sting_study import DEG, G, study
 from inercal.aoa.angles import Angles
 from inercal.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reference.corrections import told
+from inercal.aoa.reference.corrections import report_of
 from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.display import delays, displayed, in_words, rest_of_fit, use_of_fit
@@ -235,7 +235,7 @@ def test_a_fit_is_said_to_be_used_where_the_next_run_uses_it(on_a_table, tmp_pat
     fusion its biases; a hundred times as well known they are of use."""
     settings, _, found, result = on_a_table
     fit_ = replace(found, covariance=wider**2 * found.covariance)
-    result = replace(result, result={**result.result, "verified": told(fit_)})
+    result = replace(result, result={**result.result, "verified": report_of(fit_)})
     save(result, tmp_path / "table.json")
     changed = corrected(tmp_path / "table.json", settings).corrections
     assert bool(changed) == used

@@ -62,7 +62,7 @@ def test_all_rows_together_know_the_angle_as_well_as_it_is_stated():
     recording = replace(simulated.recording, t=simulated.recording.t.copy())
     recording.t[1400:1600] = recording.t[1399]  # the clock stands still: rows that never reach the filter
     recording.acc[1700:1800, 1] = np.nan
-    stated = with_zero(recording, settings).stated
+    stated = with_zero(recording, settings).zero_angle
     rows = np.flatnonzero(np.isfinite(stated[:, 0]))
     assert set(stated[rows, 0]) == {ZERO.angle}
     assert not np.isin(np.arange(1401, 1600), rows).any()
@@ -72,7 +72,7 @@ def test_all_rows_together_know_the_angle_as_well_as_it_is_stated():
     # information adds up to that of one measurement, less what is missing of the stretch
     lost = 100 / settings.motion.sample_rate / (ZERO.end - ZERO.start)
     assert np.sum(stated[rows, 1] ** -2.0) == pytest.approx((1.0 - lost) / ZERO.u**2, rel=0.01)
-    assert np.isnan(simulated.recording.stated).all()
+    assert np.isnan(simulated.recording.zero_angle).all()
 
 
 def test_a_study_without_a_zero_leaves_the_recording_as_it_is():

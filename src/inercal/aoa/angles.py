@@ -1,4 +1,4 @@
-"""Angles of a recording, by whatever method."""
+"""Angles of a recording, by any method."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from inercal.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Angles:
-    """What a ``method`` says at each of n rows, NaN where it says nothing.
+    """Angles by a ``method`` at each of n rows, NaN in rows without one.
 
     ``theta`` pitch and its standard uncertainty ``u`` [rad]; ``rate`` and ``rate_u`` [rad/s]. ``roll`` and ``roll_u``
     [rad] where gyros for roll and yaw track it. Where the study states a roll with an uncertainty, ``own_u`` is u
-    without its part, what `inercal.aoa.flow.alpha_beta` takes, and ``by_roll`` the change of theta by that of the roll.
+    without the part of the roll (`inercal.aoa.flow.alpha_beta` takes it), and ``by_roll`` the change of theta per
+    change of the roll.
     """
 
     method: str
@@ -38,14 +39,16 @@ class Angles:
 
 def continuous(theta: Array) -> Array:
     """Angles (n,) [rad] without jumps of a turn, NaN where there is none."""
-    found, known = theta.copy(), np.isfinite(theta)
-    found[known] = np.unwrap(theta[known])
-    return found
+    unwrapped, finite = theta.copy(), np.isfinite(theta)
+    unwrapped[finite] = np.unwrap(theta[finite])
+    return unwrapped
 
 
 def stated_roll(angles: Angles, attitude: Attitude) -> Angles:
-    """The angles with the uncertainty of the roll that the study states in that of theta; as they are where none is
-    stated, it is exact, or gyros track it: then it is in u already."""
+    """The angles with the uncertainty of the stated roll added to that of theta.
+
+    They come back unchanged where no roll is stated, where it is exact, and where gyros track it: u has its part then.
+    """
     if attitude.roll is None or attitude.roll.u == 0.0 or angles.roll is not None:
         return angles
     u = theta_u(angles.theta, angles.known_u, attitude, angles.by_roll)

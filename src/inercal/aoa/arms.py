@@ -38,16 +38,16 @@ def level_of(settings: AoaSettings) -> float:
     roll = settings.attitude.roll
     level = 1.0 if roll is None else math.cos(roll.value)
     if abs(level) < _ACROSS:
-        found = 0.0 if roll is None else math.degrees(roll.value)
+        degrees = 0.0 if roll is None else math.degrees(roll.value)
         raise StudyError(
             "model.roll",
-            f"found {found:.6g} deg, expected one further from +-90 deg, at which pitch shows",
+            f"found {degrees:.6g} deg, expected one further from +-90 deg, at which pitch shows",
         )
     return level
 
 
 def axes(layout: Layout, level: float = 1.0) -> Array:
-    """(N, 2): what each axis reads of (sin theta, cos theta) at rest, over g."""
+    """(N, 2): coefficients by which each axis reads (sin theta, cos theta) at rest, over g."""
     return np.stack([np.cos(layout.angle), -level * np.sin(layout.angle)], axis=-1)
 
 
@@ -62,7 +62,7 @@ def tangential_arms(layout: Layout, level: float = 1.0) -> Array:
 
 
 def _arms(length: Array) -> Array:
-    """Arms, 0 where they are but rounding: such an axis does without a gyro."""
+    """Arms, 0 where they are only rounding: such an axis needs no gyro."""
     return np.where(np.abs(length) < _ROUNDING, 0.0, length)
 
 
@@ -71,8 +71,8 @@ def pair_weights(layout: Layout, level: float = 1.0) -> Array | None:
 
     Of all pairs of antiparallel or parallel axes, in which gravity cancels, that with the longest arm L: (A_i + A_j)/L,
     L = p_i + p_j, for antiparallel axes, (A_i - A_j)/L, L = p_i - p_j, for parallel ones. For the three axes -z, +x, +z
-    L = r_3 - r_1. What is left of gravity where calibrated axes are not quite parallel is taken off by a third, the
-    one nearest to square with them.
+    L = r_3 - r_1. Calibrated axes are not quite parallel: a third axis, the one nearest to square with them, takes off
+    the rest of gravity.
     """
     p, h = tangential_arms(layout, level), axes(layout, level)
     pairs = [(p[i] + p[j], i, j, 1.0) for i, j in layout.opposed()]
@@ -93,8 +93,8 @@ def pair_weights(layout: Layout, level: float = 1.0) -> Array | None:
 def all_weights(layout: Layout) -> Array | None:
     """(N,) d [1/m] for the angular acceleration d . A by least squares from all axes; None where they do not show it.
 
-    Gravity cancels whatever the axes: d is what is left of the arms p outside of the plane that gravity moves the
-    readings in. At a roll of cosine c it is c al that comes out, as the gyro reads c w.
+    Gravity cancels for all axes: d is the part of the arms p outside of the plane in which gravity moves the readings.
+    At a roll of cosine c the sum is c al, as the gyro reads c w.
     """
     p, of_gravity = tangential_arms(layout), axes(layout)
     beside = p - of_gravity @ np.linalg.lstsq(of_gravity, p, rcond=None)[0]

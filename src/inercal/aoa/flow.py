@@ -32,7 +32,7 @@ from inercal.arrays import Array
 from inercal.units import Quantity
 
 _UNKNOWN = math.pi / math.sqrt(3.0)
-"""Standard deviation [rad] of an angle of which nothing is known."""
+"""Standard deviation [rad] of an angle that may be any."""
 
 _SIDEWAYS = 1e-12
 """Part of the stream across y below which there is no angle of attack."""
@@ -48,8 +48,8 @@ class Flow:
     u_beta: Array
 
 
-def stated(attitude: Attitude) -> bool:
-    """True where the study says how the model lies in the stream: else alpha is not told from theta."""
+def gives_alpha(attitude: Attitude) -> bool:
+    """True where the study states how the model lies in the stream, so that alpha follows from theta."""
     return any(each is not None for each in (attitude.roll, attitude.yaw, attitude.upwash, attitude.sidewash))
 
 
@@ -63,11 +63,11 @@ def alpha_beta(
 ) -> Flow:
     """Angle of attack and sideslip at pitch angles ``theta`` (n,) [rad] of standard uncertainty ``u_theta``.
 
-    ``roll`` and ``u_roll`` (n,) [rad] as the fusion tracks them with gyros for roll and yaw, in the place of the stated
-    roll. Uncertainties are propagated to first order, their sources taken as independent. A roll that is stated was
-    used to find theta too, and its error comes in by both ways, so that ``u_theta`` is without it; ``by_roll`` (n,) is
-    the change of theta by that of the stated roll, `theta_by_roll` where it is not given.
-    Where the wind comes straight from the side alpha is not defined, and its uncertainty that of any angle.
+    ``roll`` and ``u_roll`` (n,) [rad] are those that the fusion tracks with gyros for roll and yaw; they replace the
+    stated roll. Uncertainties are propagated to first order, their sources taken as independent. A stated roll was used
+    to find theta too, so its error enters twice, and ``u_theta`` must be without it; ``by_roll`` (n,) is the change of
+    theta per change of the stated roll, by default `theta_by_roll`.
+    Where the wind comes straight from the side alpha is not defined, and its uncertainty is that of any angle.
     """
     yaw, up, side = (_of(each) for each in (attitude.yaw, attitude.upwash, attitude.sidewash))
     of_roll = _of(attitude.roll)
@@ -91,15 +91,12 @@ def alpha_beta(
         # straight from the side any turn takes beta off 90 deg
         of_beta += np.where(sideways, dx**2 + dz**2, (dy / safe) ** 2) * u**2
     u_alpha = np.where(sideways, _UNKNOWN, np.minimum(np.sqrt(of_alpha), _UNKNOWN))
-    known = np.isfinite(theta)
-    return Flow(alpha, np.where(known, u_alpha, np.nan), beta, np.sqrt(of_beta))
+    finite = np.isfinite(theta)
+    return Flow(alpha, np.where(finite, u_alpha, np.nan), beta, np.sqrt(of_beta))
 
 
 def theta_u(theta: Array, u: Array, attitude: Attitude, by_roll: Array | None = None) -> Array:
-    """Standard uncertainty (n,) [rad] of ``theta``: ``u`` (n,), and what the roll that is stated leaves in theta.
-
-    ``by_roll`` as of `alpha_beta`.
-    """
+    """Standard uncertainty [rad] of ``theta`` (n,) with the part of the stated roll; ``by_roll`` as of `alpha_beta`."""
     value, of_roll = _of(attitude.roll)
     if not of_roll:
         return u
@@ -109,8 +106,8 @@ def theta_u(theta: Array, u: Array, attitude: Attitude, by_roll: Array | None = 
 def theta_by_roll(theta: Array, roll: float) -> Array:
     """Change of theta, found by accelerometers along and across the body at rest, per change of the stated roll.
 
-    It is what a stream, which knows no better, goes by; `inercal.aoa.result.systematic` does know better. The best fit
-    of g sin theta and g cos phi cos theta, each as well known, to what is read moves by
+    A stream uses it; for a whole recording `inercal.aoa.result.systematic` is exact. The best fit of g sin theta and
+    g cos phi cos theta, equally well known, to the readings moves by
     -cos phi sin phi sin theta cos theta / (cos^2 theta + cos^2 phi sin^2 theta).
     """
     s, c, level = np.sin(theta), np.cos(theta), math.cos(roll)
@@ -125,7 +122,7 @@ def _of(quantity: Quantity | None) -> tuple[float, float]:
 def _seen(
     theta: Array, phi: Array, yaw: float, up: float, side: float
 ) -> tuple[Array, Array, Array, list[Array]]:
-    """Components along x, y, z, and their derivatives (3, n) by theta, phi, yaw, upwash and sidewash."""
+    """Components of the motion along x, y, z, and their derivatives (3, n) by theta, phi, yaw, upwash and sidewash."""
     ce, se, cs, ss = math.cos(up), math.sin(up), math.cos(side), math.sin(side)
     cy, sy = math.cos(yaw), math.sin(yaw)
     st, ct, sp, cp = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)

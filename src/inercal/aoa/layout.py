@@ -1,4 +1,4 @@
-"""Where the accelerometers of a wind-tunnel model sit, and along which axes they look."""
+"""Positions and axes of the accelerometers of a wind-tunnel model."""
 
 from __future__ import annotations
 

@@ -49,21 +49,21 @@ def buffet(rms: float, low: float, high: float, rng: np.random.Generator, count:
 
 
 def shaking(of: Shaking | None, rng: np.random.Generator) -> Sines:
-    """A vibration; none where there is none."""
+    """A vibration as sines; no sine without one."""
     if of is None:
         return Sines(*np.zeros((3, 0)))
     return buffet(of.rms, of.low, of.high, rng, _SHAKING)
 
 
 def oscillation(of: Oscillation | None) -> Sines:
-    """A sine; none where there is none."""
+    """An oscillation as one sine; no sine without one."""
     if of is None:
         return Sines(*np.zeros((3, 0)))
     return Sines(np.array([of.amplitude]), np.array([2.0 * math.pi * of.frequency]), np.zeros(1))
 
 
 def duration(plan: MotionPlan) -> float:
-    """Length [s] of a motion: as stated, that of all pauses and moves, or no more than that of a file.
+    """Length [s] of a motion: as stated, of all pauses and moves, or of its file if that is shorter.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def moves(plan: MotionPlan) -> int:
 
 
 def course(plan: MotionPlan, rng: np.random.Generator) -> Course:
-    """The pitch that a plan states; what is random in it is drawn here.
+    """The pitch of a plan; its random parts are drawn here.
 
     Raises
     ------

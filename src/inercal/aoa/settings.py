@@ -1,4 +1,4 @@
-"""What a study of inertial angle of attack says, in SI: sensors, noise, prior, motion, timing, estimator."""
+"""Settings of a study of inertial angle of attack, in SI: sensors, noise, prior, motion, timing, estimator."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ DELAY = within(-1.0, 1.0, "a delay from -1 s to 1 s")
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of each sample, and biases that nobody knows beforehand: standard deviations."""
+    """Noise of each sample, and unknown biases: standard deviations."""
 
     accelerometer: float = quantity(
         "of a sample of an accelerometer", "acceleration", REQUIRED, example="1e-4 g", bounds=DEVIATION
@@ -82,7 +82,7 @@ class Resonance:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is not known of the sensors before the run: standard deviations about 0.
+    """Prior of the errors of the sensors: standard deviations about 0.
 
     ``heave`` and ``axial`` are the sting's flexure.
     """
@@ -102,11 +102,11 @@ class Prior:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A sensor's calibration: what it measures is ``(indication x scale - bias)``, each with temperature terms.
+    """A sensor's calibration: it measures ``indication x scale - bias``, both with temperature terms.
 
     ``scale`` SI per SI unit of the record's column, or ``per`` volt or count of it; ``bias`` [SI]; ``scale_slope``
-    [1/K] and ``bias_slope`` [SI/K] about ``temperature`` [degC]; ``range`` [SI] of what it measures, at or beyond
-    which it is saturated, None where not known. ``caution``: what the file that it is of says against itself.
+    [1/K] and ``bias_slope`` [SI/K] about ``temperature`` [degC]; ``range`` [SI] of the measured value, at or beyond
+    which it is saturated, None where not known. ``caution``: the warning in the file that holds it.
     """
 
     scale: float = 1.0
@@ -119,12 +119,12 @@ class Calibration:
     caution: str = ""
 
     def measured(self, indication: Array, temperature: Array | float | None = None) -> Array:
-        """What indications (n,) mean [SI]; at the calibration's own temperature where ``temperature`` is None."""
+        """Measured values [SI] of indications (n,); at its own temperature without ``temperature`` [degC]."""
         scale, bias = self._at(temperature)
         return np.asarray(indication * scale - bias)
 
     def indicated(self, value: Array, temperature: Array | float | None = None) -> Array:
-        """The inverse of `measured`: what the record's column holds, in SI, volts or counts."""
+        """Indications, in SI, volts or counts, of measured values: the inverse of `measured`."""
         scale, bias = self._at(temperature)
         return np.asarray((value + bias) / scale)
 
@@ -168,14 +168,14 @@ class Estimator:
 
     @property
     def density(self) -> float:
-        """``snap``, or where it is not stated 1e7, and 1e8 where flexure is estimated too: a livelier motion that the
-        model does not expect would be taken for errors of positions and of the gyro's scale, which multiply it."""
+        """``snap``, or, where it is not stated, 1e7, and 1e8 where flexure is estimated too: a livelier motion than the
+        model expects would be taken for errors of positions and of the gyro's scale, which multiply it."""
         return (1e8 if self.states >= 15 else 1e7) if self.snap is None else self.snap
 
 
 @dataclass(frozen=True)
 class Methods:
-    """The paper's way, where an option of the command asks for it; the options win."""
+    """The paper's way, where an option of the command asks for it; options override these keys."""
 
     static: Static = option("the static mechanisation", "improved")
     centrifugal: Centrifugal = option("compensation of r w^2", "mechanical")
@@ -184,7 +184,7 @@ class Methods:
 
 @dataclass(frozen=True)
 class ModelAttitude:
-    """How the model lies in the tunnel beside its pitch; alpha and beta are given where this or the flow is."""
+    """Attitude of the model in the tunnel beside its pitch; alpha and beta need this or the flow."""
 
     roll: Quantity | None = quantity(
         "right wing down positive; 0 if absent; with gyros for roll and yaw at the start of the record", "angle",
@@ -210,7 +210,7 @@ class Flow:
 
 @dataclass(frozen=True)
 class Attitude(Flow, ModelAttitude):
-    """How the model lies in the stream, beside its pitch; values [rad] with standard uncertainties."""
+    """Attitude of the model in the stream beside its pitch; values [rad] with standard uncertainties."""
 
 
 @dataclass(frozen=True)
@@ -306,7 +306,7 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """What a simulation adds to the rigid, well-known model; nothing if absent.
+    """Disturbances that a simulation adds to the rigid, well-known model; none if absent.
 
     Flexure of the sting: ``pitch`` [rad], ``heave`` and ``axial`` [m/s^2]. ``roll`` and ``yaw`` [rad] coupled in.
     ``heights`` [m] added to each z. A gyro's spikes are ``spike`` over 9.80665 in rad/s.
@@ -372,5 +372,5 @@ class AoaSettings:
     corrections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def calibration(self, name: str) -> Calibration:
-        """The calibration of a sensor; that of one which needs none where the study has none."""
+        """The calibration of a sensor; the identity where the study has none."""
         return self.sensors.get(name, Calibration())

@@ -1,4 +1,4 @@
-"""A simulated recording of a wind-tunnel model on its sting, with what real ones add."""
+"""A simulated recording of a wind-tunnel model on its sting, with the disturbances of real ones."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Simulated:
     errors: Mapping[str, float]
 
 
-def drawn(noise: Noise, count: int, rng: np.random.Generator) -> dict[str, float]:
+def drawn_biases(noise: Noise, count: int, rng: np.random.Generator) -> dict[str, float]:
     """Biases of ``count`` accelerometers and of the gyros: half the variance of the former in common."""
     common, *own = math.sqrt(0.5) * noise.accelerometer_bias * rng.standard_normal(count + 1)
     biases = {f"b_{k}": float(common + each) for k, each in enumerate(own, start=1)}
@@ -58,7 +58,7 @@ def simulate(
     if plan is None:
         raise StudyError("motion", "missing, expected the motion to be simulated")
     n = len(layout.names)
-    truth = drawn(settings.noise, n, rng) if errors is None else dict(errors)
+    truth = drawn_biases(settings.noise, n, rng) if errors is None else dict(errors)
     for k in range(n):
         truth[f"dr_{k + 1}"] = truth.get(f"dr_{k + 1}", 0.0) + other.pivot
         height = other.heights[k] if k < len(other.heights) else 0.0
@@ -95,7 +95,7 @@ def simulate(
         acc=values[:, :n].copy(),
         gyro=values[:, n].copy(),
         turns=turns.copy(),
-        stated=np.full((len(t), 2), np.nan),
+        zero_angle=np.full((len(t), 2), np.nan),
         point=point_numbers(plan, t),
         reference=theta,
     )
@@ -118,9 +118,9 @@ class _Body:
             w = theta' cos phi - psi' cos theta sin phi
             y = theta' sin phi + psi' cos theta cos phi
         """
-        other, stated = self.settings.disturbances, self.settings.attitude.roll
+        other, nominal = self.settings.disturbances, self.settings.attitude.roll
         phi, phi1, _ = oscillation(other.roll)(t)
-        phi = phi + (0.0 if stated is None else stated.value)
+        phi = phi + (0.0 if nominal is None else nominal.value)
         _, psi1, psi2 = oscillation(other.yaw)(t)
         s, c, sp, cp = np.sin(theta), np.cos(theta), np.sin(phi), np.cos(phi)
         p, w, y = phi1 + psi1 * s, rate * cp - psi1 * c * sp, rate * sp + psi1 * c * cp
@@ -133,13 +133,13 @@ class _Body:
         """(n, N) m/s^2, without noise."""
         g, layout, errors = self.settings.site.gravity, self.settings.layout, self.errors
         phi, p, w, y, al = self.turning(t, theta, rate, acceleration)
-        found = np.empty((len(t), len(layout.names)))
+        readings = np.empty((len(t), len(layout.names)))
         for k, angle in enumerate(layout.angle):
             r, z = layout.r[k] + errors[f"dr_{k + 1}"], layout.z[k] + errors[f"zo_{k + 1}"]
             fx = g * np.sin(theta) - r * (w**2 + y**2) - z * (al - p * y) + axial
             fz = g * np.cos(theta) * np.cos(phi) + r * (al + p * y) - z * (w**2 + p**2) + heave
-            found[:, k] = fx * math.cos(angle) - fz * math.sin(angle) + errors.get(f"b_{k + 1}", 0.0)
-        return found
+            readings[:, k] = fx * math.cos(angle) - fz * math.sin(angle) + errors.get(f"b_{k + 1}", 0.0)
+        return readings
 
     def gyros(self, t: Array, theta: Array, rate: Array, acceleration: Array) -> tuple[Array, Array, Array]:
         """Nose-up, roll and yaw gyro, (n,) rad/s each, without noise."""
@@ -150,7 +150,7 @@ class _Body:
 
 
 def _limited(values: Array, other: Disturbances, step: float) -> Array:
-    """What sensors of limited bandwidth make of it."""
+    """Readings (n, k) of sensors of limited bandwidth."""
     if math.isinf(other.bandwidth):
         return values
     from scipy.signal import lfilter
@@ -180,8 +180,8 @@ def _spoiled(values: Array, settings: AoaSettings, rng: np.random.Generator) -> 
 def to_record(recording: Recording, settings: AoaSettings) -> Record:
     """A record as a file holds it, which read with the same study means the same.
 
-    ``t``; ``a1``.. [g], ``gyro`` [deg/s], and ``gyro_roll``, ``gyro_yaw`` [deg/s] where the recording has them: or
-    volts or counts of sensors that the study calibrates from these. ``point`` and ``trigger`` where they are known,
+    ``t``; ``a1``.. [g], ``gyro`` [deg/s], and ``gyro_roll``, ``gyro_yaw`` [deg/s] where the recording has them, in
+    volts or counts for sensors that the study calibrates from these. ``point`` and ``trigger`` where they are known,
     ``theta_ref`` [deg] where there is a reference; ``temperature`` [degC], that of the study, where a sensor depends
     on it.
     """

@@ -1,4 +1,4 @@
-"""What the command runs on a study of inertial angle of attack: angles from a record, by one method or by many."""
+"""The task of the command: angles of attack from a record, by one method or by many."""
 
 from __future__ import annotations
 
@@ -36,12 +36,11 @@ from inercal.records.record import Record
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """An ``estimate``, and what is behind it for files and pictures.
+    """An ``estimate``, and the data behind it for files and pictures.
 
-    ``settings`` are those of the study, put right by an earlier result; ``angles`` of the method asked for;
-    ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest; ``delay`` of the gyro as the spectra
-    have it; with a reference angle its ``errors`` by method and the sensors fitted to it, ``verified``; ``compared``
-    the angles of other methods, by name.
+    ``settings`` are those of the study, corrected by an earlier result; ``angles`` of the chosen method; ``filtered``
+    of the fusion, None for the paper's methods; ``points`` at rest; ``delay`` of the gyro by the spectra; ``errors`` by
+    method and ``verified`` sensors where there is a reference angle; ``compared`` angles of other methods, by name.
     """
 
     estimate: Estimate
@@ -65,24 +64,24 @@ def in_order(measurement: Measurement) -> Measurement:
         return measurement
 
     def rows(of: Any, *names: str) -> Any:
-        """A part of the measurement, with those of its fields cut."""
+        """A part of the measurement with only the later rows of some fields."""
         return replace(
             of, **{name: getattr(of, name)[taken] for name in names if getattr(of, name) is not None}
         )
 
     motion = ("theta", "u", "rate", "rate_u")
     angles = (*motion, "roll", "roll_u", "own_u", "by_roll")
-    found = measurement.filtered
-    if found is not None:
-        starts = tuple(int(k) for k in np.searchsorted(taken, found.starts))
-        cut = rows(found, *motion, "acceleration", "innovations", "roll", "roll_u")
-        found = replace(cut, starts=starts)
-    kept = ("t", "acc", "gyro", "turns", "stated", "point", "trigger", "reference", "masked")
+    filtered = measurement.filtered
+    if filtered is not None:
+        starts = tuple(int(k) for k in np.searchsorted(taken, filtered.starts))
+        cut = rows(filtered, *motion, "acceleration", "innovations", "roll", "roll_u")
+        filtered = replace(cut, starts=starts)
+    kept = ("t", "acc", "gyro", "turns", "zero_angle", "point", "trigger", "reference", "masked")
     return replace(
         measurement,
         recording=rows(measurement.recording, *kept),
         angles=rows(measurement.angles, *angles),
-        filtered=found,
+        filtered=filtered,
         compared={name: rows(other, *angles) for name, other in measurement.compared.items()},
     )
 
@@ -118,7 +117,7 @@ def measure(
     compare : bool
         Also by the fusion of 8 and 19 states, causal and smoothed, and by the paper's methods.
     progress : callable
-        Told, in words, what is being done.
+        Called with each step, in words.
 
     Returns
     -------
@@ -142,11 +141,11 @@ def measure(
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)
     delay = relative_delay(recording, settings.layout)
-    found: FilterResult | None = None
+    filtered: FilterResult | None = None
     if methods is None:
         progress("smoothing" if settings.estimator.smooth else "filtering")
-        found = filter_result.estimate(zeroed, of, settings.estimator.smooth)
-        angles = by_fusion(zeroed, settings, of, found)
+        filtered = filter_result.estimate(zeroed, of, settings.estimator.smooth)
+        angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         findings = [*findings, *diagnose(zeroed, settings, findings)]
     else:
@@ -162,13 +161,13 @@ def measure(
         verified = _fitted(recording, settings)
     at_rest = points(recording, angles, settings)
     behind = (findings, delay, at_rest, judged, compared, verified)
-    if found is None:
+    if filtered is None:
         estimate = assemble_paper(recording, settings, angles, *behind)
     else:
-        estimate = assemble(zeroed, settings, of, found, *behind, angles=angles)
+        estimate = assemble(zeroed, settings, of, filtered, *behind, angles=angles)
     estimate = replace(estimate, timing={"solve": time.perf_counter() - clock})
     return Measurement(
-        estimate, settings, of, recording, angles, found, at_rest, delay, judged, verified, compared
+        estimate, settings, of, recording, angles, filtered, at_rest, delay, judged, verified, compared
     )
 
 

@@ -2,9 +2,9 @@
 
 The causal fusion of `inercal.aoa` goes on by one row at a time, to the digits that it gives on the whole file, and
 answers each row with one line: the first ones, and those after the angle was lost, are held until the filter can start
-(`inercal.aoa.fusion.live`). Sensors are calibrated, and samples at a range left out, as
-`inercal.aoa.reading.from_record` does it. What only a whole recording shows is not seen here: sensors that are flat at
-an extreme below their range, or stuck, and whether the model rests in the stretch that the study calls its zero.
+(`inercal.aoa.fusion.live`). `inercal.aoa.reading.calibrated` calibrates the sensors, and samples at a range are left
+out. A stream does not see faults that only a whole recording shows: sensors that are flat at an extreme below their
+range, or stuck, and a model that moves in the stretch of the study's zero.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
 from inercal.aoa.reading.from_record import of_sensors
-from inercal.aoa.reading.wind_off_zero import stated_at
+from inercal.aoa.reading.wind_off_zero import angle_at
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.columns import columns, rows
@@ -38,32 +38,32 @@ _CONTRADICTED = 2.0
 """Mean of the squared innovations in a window, each over its variance, from which rows contradict the model."""
 
 _WINDOW = 2.0
-"""Length [s] of such a window."""
+"""Length [s] of a window of innovations."""
 
 _FEWEST = 50
-"""Innovations in a window below which it is not judged."""
+"""Smallest number of innovations in a window that is judged."""
 
 _SILENT = 1.0
 """Time [s] without a number after which a gyro is said to be silent."""
 
-# bits of `AoaState.said`; from the last on one for each sensor
+# bits of `AoaState.alarms`; from the last on one for each sensor
 _BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
 
 
 class Beside(NamedTuple):
-    """The fusion under a change of what is stated: its state, and theta [rad] of rows that the other has not told."""
+    """The fusion under a change of a stated input: its state, and theta [rad] of rows not yet answered without it."""
 
     live: LiveState
     theta: Array
 
 
 class AoaState(NamedTuple):
-    """What is known after a row.
+    """State after a row.
 
-    ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by their names; ``t`` [s]
-    the latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last one known; ``heard`` [s]
-    the last row in which the gyro spoke. ``nis`` and ``scalars``: sum of the squared innovations since ``window`` [s],
-    and their number. ``said`` are the alarms given, one bit each; ``slots`` that of the last line.
+    ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by name; ``t`` [s] the
+    latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
+    last row with a number of the gyro. ``nis`` and ``scalars``: sum and number of the squared innovations since
+    ``window`` [s]. ``alarms`` are those given, one bit each; ``slots`` that of the last line.
     """
 
     live: LiveState
@@ -75,7 +75,7 @@ class AoaState(NamedTuple):
     nis: float
     scalars: int
     window: float
-    said: int
+    alarms: int
     slots: Slots
 
 
@@ -91,8 +91,8 @@ class Aoa:
         Interval [s] of the lines, in the time of the record: of the first row with an angle in each; 0 for a line each
         row.
     say : callable
-        Told, once each, of sensors that are missing, at their range or silent, and when the innovations contradict the
-        model.
+        Called once each for sensors that are missing, at their range or silent, and for innovations that contradict
+        the model.
 
     Raises
     ------
@@ -161,7 +161,7 @@ class Aoa:
         }
 
     def initial(self) -> AoaState:
-        """Nothing known."""
+        """The state before the first row."""
         return AoaState(
             live=Live(self._problem).state,
             beside={
@@ -169,7 +169,7 @@ class Aoa:
                 for each, of in zip(self._changes, self._leaning, strict=True)
             },
             t=-math.inf, begun=math.nan, temperature=math.nan,
-            heard=math.nan, nis=0.0, scalars=0, window=math.nan, said=0, slots=Slots(),
+            heard=math.nan, nis=0.0, scalars=0, window=math.nan, alarms=0, slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
@@ -178,21 +178,23 @@ class Aoa:
             self._live, self._others = self._from(state)
         if self._temperature >= 0 and math.isfinite(sample.values[self._temperature]):
             state = state._replace(temperature=sample.values[self._temperature])
-        state, values = self._measured(self._told_of_sensors(state), sample)
+        state, values = self._measured(self._remarked(state), sample)
         n = self._problem.count
         later = sample.t > state.t
-        stated = (math.nan, math.nan)
+        zero_angle = (math.nan, math.nan)
         gyro, roll, yaw = values[n:].tolist()
         if later:
-            stated = self._zero(state, sample.t, values[:n])
+            zero_angle = self._zero(state, sample.t, values[:n])
             state = self._heard(state, sample.t, gyro)
-        told = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *stated)
-        turned = [each.feed(sample.t, values[:n], gyro, roll, yaw, *stated).theta for each in self._others]
+        answers = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *zero_angle)
+        turned = [
+            each.feed(sample.t, values[:n], gyro, roll, yaw, *zero_angle).theta for each in self._others
+        ]
         if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
-        state = self._judged(state, told)._replace(live=self._live.state)
-        state, outputs = self._lines(state, told, self._others, turned)
+        state = self._judged(state, answers)._replace(live=self._live.state)
+        state, outputs = self._lines(state, answers, self._others, turned)
         self._after = state
         return state, outputs
 
@@ -210,7 +212,7 @@ class Aoa:
         )
 
     def _measured(self, state: AoaState, sample: Sample) -> tuple[AoaState, Array]:
-        """What the sensors of a row measure, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
+        """Measured values of a row, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
         values = np.full(self._problem.count + len(GYROS), np.nan)
         temperature = None if math.isnan(state.temperature) else state.temperature
         for k, place, column in self._sensors:
@@ -224,23 +226,23 @@ class Aoa:
             state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
         return state, values
 
-    def _told_of_sensors(self, state: AoaState) -> AoaState:
-        """The state with what there is to say of the sensors said."""
-        if state.said & 1 << _BEGUN:
+    def _remarked(self, state: AoaState) -> AoaState:
+        """The state once the findings on the sensors are given."""
+        if state.alarms & 1 << _BEGUN:
             return state
         for finding in self._remarks:
             self._say(finding)
-        return state._replace(said=state.said | 1 << _BEGUN)
+        return state._replace(alarms=state.alarms | 1 << _BEGUN)
 
     def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[float, float]:
         """The angle that is stated for a row, and its standard uncertainty [rad]; NaN where there is none."""
         zero = self._settings.zero
         if zero is None or not np.isfinite(acc).all():
             return math.nan, math.nan
-        return stated_at(zero, t, state.t)
+        return angle_at(zero, t, state.t)
 
     def _heard(self, state: AoaState, t: float, gyro: float) -> AoaState:
-        """The state with a gyro heard, or said to be silent."""
+        """The state with the last row of the gyro, or an alarm where it is silent."""
         if math.isfinite(gyro) or math.isnan(state.heard):
             return state._replace(heard=t)
         if self._has_gyro and t - state.heard > _SILENT:
@@ -248,13 +250,13 @@ class Aoa:
             return self._alarm(state, _SILENCE, "gyro_missing", text, t)
         return state
 
-    def _judged(self, state: AoaState, told: Answers) -> AoaState:
+    def _judged(self, state: AoaState, answers: Answers) -> AoaState:
         """The state with innovations counted, and an alarm where a window of them contradicts the model.
 
         Each counts as far as the gate lets it through, so that a single spike is no alarm.
         """
         gate = self._problem.constants.gate
-        for t, innovations in zip(told.t.tolist(), told.innovations, strict=True):
+        for t, innovations in zip(answers.t.tolist(), answers.innovations, strict=True):
             squared = np.minimum(np.square(innovations[np.isfinite(innovations)]), gate)
             if not squared.size or t - state.begun < SETTLED:
                 continue
@@ -274,40 +276,40 @@ class Aoa:
 
     def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
         """The state with an alarm given, once."""
-        if state.said & 1 << bit:
+        if state.alarms & 1 << bit:
             return state
         harm = () if CODES[code].harm is Harm.NEVER else EVERYTHING
         self._say(Finding(code, text, f"t = {t:.10g} s", harm))
-        return state._replace(said=state.said | 1 << bit)
+        return state._replace(alarms=state.alarms | 1 << bit)
 
     def _lines(
-        self, state: AoaState, told: Answers, others: Sequence[Live], turned: Sequence[Array]
+        self, state: AoaState, answers: Answers, others: Sequence[Live], turned: Sequence[Array]
     ) -> tuple[AoaState, list[Output]]:
         """The state with the slots of lines, and the lines that are due; ``turned`` is theta under changes."""
         outputs: list[Output] = []
-        rest, beside, changed = len(told.t), {}, []
+        rest, beside, changed = len(answers.t), {}, []
         for (name, before), live, theta in zip(state.beside.items(), others, turned, strict=True):
             theta = np.append(before.theta, theta)
             # a filter that has lost theta, or has it anew, alone is out of step until both have it
             changed.append(np.append(theta[:rest], np.full(max(rest - len(theta), 0), np.nan)))
             beside[name] = Beside(live.state, theta[rest:])
         angles = widened(
-            Angles("", told.theta, told.u, told.rate, told.rate_u, told.roll, told.roll_u),
+            Angles("", answers.theta, answers.u, answers.rate, answers.rate_u, answers.roll, answers.roll_u),
             self._settings,
             self._changes,
             changed,
         )
         state = state._replace(beside=beside)
-        said = rows(
-            told.theta,
+        values = rows(
+            answers.theta,
             angles.known_u,
-            told.rate,
+            answers.rate,
             self._settings.attitude,
-            told.roll,
-            told.roll_u,
+            answers.roll,
+            answers.roll_u,
             angles.by_roll,
         )
-        for t, row in zip(told.t.tolist(), said.tolist(), strict=True):
+        for t, row in zip(answers.t.tolist(), values.tolist(), strict=True):
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None
                 if slots is None:

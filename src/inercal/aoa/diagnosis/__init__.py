@@ -1,1 +1,1 @@
-"""What is wrong with a recording or its study, named."""
+"""Faults of a recording or its study, named."""

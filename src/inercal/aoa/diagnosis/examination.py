@@ -1,15 +1,15 @@
-"""What is wrong with a recording of a model or its study: all hypotheses asked in order, before and after filtering.
+"""Faults of a recording or its study, found by trying all hypotheses in order, before and after filtering.
 
-Before any angle is believed (`implausible`) gross faults are looked for: wrong signs, units and positions, exchanged
-sensors, clocks. They are told from the errors that the fusion allows for by the size of the contradiction: the
-liveliest stretch is filtered with all nuisances, and again without each fault (`inercal.aoa.diagnosis.gross`). A fault
-that alone makes the recording fit is named; where several do, because the motion is too slow to tell, all of them are.
-Faults that no sensor contradicts cannot be seen: at rest the gyro's sign and unit, positions, and the sign of an
-accelerometer along the model.
+The first search (`implausible`) comes before any angle is believed. It looks for gross faults: wrong signs, units and
+positions, exchanged sensors, clocks. The size of the contradiction tells them from the errors that the fusion allows
+for: the liveliest stretch is filtered with all nuisances, and again without each fault
+(`inercal.aoa.diagnosis.gross`). A fault that alone makes the recording fit is named; where the motion is too slow to
+tell several apart, all of them are. Faults that no sensor contradicts cannot be seen: at rest the gyro's sign and unit,
+positions, and the sign of an accelerometer along the model.
 
-Afterwards (`diagnose`) noise is looked at on its own (`inercal.aoa.diagnosis.noise_check`), a motion that is too lively
-and a model that is too small, and where innovations or coefficients are beyond what noise and priors explain, constant
-errors that the model leaves out (`inercal.aoa.diagnosis.small`).
+The second search (`diagnose`) looks at noise on its own (`inercal.aoa.diagnosis.noise_check`), then at a motion that is
+too lively and a model that is too small, and, where innovations or coefficients exceed their noise and priors, at
+constant errors that the model leaves out (`inercal.aoa.diagnosis.small`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from inercal.aoa.settings import STATES, AoaSettings
 from inercal.estimate.hypotheses import Fitted, tried
 from inercal.findings import EVERYTHING, Finding
 
-#: number of states -> what those with so many have beside the ones with fewer
+#: number of states -> errors that fewer states leave out
 _BESIDE = {
     11: "errors of the lever arms",
     15: "flexure of the sting",
@@ -41,14 +41,14 @@ _BESIDE = {
 
 @dataclass(frozen=True, eq=False)
 class _Explanation:
-    """Faults taken out together, and how well what is left fits."""
+    """Faults taken out together, and the quality of the fit without them."""
 
     faults: tuple[Fitted[Case], ...]
     quality: FitQuality
 
     @property
     def misfit(self) -> float:
-        """Misfit that is left."""
+        """Misfit of the fit without these faults."""
         return self.quality.misfit
 
     @property
@@ -58,15 +58,15 @@ class _Explanation:
 
     @property
     def unlikely(self) -> bool:
-        """True where any other is likelier."""
+        """True where any other explanation is likelier."""
         return self.faults[-1].hypothesis.name == OTHER_CHANNEL
 
 
 def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
-    """What does not fit together, with what to write instead; empty for a sound recording.
+    """Gross faults, each with the correction to write; empty for a sound recording.
 
-    Codes are ``sign_suspect``, ``channel_swap``, ``unit_suspect`` and ``command_shift``; ``not_stated`` of a model on
-    its back, which may be as it is.
+    Codes are ``sign_suspect``, ``channel_swap``, ``unit_suspect`` and ``command_shift``; ``not_stated`` for a model on
+    its back, which may be right.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
 def _explaining(
     case: Case, now: FitQuality, given: Sequence[tuple[Fitted[Case], ...]] = ((),)
 ) -> list[Fitted[Case]]:
-    """Faults that make a case fit, with all that do as well; first alone, then two together, beside ``given`` ones."""
+    """Faults that make a case fit, with all equally good ones: one alone, then two together, beside ``given`` ones."""
     explanations = [each for before in given for each in _explanations(case, before)]
     most = (1.0 - LIMITS.explained_share) * now.misfit
     fitting = [each for each in explanations if each.misfit <= min(LIMITS.sound_misfit, most)]
@@ -118,7 +118,7 @@ def _explanations(case: Case, before: tuple[Fitted[Case], ...] = ()) -> Iterator
 
 
 def _without_gyro(case: Case) -> list[tuple[Fitted[Case], ...]]:
-    """Faults without which the accelerometers fit each other: what is left then is the gyro's."""
+    """Faults without which the accelerometers fit each other: the rest of the misfit is the gyro's."""
     part, settings = case
     blind = replace(part, gyro=np.full_like(part.gyro, np.nan))
     fitting = [each for each in _explanations((blind, settings)) if each.misfit <= LIMITS.sound_misfit]
@@ -126,7 +126,7 @@ def _without_gyro(case: Case) -> list[tuple[Fitted[Case], ...]]:
 
 
 def _loud(case: Case) -> bool:
-    """True where noise above what is stated explains all."""
+    """True where noise above the stated noise explains all."""
     return fit_quality(case[0], misstated(*case)[1]).misfit <= LIMITS.sound_misfit
 
 
@@ -152,9 +152,9 @@ def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
 def diagnose(
     recording: Recording, settings: AoaSettings, gross: Sequence[Finding] | None = None
 ) -> list[Finding]:
-    """Name what is wrong with a recording; nothing for a sound one, nor where it is implausible as a whole.
+    """Name the faults of a recording; none for a sound one, nor for one with gross faults.
 
-    ``gross`` is what `implausible` said, where it was asked already.
+    ``gross`` are the findings of `implausible`, where they are known already.
 
     Codes are ``excess_scatter``, ``low_scatter``, ``unmodelled``, ``site_suspect``, ``prior_suspect`` and, where no one
     error explains what the sensors say, ``contradiction``.
@@ -170,7 +170,7 @@ def diagnose(
 
 
 def _too_fast(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
-    """``unmodelled``: a motion livelier than the study's snap allows, which some sensor shows."""
+    """``unmodelled``: a motion livelier than the study's snap allows, seen by a sensor."""
     if now.white:
         return []
     for factor in (1e2, 1e4):
@@ -198,34 +198,34 @@ def _of_snap(settings: AoaSettings, snap: float) -> Finding:
 
 def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
     """``unmodelled``: the whole model fits, the study's smaller one does not."""
-    stated = settings.estimator.states
-    larger = [states for states in STATES if states > stated]
-    if not larger or fit_quality(part, settings, stated).fits:
+    chosen = settings.estimator.states
+    larger = [states for states in STATES if states > chosen]
+    if not larger or fit_quality(part, settings, chosen).fits:
         return []
-    # of more states more snap is usual
+    # more states go with more snap
     usual = replace(settings.estimator, states=19).density
-    if fit_quality(part, _livelier(settings, usual), stated).fits:
+    if fit_quality(part, _livelier(settings, usual), chosen).fits:
         return [_of_snap(settings, usual)]
     enough = next((states for states in larger if fit_quality(part, settings, states).fits), 19)
     at_least = "" if enough == 19 else f" ({enough} at least)"
     text = (
-        f"the recording shows {_BESIDE[enough]}, which {stated} states leave out: their angle is wrong by more than it "
+        f"the recording shows {_BESIDE[enough]}, which {chosen} states leave out: their angle is wrong by more than it "
         f"claims, write states = 19{at_least} under [estimator]"
     )
     return [Finding("unmodelled", text, harm=EVERYTHING)]
 
 
 def _errors(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
-    """Constant errors that explain what is left over; what does not make the recording fit is no advice."""
-    found, left = small_errors((part, settings))
+    """Constant errors that make the recording fit; a contradiction where none do."""
+    errors, left = small_errors((part, settings))
     then = fit_quality(*left)
     if then.fits or then.misfit <= LIMITS.sound_misfit:
-        return [each.finding for each in found]
+        return [each.finding for each in errors]
     return [_contradiction(part, settings, now)]
 
 
 def _contradiction(part: Recording, settings: AoaSettings, now: FitQuality) -> Finding:
-    """What no one error explains: the accelerometer without which the rest fits, or no more than that."""
+    """``contradiction`` that no single error explains, with the accelerometer without which the others fit, if any."""
     names = settings.layout.names
     for k, name in enumerate(names):
         others = [i for i in range(len(names)) if i != k and np.isfinite(part.acc[:, i]).any()]

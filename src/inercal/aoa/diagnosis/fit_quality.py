@@ -1,4 +1,4 @@
-"""How well a recording fits its study: what the fusion with all its nuisances makes of the liveliest stretch of it."""
+"""Quality of the fit of a recording to its study: the liveliest stretch, filtered with all nuisances."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ _BLOCK = 50
 """Rows that are filtered at a time."""
 
 Case = tuple[Recording, AoaSettings]
-"""A recording and its study, of which hypotheses speak."""
+"""A recording and its study, on which hypotheses are tried."""
 
 _BY_MOTION = ("dr_", "zo_", "k_g", "tau_g")
-"""Coefficients that only motion shows; at rest they follow noise, and where they end says nothing."""
+"""Coefficients that only motion shows; at rest they follow noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitQuality:
-    """What the fusion found in a stretch.
+    """Result of the fusion of a stretch.
 
-    ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` how far
-    each coefficient ended from its prior, in standard deviations of it, by name, without those that only motion shows
-    where there is none; ``misfit`` of all in one number.
+    ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` the
+    distance of each coefficient from its prior, in standard deviations of the prior, by name, at rest without those
+    that only motion shows; ``misfit`` of all in one number.
     """
 
     innovations: Array
@@ -45,8 +45,8 @@ class FitQuality:
 
     @property
     def by_sensor(self) -> Array:
-        """(N + 1,) mean of log(1 + v^2) of each sensor: 0.53 for white innovations, and little moved by single wild
-        ones; 0 of one that is not there."""
+        """(N + 1,) mean of log(1 + v^2) of each sensor: 0.53 for white innovations, little moved by single wild ones; 0
+        for an absent sensor."""
         return np.array([_logarithm(v[np.isfinite(v)]) for v in self.innovations.T])
 
     @property
@@ -68,7 +68,7 @@ class FitQuality:
 
     @property
     def _far(self) -> Array:
-        """How far the coefficients are off, over what is expected at most."""
+        """Distances of the coefficients from their priors, over the largest expected ones."""
         wide, wide_scale = LIMITS.prior_sigmas, LIMITS.gyro_scale_sigmas
         return np.array([0.0, *(v / (wide_scale if k == "k_g" else wide) for k, v in self.off.items())])
 
@@ -80,7 +80,7 @@ def _logarithm(v: Array) -> float:
 
 
 def stretch(recording: Recording) -> Recording:
-    """The rows in which the sensors vary most, of those that go on in time, without single wild samples."""
+    """The rows in which the sensors vary most, later ones only, without single wild samples."""
     taken, most = later(recording.t), LIMITS.judged_rows
     if len(taken) > most:
         read = np.column_stack([recording.acc, recording.gyro])[taken]
@@ -98,9 +98,9 @@ def stretch(recording: Recording) -> Recording:
 
 
 def _scatter(read: Array) -> Array:
-    """Standard deviation of each column, 1 of one that is not there."""
-    known = np.isfinite(read)
-    each = [float(c[k].std()) if k.any() else 0.0 for c, k in zip(read.T, known.T, strict=True)]
+    """Standard deviation of each column, 1 for an empty one."""
+    finite = np.isfinite(read)
+    each = [float(c[k].std()) if k.any() else 0.0 for c, k in zip(read.T, finite.T, strict=True)]
     return np.array([one or 1.0 for one in each])
 
 
@@ -111,7 +111,7 @@ def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
         recording.acc[rows],
         recording.gyro[rows],
         recording.turns[rows],
-        recording.stated[rows],
+        recording.zero_angle[rows],
     )
 
 
@@ -120,22 +120,25 @@ def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19
     asked = replace(settings, estimator=replace(settings.estimator, states=states))
     posed = problem(asked, recording.spatial)
     with np.errstate(all="ignore"):
-        state, told = _followed(posed, recording.t, recording.rows)
+        state, outputs = _followed(posed, recording.t, recording.rows)
         at = [*posed.nuisances.values()]
         off = (state.x[at] - posed.mean[at]) / np.sqrt(np.diag(posed.covariance)[at])
         off = np.nan_to_num(off, nan=1e6)
-    still = rms(told[:, 2]) < settings.noise.gyro
+    still = rms(outputs[:, 2]) < settings.noise.gyro
     named = {
         name: each
         for name, each in zip(posed.nuisances, off.tolist(), strict=True)
         if not (still and name.startswith(_BY_MOTION))
     }
-    return FitQuality(told[:, OUTPUTS:], told[:, 0], told[:, 2], named, posed)
+    return FitQuality(outputs[:, OUTPUTS:], outputs[:, 0], outputs[:, 2], named, posed)
 
 
 def _followed(posed: FilterProblem, t: Array, rows: Array) -> tuple[State, Array]:
-    """The state after rows, and what the fusion says of each (m, OUTPUTS + N + 1); NaN from where on it is given up, as
-    it loses the angle every few rows and starting anew takes the time of a hundred steps."""
+    """The state after rows, and the outputs of the fusion (m, OUTPUTS + N + 1).
+
+    A filter that loses the angle every few rows is given up, as a new start takes the time of a hundred steps: NaN from
+    there on.
+    """
     state, done, starts = initial(posed), 0, 0
     out = np.full((len(t), OUTPUTS + posed.count + 1), np.nan)
     for a in range(0, len(t), _BLOCK):

@@ -29,9 +29,9 @@ from inercal.units import STANDARD_GRAVITY
 Change = Callable[[Recording, AoaSettings], Case]
 
 OTHER_CHANNEL = "gyro does not tell of the pitch that the accelerometers show"
-"""The hypothesis than which any other is likelier."""
+"""Name of the least likely hypothesis."""
 
-#: what values [SI] are to be multiplied by -> the unit they look to be in, and that they were taken for
+#: factor that corrects values [SI] -> the unit they look to be in, and the unit they were taken for
 _ACCELEROMETER_UNITS = {
     STANDARD_GRAVITY: ("g", "m/s^2"),
     1.0 / STANDARD_GRAVITY: ("m/s^2", "g"),
@@ -64,7 +64,7 @@ def gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
     there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
     shown = _shown(recording, settings)
     if np.isfinite(recording.gyro).any():
-        # at rest a gyro tells of noise alone, which is of no sign and unit
+        # at rest a gyro shows noise alone, which has no sign and no unit
         if rms(shown) > settings.noise.gyro:
             yield from _of_gyro()
         yield from _of_clock(recording, settings, shown)
@@ -73,7 +73,7 @@ def gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
     yield from _reversed(there, settings)
     yield from _orders(there, settings)
     yield from _units(there, settings)
-    # of steady motion positions show no more than small errors of the sensors do
+    # in steady motion positions show no more than small errors of the sensors do
     arm = max(float(np.abs(settings.layout.r).max()), LIMITS.least_arm)
     if arm * rms(np.gradient(shown, recording.t)) > LIMITS.plain_acceleration:
         yield from _positions(there, settings)
@@ -89,22 +89,22 @@ def _shown(recording: Recording, settings: AoaSettings) -> Array:
     return fit_quality(replace(recording, gyro=np.full_like(recording.gyro, np.nan)), settings).rate
 
 
-def _follows(recording: Recording, shown: Array, stated: float) -> bool:
+def _follows(recording: Recording, shown: Array, gyro_noise: float) -> bool:
     """True where a gyro explains half of the mean square of the rate that accelerometers show, beside its bias and
-    noise, or where there is hardly any rate; ``stated`` noise."""
+    noise, or where there is hardly any rate; ``gyro_noise`` [rad/s] is the stated one."""
     gyro = recording.gyro
-    known = np.isfinite(gyro) & np.isfinite(shown)
-    known[: len(known) // 10] = False
-    if known.sum() < LIMITS.compared_rows:
+    both = np.isfinite(gyro) & np.isfinite(shown)
+    both[: len(both) // 10] = False
+    if both.sum() < LIMITS.compared_rows:
         return False
-    told = scatter(recording.t[known], gyro[known])
-    noise = stated if told is None else told.size
-    left = float(np.var(gyro[known] - shown[known])) - noise**2
-    return left < 0.5 * max(float(np.var(shown[known])), (LIMITS.still_gyro_ratio * noise) ** 2)
+    gyro_scatter = scatter(recording.t[both], gyro[both])
+    noise = gyro_noise if gyro_scatter is None else gyro_scatter.size
+    left = float(np.var(gyro[both] - shown[both])) - noise**2
+    return left < 0.5 * max(float(np.var(shown[both])), (LIMITS.still_gyro_ratio * noise) ** 2)
 
 
 def _of_gyro() -> Iterator[Hypothesis[Case]]:
-    """Reversed, or of another unit."""
+    """A gyro that is reversed, or of another unit."""
 
     def times(factor: float) -> Change:
         return lambda recording, settings: (replace(recording, gyro=factor * recording.gyro), settings)
@@ -117,12 +117,12 @@ def _of_gyro() -> Iterator[Hypothesis[Case]]:
 
 
 def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Hypothesis[Case]]:
-    """A gyro that is late, or one that tells of something else than pitch."""
+    """A gyro that is late, or one that does not measure pitch."""
     if settings.timing.gyro_delay is not None:
-        found = relative_delay(recording, settings.layout)
-        shift = 0.0 if found is None else found.value - settings.timing.gyro_delay
-        if found is not None and abs(shift) > LIMITS.delay_sigmas * found.u:
-            value = f"{1e3 * found.value:.2g} ms"
+        delay = relative_delay(recording, settings.layout)
+        shift = 0.0 if delay is None else delay.value - settings.timing.gyro_delay
+        if delay is not None and abs(shift) > LIMITS.delay_sigmas * delay.u:
+            value = f"{1e3 * delay.value:.2g} ms"
             how = "later" if shift > 0.0 else "earlier"
             text = (
                 f"gyro comes {1e3 * abs(shift):.2g} ms {how} than the accelerometers and the study say: write "
@@ -195,7 +195,7 @@ def _orders(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Case
         if len(moved) == 2:
             what = f"{names[moved[0][0]]} and {names[moved[0][1]]} look exchanged"
         else:
-            # the column of b holds what belongs to a
+            # the column of b holds the readings of a
             what = ", ".join(f"{names[b]} looks like {names[a]}" for a, b in moved)
         text = f"{what}: correct their columns in the map, or their axes and positions in the study"
         yield _fault("channel_swap", text, _ordered(there, order))

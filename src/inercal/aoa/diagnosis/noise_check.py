@@ -1,4 +1,4 @@
-"""The noise that sensors show, told from their motion by differences of high order."""
+"""Noise of the sensors, separated from motion by differences of high order."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from inercal.units import STANDARD_GRAVITY
 
 @dataclass(frozen=True)
 class Scatter:
-    """Noise of a sensor, standard deviation [SI] from row to row: ``size``, and whether it is noise for ``certain`` and
-    not motion; ``sparse`` the same over every fourth row."""
+    """Noise of a sensor: standard deviation ``size`` [SI] from row to row, ``certain`` where it is surely noise and no
+    motion; ``sparse`` the same over every fourth row."""
 
     size: float
     certain: bool
@@ -28,8 +28,8 @@ class Scatter:
 def scatter(t: Array, values: Array) -> Scatter | None:
     """Noise of ``values`` (n,) at ``t`` (n,) [s]; None where hardly any come at even intervals.
 
-    White noise shows alike in all orders, motion below a quarter of the sample rate from one order to the next at most
-    half in the square, so that s6^2 - (s5^2 - s6^2) is noise at least.
+    White noise has the same size in all orders; the square of motion below a quarter of the sample rate at least halves
+    from one order to the next. So at least s6^2 - (s5^2 - s6^2) is noise.
     """
     sizes = _by_order(t, values)
     if sizes is None:
@@ -41,26 +41,28 @@ def scatter(t: Array, values: Array) -> Scatter | None:
 
 
 def _by_order(t: Array, values: Array) -> list[float] | None:
-    """Noise by the median difference of each order, from the first; of white noise the same for all.
+    """Noise by the median difference of each order, from the first; equal in all orders for white noise.
 
-    Differences of the last order are zero for motion alone where the intervals are alike, so others are left out.
+    Only even intervals count: there alone smooth motion leaves no differences of the last order.
     """
     there = np.isfinite(values)
-    known, step = values[there], np.diff(t[there])
+    differences, step = values[there], np.diff(t[there])
     even = (
         np.abs(step - np.median(step)) < LIMITS.even_share * np.median(step)
         if len(step)
         else np.zeros(0, dtype=np.bool_)
     )
     runs = even
-    found = []
+    sizes = []
     for order in range(1, LIMITS.noise_order + 1):
-        known = np.diff(known)
+        differences = np.diff(differences)
         runs = even if order == 1 else runs[:-1] & even[order - 1 :]
         if runs.sum() < LIMITS.noise_differences:
             return None
-        found.append(float(np.median(np.abs(known[runs]))) / 0.6745 / math.sqrt(math.comb(2 * order, order)))
-    return found
+        sizes.append(
+            float(np.median(np.abs(differences[runs]))) / 0.6745 / math.sqrt(math.comb(2 * order, order))
+        )
+    return sizes
 
 
 def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding], AoaSettings]:
@@ -69,24 +71,26 @@ def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding
     columns = {name: recording.acc[:, k] for k, name in enumerate(names)}
     groups = (("accelerometer", columns, noise.accelerometer), ("gyro", {"gyro": recording.gyro}, noise.gyro))
     findings = []
-    for key, sensors, stated in groups:
-        told = {name: scatter(recording.t, values) for name, values in sensors.items() if stated > 0.0}
-        seen = {name: each for name, each in told.items() if each is not None}
-        over = {name: each.size / stated for name, each in seen.items() if each.certain}
-        under = {name: max(each.size, each.sparse) / stated for name, each in seen.items() if each.size > 0.0}
+    for key, sensors, nominal in groups:
+        scatters = {name: scatter(recording.t, values) for name, values in sensors.items() if nominal > 0.0}
+        seen = {name: each for name, each in scatters.items() if each is not None}
+        over = {name: each.size / nominal for name, each in seen.items() if each.certain}
+        under = {
+            name: max(each.size, each.sparse) / nominal for name, each in seen.items() if each.size > 0.0
+        }
         if loud := [name for name, ratio in over.items() if ratio > LIMITS.loud_noise_ratio]:
             most = max(over.values())
-            findings.append(_finding("excess_scatter", key, loud, most, stated))
-            settings = replace(settings, noise=replace(settings.noise, **{key: most * stated}))
+            findings.append(_finding("excess_scatter", key, loud, most, nominal))
+            settings = replace(settings, noise=replace(settings.noise, **{key: most * nominal}))
         elif under and LIMITS.no_noise_ratio < max(under.values()) < LIMITS.low_noise_ratio:
-            findings.append(_finding("low_scatter", key, list(under), max(under.values()), stated))
+            findings.append(_finding("low_scatter", key, list(under), max(under.values()), nominal))
     return findings, settings
 
 
-def _finding(code: str, key: str, names: list[str], ratio: float, stated: float) -> Finding:
-    """Noise in words."""
+def _finding(code: str, key: str, names: list[str], ratio: float, nominal: float) -> Finding:
+    """Finding on the noise of sensors, in words."""
     unit, size = ("g", STANDARD_GRAVITY) if key == "accelerometer" else ("deg/s", math.pi / 180.0)
-    now, then = f"{stated / size:.3g} {unit}", f"{ratio * stated / size:.2g} {unit}"
+    now, then = f"{nominal / size:.3g} {unit}", f"{ratio * nominal / size:.2g} {unit}"
     harm = EVERYTHING if code == "excess_scatter" else ()
     text = f"{', '.join(names)}: noise is {ratio:.2g} times the {now} that the study states: write {key} = "
     return Finding(code, f'{text}"{then}" under [noise], unless its unit is wrong', harm=harm)

@@ -2,8 +2,8 @@
 
 Innovations of a filter are white where its model holds, which makes them the residuals of the score test
 (`inercal.estimate.hypotheses`), over the stretch that is judged. The model is never exact enough for chance alone to
-decide: the likeliest errors are fitted to the end, and that is taken which takes most of the misfit away, if it is
-half. At one angle a bias, a scale, an axis and gravity look alike: what takes away as much is said beside it.
+decide: the likeliest errors are fitted to the end, and the one that takes most of the misfit away is taken, if it takes
+half. At one angle a bias, a scale, an axis and gravity look alike: equally good errors are named beside it.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Fusion:
         gated = replace(settings, estimator=replace(settings.estimator, gate=1e12))
         innovations = fit_quality(recording, gated).innovations
         size = np.abs(innovations)
-        known = np.flatnonzero(np.isfinite(size).any(axis=0))
+        measured = np.flatnonzero(np.isfinite(size).any(axis=0))
         usual = np.zeros(size.shape[1])
-        usual[known] = np.nanmedian(size[:, known], axis=0)
+        usual[measured] = np.nanmedian(size[:, measured], axis=0)
         return np.where(size < LIMITS.wild_ratio * usual, innovations, np.nan)
 
     def misfit(self, case: Case) -> float:
@@ -48,12 +48,12 @@ JUDGE = Fusion()
 
 
 def small_errors(case: Case) -> tuple[Fits[Case], Case]:
-    """Constant errors that explain what is left over, and the case without them."""
+    """Constant errors that explain the rest of the misfit, and the case without them."""
     return search(case, constant_errors, JUDGE, 1.0, LIMITS.small_errors, choose=_most_explaining)
 
 
 def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-    """The fit with the least misfit, with others that have hardly more, if it takes enough of it away."""
+    """The fit with the least misfit, with others that have hardly more; None where it takes too little away."""
     by_misfit = sorted(
         (
             (JUDGE.misfit(fit[-1].case), k, fit)
@@ -68,7 +68,7 @@ def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | Non
 
 
 def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
-    """Errors that may be looked for; none where the case fits."""
+    """Hypotheses of constant errors; none where the case fits."""
     recording, settings = case
     now = fit_quality(recording, settings)
     if now.fits:
@@ -105,7 +105,7 @@ def _error(
 
 def _axis(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """An axis at lambda plus the value [rad]."""
-    name, stated = settings.layout.names[k], float(settings.layout.angle[k])
+    name, nominal = settings.layout.names[k], float(settings.layout.angle[k])
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         angle = settings.layout.angle.copy()
@@ -113,14 +113,14 @@ def _axis(settings: AoaSettings, k: int) -> Hypothesis[Case]:
         return recording, replace(settings, layout=replace(settings.layout, angle=angle))
 
     def says(value: float) -> str:
-        advice = f'write angle = "{math.degrees(stated + value):.4g} deg" under [sensors.{name}]'
+        advice = f'write angle = "{math.degrees(nominal + value):.4g} deg" under [sensors.{name}]'
         return f"the axis of {name} looks turned by {math.degrees(value):.3g} deg: {advice}"
 
     return _error(f"axis {name}", "unmodelled", without, says, 1e-5, (-0.7, 0.7))
 
 
 def _scale(settings: AoaSettings, k: int) -> Hypothesis[Case]:
-    """A sensor that reads 1 + value times what it should."""
+    """A sensor whose readings are 1 + value times too large."""
     name = settings.layout.names[k]
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
@@ -136,7 +136,7 @@ def _scale(settings: AoaSettings, k: int) -> Hypothesis[Case]:
 
 
 def _bias(settings: AoaSettings, k: int) -> Hypothesis[Case]:
-    """A sensor that reads more by the value [m/s^2]."""
+    """A sensor whose readings are too large by the value [m/s^2]."""
     name = settings.layout.names[k]
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
@@ -153,14 +153,14 @@ def _bias(settings: AoaSettings, k: int) -> Hypothesis[Case]:
 
 def _position(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """A sensor further ahead of the pivot by the value [m]."""
-    name, stated = settings.layout.names[k], float(settings.layout.r[k])
+    name, nominal = settings.layout.names[k], float(settings.layout.r[k])
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         return recording, _further_ahead(settings, k, value)
 
     def says(value: float) -> str:
         what = f"{name} looks to sit {1e3 * value:.3g} mm further ahead than stated"
-        return f'{what}: write r = "{stated + value:.4g} m" under [sensors.{name}]'
+        return f'{what}: write r = "{nominal + value:.4g} m" under [sensors.{name}]'
 
     return _error(f"position {name}", "prior_suspect", without, says, 1e-4, (-1.0, 1.0))
 
@@ -187,15 +187,15 @@ def _further_ahead(settings: AoaSettings, k: int | slice, value: float) -> AoaSe
 
 def _gravity(settings: AoaSettings) -> Hypothesis[Case]:
     """Gravity larger by the value [m/s^2]."""
-    stated = settings.site.gravity
+    nominal = settings.site.gravity
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
         site = replace(settings.site, gravity=settings.site.gravity + value)
         return recording, replace(settings, site=site)
 
     def says(value: float) -> str:
-        advice = f"stated are {stated:.6g} m/s^2, correct gravity or latitude and height under [site]"
-        return f"gravity looks to be {stated + value:.5g} m/s^2: {advice}"
+        advice = f"stated are {nominal:.6g} m/s^2, correct gravity or latitude and height under [site]"
+        return f"gravity looks to be {nominal + value:.5g} m/s^2: {advice}"
 
     return _error("gravity", "site_suspect", without, says, 1e-4, (-0.5, 0.5))
 
@@ -221,8 +221,8 @@ def _roll() -> Hypothesis[Case]:
     """Roll of the mean square ``value`` [rad^2], all the time or to and fro: f_z is less by its mean cosine."""
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        stated = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
-        turned = math.acos(math.cos(stated) * math.cos(math.sqrt(max(value, 0.0))))
+        nominal = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
+        turned = math.acos(math.cos(nominal) * math.cos(math.sqrt(max(value, 0.0))))
         roll = Quantity(turned, 0.0, parse_unit("rad"), "")
         return recording, replace(settings, attitude=replace(settings.attitude, roll=roll))
 

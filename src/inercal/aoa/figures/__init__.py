@@ -1,4 +1,4 @@
-"""Pictures and the page of an angle of attack: the angle and its band, and what speaks for it or against it."""
+"""Pictures and the page of an angle of attack: the angle and its band, and the evidence for and against it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.figures import sensors
-from inercal.aoa.figures.innovations import innovations
-from inercal.aoa.figures.learned import flexure, learned, lever_arms
-from inercal.aoa.flow import alpha_beta, stated
+from inercal.aoa.figures.innovations import consistency
+from inercal.aoa.figures.learned import coefficients, flexure, lever_arms
+from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
+from inercal.aoa.flow import alpha_beta, gives_alpha
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.result.display import delays, displayed
 from inercal.aoa.result.tables import answer, on_page
@@ -58,36 +58,36 @@ def page(measurement: Measurement) -> str:
 def pictures(measurement: Measurement) -> list[Picture]:
     """All pictures of a measurement of whatever method, status and length, the main one first."""
     settings, map_of_sensors, seen = measurement.settings, _sensors(measurement), in_order(measurement)
-    recording, found = seen.recording, seen.filtered
+    recording, filtered = seen.recording, seen.filtered
     t = recording.t
     if len(t) < 2:
         return [map_of_sensors]
     names = (*settings.layout.names, "gyro")
     missing, masked = _lost(recording)
     marks = _marks(seen)
-    drawn = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
+    gallery = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
     if missing.any() or len(marks.gaps):
-        drawn.append(measured(t, names, missing, masked, marks))
-    drawn += _in_the_stream(seen, settings, marks)
-    drawn += _against_reference(seen, marks) + _fitted(seen) + _points(measurement) + _compared(seen, marks)
-    drawn += lever_arms(seen, settings, marks)
-    if found is not None:
-        drawn += flexure(seen, found, settings, marks) + learned(seen, found)
-        drawn += innovations(t, found.innovations, names, found.nis_mean, marks)
+        gallery.append(measured(t, names, missing, masked, marks))
+    gallery += _in_the_stream(seen, settings, marks)
+    gallery += _against_reference(seen, marks) + _fitted(seen) + _points(measurement) + _compared(seen, marks)
+    gallery += lever_arms(seen, settings, marks)
+    if filtered is not None:
+        gallery += flexure(seen, filtered, settings, marks) + coefficients(seen, filtered)
+        gallery += consistency(t, filtered.innovations, names, filtered.nis_mean, marks)
     reference = recording.reference
-    drawn += of_angle(
+    gallery += of_angle(
         t,
         np.degrees(seen.angles.theta),
         None if reference is None else np.degrees(_apart(seen.angles.theta, reference)),
-        {} if found is None else dict(zip(names, found.innovations.T, strict=True)),
+        {} if filtered is None else dict(zip(names, filtered.innovations.T, strict=True)),
     )
-    return drawn + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
+    return gallery + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
 
 
 def _sensors(measurement: Measurement) -> Picture:
-    """Where the sensors are on the model."""
+    """Places of the sensors on the model."""
     layout, gyro = measurement.settings.layout, measurement.recording.gyro
-    return sensors.side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
+    return side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
 
 
 def _lost(recording: Recording) -> tuple[Flags, Flags]:
@@ -113,12 +113,12 @@ def _angle(seen: Measurement, marks: Marks) -> Picture:
         if seen.filtered is not None
         else ""
     )
-    told = f"u: median {middle(u):.2g}°, largest after the start {largest(u[settled(t)]):.2g}°"
+    title = f"u: median {middle(u):.2g}°, largest after the start {largest(u[settled(t)]):.2g}°"
     panels = [
         Panel(
             "theta [°]", {"": theta}, f"{angles.method}: {span(theta)}°", (theta - 2.0 * u, theta + 2.0 * u)
         ),
-        Panel("u of theta [°]", {"": u}, told, scale="log"),
+        Panel("u of theta [°]", {"": u}, title, scale="log"),
     ]
     if np.isfinite(rate).any():
         panels.append(Panel("rate [°/s]", {"": rate}, f"rate: {span(rate)} °/s", zero=True))
@@ -162,14 +162,14 @@ def _close_up(seen: Measurement) -> list[Picture]:
 
 
 def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
-    """The error against a reference angle with the band that it should lie in; nothing without one."""
+    """The error against a reference angle with its band; nothing without a reference."""
     t, angles, reference = seen.recording.t, seen.angles, seen.recording.reference
     if reference is None or not np.isfinite(angles.theta - reference).any():
         return []
-    told = np.isfinite(reference)
+    finite = np.isfinite(reference)
     moving = np.zeros(len(t), dtype=bool)
-    still, _ = at_rest(t[told], np.unwrap(reference[told]), np.full(int(told.sum()), REFERENCE_U))
-    moving[told] = ~still
+    still, _ = at_rest(t[finite], np.unwrap(reference[finite]), np.full(int(finite.sum()), REFERENCE_U))
+    moving[finite] = ~still
     error, half = np.degrees(_apart(angles.theta, reference)), 2.0 * np.degrees(angles.u)
     late = settled(t) & np.isfinite(error) & np.isfinite(half)
     outside = 100.0 * float(np.mean(np.abs(error[late]) > half[late])) if late.any() else 0.0
@@ -196,7 +196,7 @@ def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
 def _in_the_stream(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[Picture]:
     """Angle of attack and sideslip, where the study states how the model lies, and roll where it is tracked."""
     angles, panels = seen.angles, []
-    if stated(settings.attitude):
+    if gives_alpha(settings.attitude):
         flow = alpha_beta(
             angles.theta, angles.known_u, settings.attitude, angles.roll, angles.roll_u, angles.by_roll
         )
@@ -228,7 +228,7 @@ def _banded(seen: Measurement, name: str, value: Array, u: Array) -> Panel:
 
 
 def _fitted(seen: Measurement) -> list[Picture]:
-    """The sensors as the reference angle shows them; nothing without such a fit."""
+    """The sensors as fitted to the reference angle; nothing without a fit."""
     fit, names = seen.verified, seen.settings.layout.names
     if fit is None or not fit.converged:
         return []
@@ -239,28 +239,28 @@ def _fitted(seen: Measurement) -> list[Picture]:
     values = np.array([[each.value for each in row] for row in rows])
     values[0] -= 1.0
     u = np.array([[each.u for each in row] for row in rows])
-    told = np.array([[each.name not in fit.unseen for each in row] for row in rows])
-    return [sensors.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
+    identified = np.array([[each.name not in fit.unseen for each in row] for row in rows])
+    return [fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, identified)]
 
 
 def _points(measurement: Measurement) -> list[Picture]:
     """Means of the points at rest, and against the reference where there is one; nothing without any."""
-    found, reference = measurement.points, measurement.recording.reference
-    if not found:
+    all_points, reference = measurement.points, measurement.recording.reference
+    if not all_points:
         return []
     theta, u, left, scatter = np.degrees(
-        [[each.theta, each.u, each.u_scatter, each.scatter] for each in found]
+        [[each.theta, each.u, each.u_scatter, each.scatter] for each in all_points]
     ).T
     error = None
     if reference is not None:
-        true = [known(reference[each.start : each.stop]) for each in found]
+        true = [known(reference[each.start : each.stop]) for each in all_points]
         means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
         error = np.degrees(_apart(np.radians(theta), means))
-    return [sensors.points(theta, u, left, scatter, error)]
+    return [points(theta, u, left, scatter, error)]
 
 
 def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
-    """Errors of all methods against the reference, or their differences from the one asked for."""
+    """Errors of all methods against the reference, or their differences from the chosen one."""
     if not seen.compared:
         return []
     t, reference = seen.recording.t, seen.recording.reference
@@ -274,7 +274,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
     panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
     return [
-        sensors.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
+        side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
         over_time(
             "Methods over time",
             f"The {what}, a panel for each method, each on a scale of its own: that which it spans after the first "

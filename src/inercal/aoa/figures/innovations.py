@@ -1,4 +1,4 @@
-"""Is a filter as good as it says, sensor by sensor: squared innovations over time, and whether they are white."""
+"""Consistency of a filter, sensor by sensor: squared innovations over time, and their whiteness."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _BLOCKS = 400
 """Pieces of a record whose mean squared innovations are drawn."""
 
 
-def innovations(
+def consistency(
     t: Array, values: Array, names: Sequence[str], nis_mean: float, marks: Marks
 ) -> list[Picture]:
     """Innovations, ``values`` (n, k) of ``names`` over their standard deviations, NaN where not measured, over ``t``

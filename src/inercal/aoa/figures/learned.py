@@ -1,4 +1,4 @@
-"""Pictures of what lies between readings and angle: lever arms, flexure of the sting, and what was learned."""
+"""Pictures of lever arms, flexure of the sting, and errors of the sensors."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 _MG = 1e-3 * STANDARD_GRAVITY
 
 _NO_FORCE = 1e-3
-"""Specific force [mg] that is none."""
+"""Specific force [mg] below which there is none."""
 
 
 def lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[Picture]:
-    """What lever arms add to the reading of each accelerometer."""
-    t, found, layout, roll = seen.recording.t, seen.filtered, settings.layout, settings.attitude.roll
+    """Parts of the readings that lever arms add."""
+    t, filtered, layout, roll = seen.recording.t, seen.filtered, settings.layout, settings.attitude.roll
     rate = seen.angles.rate if np.isfinite(seen.angles.rate).any() else seen.recording.gyro
     level = 1.0 if roll is None else math.cos(roll.value)
     weights = all_weights(layout)
-    if found is not None:
-        acceleration = found.acceleration
+    if filtered is not None:
+        acceleration = filtered.acceleration
     else:
         acceleration = np.full(len(t), np.nan) if weights is None else seen.recording.acc @ weights / level
     degrees, late = math.degrees(_MG / settings.site.gravity), settled(t)
@@ -68,15 +68,15 @@ def lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[P
     ]
 
 
-def flexure(seen: Measurement, found: FilterResult, settings: AoaSettings, marks: Marks) -> list[Picture]:
+def flexure(seen: Measurement, filtered: FilterResult, settings: AoaSettings, marks: Marks) -> list[Picture]:
     """The sting's flexure as it was estimated; nothing where it is not."""
     names, prior = seen.problem.names, settings.prior
-    if "flexure_z" not in names or len(found.kept_t) < 2:
+    if "flexure_z" not in names or len(filtered.kept_t) < 2:
         return []
     panels = []
     for axis, word, of in (("z", "across", prior.heave), ("x", "along", prior.axial)):
         k = names.index(f"flexure_{axis}")
-        value, u, level = found.states[:, k] / _MG, found.states_u[:, k] / _MG, 2.0 * of.level / _MG
+        value, u, level = filtered.states[:, k] / _MG, filtered.states_u[:, k] / _MG, 2.0 * of.level / _MG
         title = f"{word} the model: {rms(value):.2g} mg rms, u {middle(u):.2g} mg; prior {0.5 * level:.2g} mg"
         band = value - 2.0 * u, value + 2.0 * u
         panels.append(Panel(f"{axis} [mg]", {"": value}, title, band, {"": level, " ": -level}, zero=True))
@@ -87,16 +87,16 @@ def flexure(seen: Measurement, found: FilterResult, settings: AoaSettings, marks
             "bands of ± two standard uncertainties; dashes: ± two standard deviations of the prior. Within its band "
             "there is none to be seen. Beyond the dashes the prior is too small, and so is the uncertainty of theta; "
             f"even where they hold it can be too small by some 20 % while the sting vibrates.{marks.words}",
-            found.kept_t,
+            filtered.kept_t,
             panels,
             marks,
         )
     ]
 
 
-def learned(seen: Measurement, found: FilterResult) -> list[Picture]:
+def coefficients(seen: Measurement, filtered: FilterResult) -> list[Picture]:
     """Biases, lever arms, heights and scale: at the end against their priors, and over time."""
-    problem, t = seen.problem, found.kept_t
+    problem, t = seen.problem, filtered.kept_t
     if len(t) < 2:
         return []
     places = [*problem.nuisances.values()]
@@ -105,25 +105,25 @@ def learned(seen: Measurement, found: FilterResult) -> list[Picture]:
         np.array([shown_unit(unit_of(name))[1] for name in problem.nuisances]),
     )
     units = [shown_unit(unit_of(name))[0] for name in problem.nuisances]
-    told = np.flatnonzero(np.isfinite(found.states_u[:, places]).all(axis=1))
-    if not len(told):
+    finite = np.flatnonzero(np.isfinite(filtered.states_u[:, places]).all(axis=1))
+    if not len(finite):
         return []
     courses = [
         Course(
             name,
             unit,
-            found.states[:, k] / size,
-            found.states_u[:, k] / size,
+            filtered.states[:, k] / size,
+            filtered.states_u[:, k] / size,
             float(prior[k] / size),
             centre=float(problem.mean[k] / size),
         )
         for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True)
     ]
-    last = found.states[told[-1], places] / sizes, found.states_u[told[-1], places] / sizes
+    last = filtered.states[finite[-1], places] / sizes, filtered.states_u[finite[-1], places] / sizes
     at_end = sensors.learned(
         tuple(problem.nuisances), units, *last, problem.mean[places] / sizes, prior[places] / sizes
     )
-    if found.smoothed:
+    if filtered.smoothed:
         return [at_end]  # constants are the same all along
     return [
         at_end,

@@ -1,4 +1,4 @@
-"""Pictures of a wind-tunnel model on its sting: where its sensors are, what was learned of them, its points."""
+"""Pictures of a wind-tunnel model on its sting: places and errors of its sensors, its points."""
 
 from __future__ import annotations
 
@@ -115,9 +115,9 @@ def fitted(
     """Errors of sensors that were fitted to a reference angle: ``values``, ``u`` and whether they were ``seen``, a row
     for each of ``kinds``, names with units, and a column for each of ``names``."""
     places, panels = np.arange(len(names)), []
-    for kind, value, own, told in zip(kinds, values, u, seen, strict=True):
+    for kind, value, own, identified in zip(kinds, values, u, seen, strict=True):
         marks: list[Mark] = [Level(0.0)]
-        for chosen, colour, filled in ((told, COLOURS[0], True), (~told, QUIET, False)):
+        for chosen, colour, filled in ((identified, COLOURS[0], True), (~identified, QUIET, False)):
             bar = 2.0 * own[chosen]
             marks.append(Dots(places[chosen], value[chosen], "", colour, "o", 3.5, filled, up=bar))
         panels.append(Panel(marks, Axis(names=names), Axis(), kind, grid="y"))

@@ -1,4 +1,13 @@
-"""The fusion of a whole recording: angles with their uncertainties, what was learned of the sensors, innovations."""
+"""The fusion of a whole recording: angles with their uncertainties, errors of the sensors, innovations.
+
+Where gyros for roll and yaw track the roll, the causal filter has it at each row. The smoother keeps its states at some
+thousand times only; between them the roll follows the gyros,
+
+    phi' = p + (w sin phi - y cos phi) tan theta
+
+with the kept roll on the right side, and the drift of this sum from one kept time to the next is spread evenly between
+them: this removes biases of the gyros and keeps oscillations that the kept times do not resolve.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +30,13 @@ SETTLED = 2.0
 """Time [s] after the first row from which innovations are judged."""
 
 KEPT = 2000
-"""Rows, about, of which all states are kept for pictures."""
+"""Number of rows, about, at which all states are kept for pictures."""
+
+_STEEP = 50.0
+"""Largest tangent of theta: near 90 deg roll and yaw are one, and the roll is that of the fusion."""
 
 _BLOCK = 10_000
-"""Rows of which all states are there at a time."""
+"""Rows whose states are all held at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +57,7 @@ class FilterResult:
         Times at which all states were kept, ``states`` (k, m) and their standard deviations ``states_u`` (k, m), in the
         order of the problem's names; causal or smoothed as the angles.
     state : State
-        Of the causal filter at the end: what it learned of the sensors.
+        Of the causal filter at the end.
     nis_mean : float
         Mean of the squared innovations after the first 2 s, or in the later half of less than 4 s; NaN without any.
     nis_count : int
@@ -141,7 +153,7 @@ def _with_roll(
 ) -> tuple[State, Trace, Array, Array]:
     """The causal filter's state and trace, states kept at each ``every``-th row, and roll (n, 2) at each.
 
-    All states of all rows would be many: they are there for some rows at a time.
+    The states of all rows would fill the memory: they are held for some rows at a time.
     """
     state, done = initial(problem), 0
     starts: list[Start] = []
@@ -161,6 +173,38 @@ def _with_roll(
 
 
 def of_fusion(filtered: FilterResult, states: int) -> Angles:
-    """The angles of the fusion with so many ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
+    """The angles of the fusion, named by its ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
     way = "smoothed" if filtered.smoothed else "fusion"
     return Angles(f"{way} {states}", filtered.theta, filtered.u, filtered.rate, filtered.rate_u)
+
+
+def tracked_roll(
+    recording: Recording, problem: FilterProblem, filtered: FilterResult
+) -> tuple[Array, Array] | None:
+    """Roll (n,) and its standard uncertainty (n,) [rad] at each row, NaN where theta is; None where it is not tracked.
+
+    The uncertainty of a smoothed roll is interpolated between the kept times.
+    """
+    if not problem.spatial:
+        return None
+    if filtered.roll is not None and filtered.roll_u is not None:
+        return filtered.roll, filtered.roll_u
+    k = problem.names.index("phi")
+    finite = np.isfinite(filtered.states_u[:, k])
+    roll, roll_u = np.full((2, len(recording.t)), np.nan)
+    taken = later(recording.t)
+    taken = taken[np.isfinite(filtered.theta[taken])]
+    if not finite.any() or not len(taken):
+        return roll, roll_u
+    t, kept = recording.t[taken], filtered.kept_t[finite]
+    phi = np.unwrap(filtered.states[finite, k])
+    coarse = np.interp(t, kept, phi)
+    tangent = np.tan(filtered.theta[taken])
+    tangent = np.where(np.abs(tangent) < _STEEP, tangent, 0.0)
+    p, y = np.nan_to_num(recording.turns[taken]).T
+    speed = p + (np.nan_to_num(recording.gyro[taken]) * np.sin(coarse) - y * np.cos(coarse)) * tangent
+    run = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+    fine = run + np.interp(t, kept, phi - np.interp(kept, t, run))
+    roll[taken] = np.remainder(fine + np.pi, 2.0 * np.pi) - np.pi
+    roll_u[taken] = np.interp(t, kept, filtered.states_u[finite, k])
+    return roll, roll_u

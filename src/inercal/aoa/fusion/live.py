@@ -1,8 +1,8 @@
 """The fusion while a model is measured: samples or blocks of them in, angles out, to the digits of the whole record.
 
 The first rows are held until the filter can start (`inercal.aoa.reading.clock.HELD`), and where theta is lost rows are
-held again: their angles then come all at once. A row that is not later than those before it has no angle, as in
-`inercal.aoa.reading.clock`; every row is answered, in the order in which it came.
+held again: their angles then come all at once. A row that is not later than those before it has no angle
+(`inercal.aoa.reading.clock`); every row is answered, in the order in which it came.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import compiled
-from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion import loop
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import roll_of
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
@@ -29,7 +29,7 @@ class LiveState(NamedTuple):
     """State after a row, in the sense of `inercal.estimate.checkpoint`.
 
     ``fusion`` is the state of the filter, ``waiting`` (j,) [s] the stamps of the rows that are not answered yet, and
-    ``late`` how many of the last rows in a row were not later than those before.
+    ``late`` the number of successive rows at the end that are not later than those before.
     """
 
     fusion: fusion.State
@@ -39,7 +39,7 @@ class LiveState(NamedTuple):
 
 class Answers(NamedTuple):
     """Angles of k rows: their stamps ``t`` (k,) [s], and ``out`` (k, `OUTPUTS` + N + 1) as of
-    `inercal.aoa.fusion.loop.advance`, NaN where nothing is known; ``turned`` (k, 2) roll and its standard uncertainty
+    `inercal.aoa.fusion.loop.advance`, NaN in rows without an angle; ``turned`` (k, 2) roll and its standard uncertainty
     [rad] where it is estimated."""
 
     t: Array
@@ -90,9 +90,9 @@ class Live:
     ----------
     problem : FilterProblem
     state : LiveState, optional
-        Where an earlier one was left, of the same problem; from nothing if absent.
+        State in which an earlier `Live` of the same problem ended; the initial one if absent.
     where : object
-        What to call the samples in errors.
+        Name of the samples in errors.
 
     Examples
     --------
@@ -125,10 +125,10 @@ class Live:
         gyro: float = math.nan,
         roll: float = math.nan,
         yaw: float = math.nan,
-        stated: float = math.nan,
-        stated_u: float = math.nan,
+        zero_angle: float = math.nan,
+        zero_angle_u: float = math.nan,
     ) -> Answers:
-        """Go on by one sample; what is said of it, of none while rows are held, and of all that were held after that.
+        """Go on by one sample; answers for it: none while rows are held, and then those of all held rows.
 
         Parameters
         ----------
@@ -138,8 +138,8 @@ class Live:
             Accelerometers in the order of the layout; NaN where missing or saturated.
         gyro, roll, yaw : float
             Rates [rad/s]; nose-up, about x, about z.
-        stated, stated_u : float
-            An angle that is known [rad], and its standard uncertainty.
+        zero_angle, zero_angle_u : float
+            Angle known from elsewhere [rad], and its standard uncertainty.
 
         Raises
         ------
@@ -149,13 +149,13 @@ class Live:
         problem, state, row, n = self._problem, self._fusion, self._row, self._problem.count
         row[0, :n] = acceleration
         row[0, n], row[0, n + 1], row[0, n + 2], row[0, n + 3], row[0, n + 4] = (
-            gyro, stated, stated_u, roll, yaw,
+            gyro, zero_angle, zero_angle_u, roll, yaw,
         )  # fmt: skip
         if not (state.started and t > state.t):
             return self._block(np.array([t]), row.copy())
         self._dt[0] = t - state.t
-        if steps := fading.due(state.t, t, state.since):
-            fading.fade(state.x, state.P, problem, steps)
+        if steps := fusion.fading_steps(state.t, t, state.since):
+            fusion.fade(state.x, state.P, problem, steps)
         done = self._advance(Belief(state.x, state.P, state.turns), *self._arguments)
         stamp = np.array([t])
         self._late = 0
@@ -171,7 +171,7 @@ class Live:
         return self._block(recording.t, recording.rows)
 
     def finish(self) -> Answers:
-        """What is said of the rows that are still held: the record ends here."""
+        """Answers for the rows that are still held: the record ends here."""
         return self._block(np.empty(0), np.empty((0, self._problem.count + BESIDE)), last=True)
 
     def _block(self, t: Array, rows: Array, last: bool = False) -> Answers:
@@ -199,7 +199,7 @@ class Live:
         return roll_of(self._problem, states) if self._problem.spatial else None
 
     def _late_rows(self, waiting: Array, taken: NDArray[np.int64]) -> int:
-        """How many of the last rows were not taken; raises `RecordError` where the clock was set back."""
+        """Number of the last rows that were not taken; raises `RecordError` where the clock was set back."""
         if taken.size:
             late = self._late + int(taken[0])
             rest = len(waiting) - 1 - int(taken[-1])

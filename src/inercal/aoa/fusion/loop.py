@@ -1,12 +1,12 @@
 """The loop of the causal filter, compiled and free of allocation.
 
-A row is predicted, then updated by one scalar after the other: accelerometers in their order, the gyro, and an angle
-that is stated, all linearised at the prediction. (Relinearised at the state that the scalars before have made of it, a
-row multiplies their noise by its own, and the filter is surer than it may be: with axes at odd angles by a factor of
-six.) An innovation v that is larger than five standard deviations enlarges its own variance, S = v^2 / 25: it pulls the
-less the larger it is, while a gate that shuts would lock the filter out for good once it is off. Where some of the
-sensors agree with what is wrong, as after a shock, that pull can be too little all the same. So where one sensor has
-surprised by twice as much in each of a long row of rows, theta is found anew.
+A row is predicted, then updated by one scalar after the other: accelerometers in their order, the gyro, and a stated
+angle, all linearised at the prediction. (A scalar that is linearised anew at the state after the scalars before it
+multiplies their noise by its own, and the filter is too sure: with axes at odd angles by a factor of six.) An
+innovation v larger than five standard deviations enlarges its own variance, S = v^2 / 25: the larger it is the less it
+pulls, while a gate that shuts would lock the filter out for good once it is wrong. Where some of the sensors agree with
+a wrong angle, as after a shock, this pull can still be too small. So where one sensor has surprised by twice as much in
+each of a long series of rows, theta is found anew.
 """
 
 from __future__ import annotations
@@ -39,27 +39,28 @@ LOST = 0.09
 """Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
 
 _TURNS = 1e3
-"""An angle [rad] that is no model's."""
+"""Angle [rad] that no model reaches."""
 
 OUTPUTS = 5
 """Columns of a row of output before the innovations: theta, its u, rate, its u, acceleration."""
 
 BESIDE = 5
-"""Columns of a row of measurements after the accelerometers: gyro, an angle that is stated and its u, roll and yaw."""
+"""Columns of a row of measurements after the accelerometers: gyro, a stated angle and its u, roll and yaw."""
 
 PATIENCE = 500
-"""Rows in a row in which a sensor surprises by twice what the gate lets through, after which theta counts as lost: half
-a second at 1 kHz, longer than what a small wrong model leaves of one sign, as 5 mm of a height at 1 Hz."""
+"""Successive rows in which a sensor surprises by twice what the gate lets through, after which theta counts as lost:
+half a second at 1 kHz, longer than the errors of one sign by a slightly wrong model, such as 5 mm of a height at 1 Hz.
+"""
 
 _READING = 1e100
-"""What no sensor reads: from here on it counts as missing, as what is no number does."""
+"""Size of a reading from which on it counts as missing, like NaN."""
 
 _EVEN = 1e-9
 
 
 class Belief(NamedTuple):
     """State of the filter between two rows, changed in place: ``x`` (n,) and its covariance ``P`` (n, n); ``turns``
-    (N + 3,) the last indications of the roll and yaw gyros, and the rows in a row in which each accelerometer and the
+    (N + 3,) the last indications of the roll and yaw gyros, and the successive rows in which each accelerometer and the
     gyro surprised."""
 
     x: Array
@@ -88,7 +89,7 @@ NOT_KEPT = Kept(np.empty((0, 0)), 1, 0)
 
 
 class Memory(NamedTuple):
-    """Memory of the rows of a block (b,) for a smoother; of none for b = 0.
+    """Memory of the rows of a block (b,) for a smoother; empty for b = 0.
 
     ``steps`` (b, d, d) the transposed transition of the states that move to each row; ``after`` (b, n + 1, n) the state
     after the row, and its covariance; ``scalars`` (b, N + 2, 2 n + 2) of each scalar its row h, P h^T, the innovation v
@@ -101,7 +102,7 @@ class Memory(NamedTuple):
 
 
 def memory(block: int, states: int, moving: int, count: int) -> Memory:
-    """A memory of ``block`` rows, of so many states, of those that move, and of accelerometers."""
+    """A memory of ``block`` rows for so many states, ``moving`` ones, and ``count`` accelerometers."""
     return Memory(
         np.empty((block, moving, moving)),
         np.empty((block, states + 1, states)),
@@ -114,7 +115,7 @@ NONE = memory(0, 0, 0, 0)
 
 @kernel
 def step_of(dt: float) -> float:
-    """An interval [s] to the nanosecond, so that stamps that are even but for their rounding are."""
+    """An interval [s] to the nanosecond, so that stamps that are even but for rounding are even."""
     return round(dt / _EVEN) * _EVEN
 
 
@@ -122,7 +123,7 @@ def step_of(dt: float) -> float:
 def congruent(P: Array, moving: Indices, F: Array, Q: Array, work: Array) -> None:
     """F P F^T + Q in the place of P (n, n), symmetric to the last digit; ``work`` (d, n) is used up.
 
-    ``F`` and ``Q`` (d, d) are of the states at ``moving`` (d,) alone; the others stay as they are.
+    ``F`` and ``Q`` (d, d) are of the states at ``moving`` (d,) alone; the others do not change.
     """
     n, d = len(P), len(F)
     for i in range(d):
@@ -226,18 +227,16 @@ def root(variance: float) -> float:
 
 @kernel
 def significant(value: float, variance: float) -> float:
-    """Share of a rate or an acceleration that is more than noise, 0 to 1: 1 - 9 P / x^2, none below three
-    deviations."""
+    """Share of a rate or an acceleration above noise, 0 to 1: 1 - 9 P / x^2, and 0 below three deviations."""
     squared = value * value  # which may be zero where the value is not
     return max(0.0, 1.0 - 9.0 * variance / squared) if squared > 0.0 else 0.0
 
 
 @kernel
 def believed(row: Row, places: Places, of_rate: float, of_acceleration: float) -> None:
-    """Take from a row what it says of positions and of the gyro's scale by a motion that is but noise.
+    """Remove from a row the derivatives by positions and by the gyro's scale where the motion is only noise.
 
-    They multiply rate and acceleration. Of a model at rest the filter would learn them from the noise of these, and be
-    sure of what is not so.
+    They multiply rate and acceleration. At rest the filter would learn them from noise, and be sure of wrong values.
     """
     at, values, size = row.places, row.values, row.size[0]
     count, moved = places.accelerometers, max(of_rate, of_acceleration)

@@ -131,7 +131,7 @@ _USUAL = 1e-3
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0)
 
 _NEAR_VERTICAL = 1e-4
-"""What is added to cos^2 theta, so that roll stays finite where it is not defined."""
+"""Addition to cos^2 theta, so that roll stays finite where it is not defined."""
 
 
 @kernel

@@ -1,10 +1,21 @@
 """The causal fusion, row by row or in blocks: the same digits either way.
 
 The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
-as over a long gap, rows are held again, and the filter starts anew with all that it has learned of its sensors; with
-the prior where it was lost because sensors did not cease to contradict it. Over hours what it learned fades
-(`inercal.aoa.fusion.fading`).
-Rows must be later than those before them: `inercal.aoa.reading.clock` leaves out those that are not.
+as over a long gap, rows are held again, and the filter starts anew with the errors of the sensors that it has learned;
+with the prior where it was lost because sensors kept contradicting it. Rows must be later than those before them:
+`inercal.aoa.reading.clock` leaves out those that are not.
+
+Fading: a row is linearised at a motion that is itself estimated, so it says a little too much about the constants,
+always in the same sense. Within a minute that is small beside u. But a combination that a motion hardly shows (under
+one sine the gyro's scale, positions and heights together, which only harmonics separate) is carried away, and the
+angle with it: in 600 s of 10 deg at 1 Hz by one standard deviation of the prior at 1 kHz, by eight at 100 Hz. So from
+`MEMORY` on the information of the data on the constants fades with that time constant, and that of the prior does not;
+in information, each `FADING_STEP`,
+
+    P'^-1 = (1 - e) P^-1 + e P0^-1        P'^-1 x' = (1 - e) P^-1 x + e P0^-1 x0
+
+with x0, P0 the prior. A constant that the data show well stays as sure as `MEMORY` makes it, one that they hardly show
+stays at its prior, and a bias that wanders is followed.
 """
 
 from __future__ import annotations
@@ -14,12 +25,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion import loop
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.model import GYRO_BIAS
 from inercal.aoa.fusion.problem import START, FilterProblem
 from inercal.aoa.reading.clock import HELD
 from inercal.arrays import Array
+
+MEMORY = 60.0
+"""Time [s] from the first row on in which nothing fades, and the time constant after it."""
+
+FADING_STEP = 10.0
+"""Interval [s] at which constants fade."""
+
+_FIRST = math.floor(MEMORY / FADING_STEP)
 
 _ACROSS = 0.1
 """Cosine of the roll below which the accelerometers across the body and the gyro do not show pitch."""
@@ -47,8 +66,9 @@ class State(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where the filter started: the row, counted in the trace, its state before that row's update, whether all of it is
-    of the prior, as at first and after surprises that did not end, and the stamp [s] from which it has learned."""
+    """A start of the filter: the ``row``, counted in the trace, the state before the update of that row, ``anew`` where
+    all of it is of the prior, as at first and after surprises without end, and ``since`` [s] the row from which it has
+    learned."""
 
     row: int
     x: Array
@@ -60,7 +80,7 @@ class Start(NamedTuple):
 
 class Trace(NamedTuple):
     """Estimates of the filter at m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.fusion.loop.advance`, and its
-    ``starts`` in them."""
+    ``starts``."""
 
     out: Array
     starts: tuple[Start, ...]
@@ -93,7 +113,7 @@ def advance(
     `inercal.aoa.fusion.loop.advance`.
 
     The state handed in is used up. Rows that are held have no row in the trace yet: it comes with a later block, or at
-    the end, which ``last`` says. ``kept`` receives states and their standard deviations at each ``every``-th row of the
+    the end, if ``last``. ``kept`` receives states and their standard deviations at each ``every``-th row of the
     trace.
     """
     if kept is None:
@@ -112,7 +132,7 @@ def advance(
                 break
             out[at:end] = np.nan
             anew = bool((turns[2:] >= loop.PATIENCE).any())
-            if anew:  # neither is to be believed what was learned of the sensors
+            if anew:  # the learned errors of the sensors are not to be believed either
                 x[:], P[:] = problem.mean, problem.covariance
             if not start(x, P, turns, problem, t[at:end], rows[at:end]):
                 at = end
@@ -120,12 +140,12 @@ def advance(
             since = float(t[at]) if anew or math.isnan(since) else since
             starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew, since))
             dt[at] = 0.0
-        elif steps := fading.due(float(t[at - 1]) if at else before, float(t[at]), since):
-            fading.fade(x, P, problem, steps)
-        stop = fading.next_due(t, at, since)
+        elif steps := fading_steps(float(t[at - 1]) if at else before, float(t[at]), since):
+            fade(x, P, problem, steps)
+        stop = next_fading(t, at, since)
         part = Rows(dt[at:stop], rows[at:stop])
         done = loop.advance(Belief(x, P, turns), part, problem.model, out[at:stop], Kept(kept, every, at))
-        # what is lost in the row in which it started is no angle
+        # an angle that is lost in the row of its start is none
         at, running = (at + done, at + done == stop) if done or running else (end, False)
     before = float(t[at - 1]) if at else before
     held = np.column_stack([t[at:], rows[at:]])
@@ -133,19 +153,18 @@ def advance(
 
 
 def unknown(problem: FilterProblem) -> list[int]:
-    """Places of the states that a start does not know from before: motion, flexure of the sting, and roll, of which a
-    gap tells as little."""
+    """Places of the states that a start finds anew: motion, flexure of the sting, and roll."""
     flexure, roll = problem.places.resonators, problem.places.roll
     of_flexure = range(flexure, flexure + 4) if flexure >= 0 else ()
     return [0, 1, 2, 3, *of_flexure, *((roll,) if roll >= 0 else ())]
 
 
 def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, rows: Array) -> bool:
-    """Put motion into ``x`` and ``P`` as a few rows tell it at the first of them; False where they tell no angle.
+    """Put the motion at the first of a few rows into ``x`` and ``P``; False where these show no angle.
 
-    Theta is that which fits the medians of the accelerometers best, the rate the gyro's or, without one, that at which
-    theta changes, and the acceleration what is left over (Tan et al. with three axes: atan2(A2, (A3 - A1)/2) and
-    (A1 + A3)/(r3 - r1)). What else is `unknown` is as in the prior, what is known of the sensors stays.
+    Theta fits the medians of the accelerometers best, the rate is the gyro's or, without one, the slope of theta, and
+    the acceleration fits the rest (Tan et al. with three axes: atan2(A2, (A3 - A1)/2) and (A1 + A3)/(r3 - r1)). The
+    other `unknown` states are set to the prior; errors of the sensors stay.
     """
     n, spatial = problem.count, problem.spatial
     new = unknown(problem)
@@ -211,3 +230,43 @@ def _slope(t: Array, angles: Array) -> float:
         return 0.0
     t, angles = t[finite] - t[finite].mean(), np.unwrap(angles[finite])
     return float(t @ angles / (t @ t))
+
+
+def fading_steps(before: float, t: float, since: float) -> int:
+    """Number of steps of fading due before the row at ``t`` [s]; ``before`` [s] is the row before it, and ``since`` [s]
+    the row from which the filter has learned."""
+    late, early = math.floor((t - since) / FADING_STEP), math.floor((before - since) / FADING_STEP)
+    return max(late, _FIRST) - max(early, _FIRST)
+
+
+def next_fading(t: Array, at: int, since: float) -> int:
+    """The first row after ``at`` of ``t`` (m,) [s], increasing, before which constants fade; m where none is."""
+    passed = max(math.floor((t[at] - since) / FADING_STEP), _FIRST) + 1
+    # rounding may have it a row earlier or later
+    k = max(at + 1, int(np.searchsorted(t, since + passed * FADING_STEP)) - 1)
+    while k < len(t) and not fading_steps(float(t[k - 1]), float(t[k]), since):
+        k += 1
+    return k
+
+
+def fade(x: Array, P: Array, problem: FilterProblem, steps: int) -> Array:
+    """Let the constants of the state ``x`` (n,), ``P`` (n, n) fade by so many steps, in place.
+
+    Returns F (n, n) of x' = F x + the part of the prior. States that move do not change.
+    """
+    kept = math.exp(-FADING_STEP * steps / MEMORY)
+    prior, F = problem.covariance, np.eye(len(x))
+    at = np.array([k for k in problem.nuisances.values() if prior[k, k] > 0.0], dtype=int)
+    if not len(at):
+        return F
+    scale, own = np.sqrt(np.diag(prior)[at]), np.ix_(at, at)
+    units = np.outer(scale, scale)
+    current, given = P[own] / units, prior[own] / units
+    mixed = current @ np.linalg.pinv(kept * given + (1.0 - kept) * current, hermitian=True)
+    F[own] -= (1.0 - kept) * mixed * np.outer(scale, 1.0 / scale)
+    x[at] = problem.mean[at] + F[own] @ (x[at] - problem.mean[at])
+    P[at] = F[own] @ P[at]
+    P[:, at] = P[at].T
+    faded = mixed @ given * units
+    P[own] = 0.5 * (faded + faded.T)
+    return F

@@ -8,9 +8,9 @@ filter's rows are gone through backward, each scalar with the row, gain and vari
 
 and between the row's last scalar and the next row x_s = x - P lam, P_s = P - P Lam P, of the filter's x and P after
 the row: those before it are so wide where the filter starts that digits would be lost. No covariance is inverted. The
-filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, to
-have its rows; so memory goes with the block and not with the recording. What is known of constants fades between blocks
-(`inercal.aoa.fusion.fading`), lam := F^T lam there too.
+filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, for
+its rows; so memory grows with the block and not with the recording. Constants fade between blocks
+(`inercal.aoa.fusion.run`), lam := F^T lam there too.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
-from inercal.aoa.fusion import fading, loop
+from inercal.aoa.fusion import loop
 from inercal.aoa.fusion.loop import NOT_KEPT, OUTPUTS, Belief, Kept, Memory, Rows, congruent, root, write
 from inercal.aoa.fusion.model import Model
 from inercal.aoa.fusion.problem import FilterProblem
-from inercal.aoa.fusion.run import Start, unknown
+from inercal.aoa.fusion.run import Start, fade, fading_steps, next_fading, unknown
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def smooth(
     t, rows
         As `inercal.aoa.fusion.run.advance` took them.
     starts : tuple of Start
-        Where the filter started: between two of them motion is not connected, while what is known of sensors is.
+        Starts of the filter: the motion is not continuous across them, the errors of the sensors are.
     kept : (k, 2 n) or None
         Receives states and standard deviations at each ``every``-th row.
     """
@@ -90,9 +90,9 @@ def _stretch(
     heads = []
     a = 0
     while a < len(dt):
-        steps = fading.due(float(t[a - 1]), float(t[a]), begin.since) if a else 0
-        F = fading.fade(belief.x, belief.P, problem, steps) if steps else None
-        block = slice(a, min(a + BLOCK, fading.next_due(t, a, begin.since)))
+        steps = fading_steps(float(t[a - 1]), float(t[a]), begin.since) if a else 0
+        F = fade(belief.x, belief.P, problem, steps) if steps else None
+        block = slice(a, min(a + BLOCK, next_fading(t, a, begin.since)))
         heads.append((block, _apart(*belief), F))
         done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal)
         if done < len(dt[block]):

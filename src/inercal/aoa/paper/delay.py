@@ -1,4 +1,4 @@
-"""How much later than the accelerometers the gyro tells of a motion, from their cross-spectrum.
+"""Delay of the gyro against the accelerometers, from their cross-spectrum.
 
 The angular acceleration a that the accelerometers show, (A1 + A3)/(r3 - r1) for three axes, and the derivative b of the
 gyro's rate are the same motion. A delay tau of the gyro turns the phase of their cross-spectrum S(f) by 2 pi f tau; the
@@ -38,8 +38,8 @@ _CHANCE = 1e-6
 """Probability that a spectrum of noise alone has a frequency that counts as coherent."""
 
 _OVERLAP = 2.0 * 0.59375 / 0.5625
-"""What Hann windows that overlap by half add to the variance, against independent segments and frequencies: with W the
-sum of the squared windows over time, 2 mean(W^2) / mean(W)^2."""
+"""Factor by which Hann windows that overlap by half enlarge the variance over that of independent segments and
+frequencies: with W the sum of the squared windows over time, 2 mean(W^2) / mean(W)^2."""
 
 _BRIDGED = 5
 """Samples in a row that straight lines may stand for; of more, as of a saturated gyro, the phase is not that of the
@@ -112,26 +112,26 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     size = round(min(max((t[-1] - t[0]) / _SEGMENTS, _SHORTEST), _LONGEST) / step)
     if not 2 <= size <= len(grid):
         return None
-    tau, found = 0.0, None
+    tau, delay = 0.0, None
     for _ in range(_ROUNDS):
         # beside a line of the spectrum the phase is that of the line: only where all is aligned is it the right one
         moved = _interpolated(grid, gyro, grid + tau)
         if not np.isfinite(moved).any():
             return None
         turned = np.gradient(_bridged(grid, moved), step)
-        found = _most_likely(*_spectra(shown, turned, missing, size), 1.0 / (size * step))
-        if found is None:
+        delay = _most_likely(*_spectra(shown, turned, missing, size), 1.0 / (size * step))
+        if delay is None:
             return None
-        tau += found.value
-        if abs(found.value) < _SETTLED * found.u:
+        tau += delay.value
+        if abs(delay.value) < _SETTLED * delay.u:
             break
-    return None if found is None else replace(found, value=tau)
+    return None if delay is None else replace(delay, value=tau)
 
 
 def _bridged(t: Array, values: Array) -> Array:
     """Values with straight lines where they are missing."""
-    known = np.isfinite(values)
-    return np.interp(t, t[known], values[known])
+    finite = np.isfinite(values)
+    return np.interp(t, t[finite], values[finite])
 
 
 def _spectra(a: Array, b: Array, missing: NDArray[np.bool_], size: int) -> tuple[Array, Array, int]:
@@ -212,6 +212,6 @@ def _interpolated(t: Array, values: Array, at: Array) -> Array:
         for m, k in enumerate((a, j, j + 1, d)):
             others = [y for i, y in enumerate(x) if i != m]
             cubic += values[k] * math.prod((s - y) / (x[m] - y) for y in others)
-    found = np.where(inside & np.isfinite(cubic), cubic, line)
+    curve = np.where(inside & np.isfinite(cubic), cubic, line)
     usable = (s > -_ROUNDING) & (s < 1.0 + _ROUNDING) & (gap < _LONG * np.median(np.diff(t)))
-    return np.where(usable, found, np.nan)
+    return np.where(usable, curve, np.nan)

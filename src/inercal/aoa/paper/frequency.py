@@ -59,10 +59,10 @@ def oscillation_frequency(t: Array, acc: Array, gyro: Array, layout: Layout) -> 
     layout : Layout
         Without axes that show angular acceleration there is no frequency.
     """
-    found = np.full(len(t), np.nan)
+    nowhere = np.full(len(t), np.nan)
     weights = all_weights(layout)
     if weights is None or len(t) < 2:
-        return found
+        return nowhere
     usual = round(float(np.median(np.diff(t[: _FIRST + 1]))), 9)
     t = shortened(t, 2.0 * WINDOW)  # no window reaches over such a gap
     width = usual * max(1, round(_FINE / usual))
@@ -85,10 +85,10 @@ def _places(t: Array, width: float) -> NDArray[np.int64]:
 
 def _averaged(t: Array, values: Array, width: float) -> Array:
     """Means over intervals of ``width``, NaN where there is no value."""
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     place = _places(t, width)
-    total = np.bincount(place[known], values[known], place[-1] + 1)
-    count = np.bincount(place[known], minlength=place[-1] + 1)
+    total = np.bincount(place[finite], values[finite], place[-1] + 1)
+    count = np.bincount(place[finite], minlength=place[-1] + 1)
     return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
@@ -117,9 +117,9 @@ def _peak(shaking: Array, turning: Array, begin: int, end: int, width: float) ->
 
 def _power(values: Array, padded: int) -> Array:
     """Power spectrum of values less their mean through a Hann window; zero of values that are mostly missing."""
-    known = np.isfinite(values)
-    if 2 * known.sum() < len(values):
+    finite = np.isfinite(values)
+    if 2 * finite.sum() < len(values):
         return np.zeros(padded // 2 + 1)
     window = np.hanning(len(values) + 2)[1:-1]
-    centred = np.where(known, values, 0.0) - np.where(known, values[known].mean(), 0.0)
+    centred = np.where(finite, values, 0.0) - np.where(finite, values[finite].mean(), 0.0)
     return np.asarray(np.abs(np.fft.rfft(window * centred, padded)) ** 2)

@@ -1,7 +1,7 @@
 """Freeing the readings of a moving model from its lever-arm terms, as Tan et al. 2021 do; every axis by its geometry.
 
-With q and p the arms of `inercal.aoa.arms`, w the gyro's rate and al the angular acceleration, A - (-q w^2 + p al) is
-what the axis would read at rest. What each way leaves is in `inercal.aoa.paper.residuals` in closed form.
+With q and p the arms of `inercal.aoa.arms`, w the gyro's rate and al the angular acceleration, the axis would read
+A - (-q w^2 + p al) at rest. `inercal.aoa.paper.residuals` has the error that each way leaves in closed form.
 """
 
 from __future__ import annotations
@@ -75,9 +75,9 @@ def peak_rate(t: Array, gyro: Array, noise: float) -> Array:
 
     sqrt(2) times the root of the mean square less that of the noise: single samples would be those of the noise.
     """
-    known = np.isfinite(gyro)
-    total = np.concatenate([[0.0], np.cumsum(np.where(known, gyro, 0.0) ** 2)])
-    count = np.concatenate([[0], np.cumsum(known)])
+    finite = np.isfinite(gyro)
+    total = np.concatenate([[0.0], np.cumsum(np.where(finite, gyro, 0.0) ** 2)])
+    count = np.concatenate([[0], np.cumsum(finite)])
     begin = np.searchsorted(t, t - 0.5 * WINDOW)
     end = np.searchsorted(t, t + 0.5 * WINDOW, side="right")
     mean = (total[end] - total[begin]) / np.maximum(count[end] - count[begin], 1)
@@ -89,9 +89,9 @@ def differentiated(t: Array, gyro: Array, level: float) -> Array:
 
     Its noise is sqrt(2) dw / dt, and it is late by half an interval. NaN in the first row.
     """
-    found = np.full(len(t), np.nan)
-    found[1:] = np.diff(gyro) / (level * np.diff(t))
-    return found
+    acceleration = np.full(len(t), np.nan)
+    acceleration[1:] = np.diff(gyro) / (level * np.diff(t))
+    return acceleration
 
 
 def dual(layout: Layout, level: float) -> tuple[Array, Array]:

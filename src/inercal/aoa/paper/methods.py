@@ -13,8 +13,8 @@ from inercal.aoa.angles import Angles, continuous
 from inercal.aoa.arms import all_weights, level_of, tangential_arms
 from inercal.aoa.paper import lever, static
 from inercal.aoa.paper.delay import aligned, relative_delay
-from inercal.aoa.paper.error_terms import in_motion
 from inercal.aoa.paper.lowpass import zero_phase
+from inercal.aoa.paper.residuals import error_terms
 from inercal.aoa.paper.static import spread
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
@@ -40,11 +40,11 @@ MEASURED = (
     Methods(tangential="none"),
     Methods(centrifugal="none", tangential="none"),
 )
-"""What is measured side by side where methods are compared: the paper's own choice first."""
+"""Methods of a comparison, the paper's own choice first."""
 
 
 def label(methods: Methods) -> str:
-    """Such as ``improved, mechanical, dual``."""
+    """Name of the methods, such as ``improved, mechanical, dual``."""
     return f"{methods.static}, {methods.centrifugal}, {methods.tangential}"
 
 
@@ -54,10 +54,10 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
     The gyro is shifted first, by its delay that the study states or that is estimated from the whole recording; the
     delay common to all sensors is made up for at the end by theta' tau. A roll is that which the study states.
 
-    Where accelerometers are missing in a row, what is left of them is used if the methods can, otherwise there is no
-    angle. Its uncertainty is of first order, by noise, biases and the prior of positions and gyro scale
-    (`inercal.aoa.paper.error_terms`), and terms that the methods leave in count as errors of their own size. Flexure
-    of the sting is not in it.
+    A row in which accelerometers are missing uses the others if the methods can; otherwise it has no angle. The
+    uncertainty is of first order, by noise, biases and the prior of positions and gyro scale
+    (`inercal.aoa.paper.residuals.error_terms`), and terms that the methods leave in count as errors of their own size.
+    Flexure of the sting is not in it.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
             w, al = np.nan_to_num(rate[rows]), np.nan_to_num(acceleration[rows])
             errors = [
                 (weight, dual @ matrix @ dual.T)
-                for weight, matrix in in_motion(
+                for weight, matrix in error_terms(
                     settings, methods.tangential, layout, level, w, al, compensated[rows], step
                 )
             ]
@@ -114,19 +114,18 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
 def low_passed(angles: Angles, t: Array, cutoff: float = LOW_PASS) -> Angles:
     """Angles (n,) at the times ``t`` [s] after a zero-phase low pass (Butterworth, gain 1/2 at ``cutoff`` [Hz]).
 
-    For comparison with the fusion only: it looks ahead, and it takes what is faster than the cutoff out of the angle
-    itself. The uncertainty stays: that of biases, which no filter lowers, and of noise as it was before, an upper
-    bound.
+    For comparison with the fusion only: it looks ahead, and it takes motion faster than the cutoff out of the angle
+    itself. The uncertainty stays, as an upper bound: no filter lowers the part of biases.
     """
     taken = later(t)
     smooth = zero_phase(t[taken], continuous(angles.theta[taken]), cutoff, _ORDER)
-    found = np.full(len(t), np.nan)
-    found[taken] = principal(smooth)
-    return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=found)
+    theta = np.full(len(t), np.nan)
+    theta[taken] = principal(smooth)
+    return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=theta)
 
 
 def _needs(recording: Recording, settings: AoaSettings, methods: Methods, level: float) -> None:
-    """Raise what is missing for all rows alike."""
+    """Refuse methods that lack sensors in all rows."""
     layout = settings.layout
     if methods.tangential == "dual":
         lever.dual(layout, level)
@@ -139,14 +138,14 @@ def _needs(recording: Recording, settings: AoaSettings, methods: Methods, level:
 
 
 def _alike(acc: Array) -> Iterator[tuple[NDArray[np.intp], list[int]]]:
-    """Rows in which the same accelerometers are there, and which these are; none of rows without any."""
-    known = np.isfinite(acc)
+    """Rows with the same accelerometers, and these accelerometers; rows without any are left out."""
+    finite = np.isfinite(acc)
     kind = np.zeros(len(acc), dtype=np.int64)
     for k in range(acc.shape[1]):
-        kind = 2 * kind + known[:, k]
+        kind = 2 * kind + finite[:, k]
     for each in np.unique(kind[kind > 0]):
         rows = np.flatnonzero(kind == each)
-        seen = [int(k) for k in np.flatnonzero(known[rows[0]])]
+        seen = [int(k) for k in np.flatnonzero(finite[rows[0]])]
         yield rows, seen
 
 
@@ -177,6 +176,6 @@ def _at_stamps(
         u = np.sqrt(u**2 + (moving * tau_u) ** 2 + (tau * np.nan_to_num(rate_u)) ** 2)
         rate_u = np.hypot(rate_u, acceleration * tau_u)
         rate = rate + tau * acceleration
-    found = np.full((4, len(recording.t)), np.nan)
-    found[:, taken] = theta, u, rate, rate_u
-    return Angles(label(methods), *found)
+    columns = np.full((4, len(recording.t)), np.nan)
+    columns[:, taken] = theta, u, rate, rate_u
+    return Angles(label(methods), *columns)

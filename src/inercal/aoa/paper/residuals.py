@@ -1,8 +1,13 @@
-"""What the paper's ways of freeing readings from lever-arm terms leave, in closed form.
+"""Errors left by the paper's ways of freeing readings from lever-arm terms: in closed form, and as a covariance.
 
 The model oscillates, theta = theta_0 + theta_m sin Om t, with the peak rate X = theta_m Om; dA [m/s^2] and dw [rad/s]
 are the errors of an accelerometer and of the gyro, L = r_3 - r_1 the arm of the dual accelerometer. Source: Tan et al.
 2021, worked out; accelerations in m/s^2, angles in rad.
+
+The covariance (`error_terms`) is of noise and biases of accelerometers and gyro, of the prior of positions and gyro
+scale, and of lever-arm terms that were left in, by the reading A - q w^2 + p al of `inercal.aoa.arms`: an error of r
+enters as -(w^2 cos lambda + c al sin lambda), one of z as c^2 w^2 sin lambda - c al cos lambda, and an error e of the
+rate through compensation as 2 q w e.
 """
 
 from __future__ import annotations
@@ -11,20 +16,26 @@ import math
 
 import numpy as np
 
+from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
+from inercal.aoa.layout import Layout
+from inercal.aoa.paper.static import Errors
+from inercal.aoa.settings import AoaSettings, Tangential
+from inercal.arrays import Array
+
 DECISION = 2.0 + math.sqrt(6.0)
-"""X/dw at which low pass and mechanical compensation leave as much: X^2/2 = 2 X dw + dw^2."""
+"""X/dw at which low pass and mechanical compensation leave the same error: X^2/2 = 2 X dw + dw^2."""
 
 _LARGEST = 20.0
 """Standard deviations that no sample exceeds."""
 
 
 def low_pass(r: float, peak_rate: float) -> float:
-    """r X^2/2: what is left of the centrifugal term where a low pass removes its cosine [m/s^2]."""
+    """r X^2/2 [m/s^2]: the rest of the centrifugal term where a low pass removes its cosine."""
     return 0.5 * r * peak_rate**2
 
 
 def mechanical(r: float, peak_rate: float, gyro_error: float) -> float:
-    """r (2 X dw + dw^2), at the peak of the rate: what is left where the gyro's square is added [m/s^2]."""
+    """r (2 X dw + dw^2) [m/s^2]: the rest, at the peak of the rate, where the gyro's square is added."""
     return r * (2.0 * peak_rate * gyro_error + gyro_error**2)
 
 
@@ -42,7 +53,7 @@ def decision_frequency(amplitude: float, gyro_error: float) -> float:
 
 
 def untreated(peak_rate: float, frequency: float) -> float:
-    """theta_m Om^2: the angular acceleration [rad/s^2] that is left in the tangential term where it is left alone."""
+    """theta_m Om^2: the angular acceleration [rad/s^2] in a tangential term that is not compensated."""
     return 2.0 * math.pi * frequency * peak_rate
 
 
@@ -76,7 +87,7 @@ def may_be_left(error: float, arm: float) -> float:
 
 
 def late(peak_rate: float, delay: float) -> float:
-    """Error of the angle [rad] of an output that is late by a ``delay`` [s]: theta' tau."""
+    """Error of the angle [rad] by a ``delay`` [s] of an output: theta' tau."""
     return peak_rate * delay
 
 
@@ -86,7 +97,7 @@ def sampled(
     """Largest error [rad] of the angle over ``samples`` of mechanical compensation by a gyro with white noise, no bias.
 
     2 r2 |w| dw n cos theta_0 / g about the ``mean`` theta_0, where the rate w of the sine is largest; n is the noise of
-    one sample over its deviation. Given is the level that is exceeded once on average.
+    one sample over its deviation. The level returned is exceeded once on average.
     """
     from scipy.optimize import brentq
     from scipy.special import ndtr
@@ -99,3 +110,74 @@ def sampled(
         return float(samples * each.mean()) - 1.0
 
     return unit * float(brentq(exceeding, 0.0, _LARGEST))
+
+
+def error_terms(
+    settings: AoaSettings,
+    tangential: Tangential,
+    layout: Layout,
+    level: float,
+    rate: Array,
+    acceleration: Array,
+    compensated: Array,
+    step: float,
+) -> Errors:
+    """Error covariances of the readings; first the one that is the same in all rows.
+
+    Parameters
+    ----------
+    settings : AoaSettings
+        Its noise and prior.
+    tangential : "none", "differentiated" or "dual"
+        How p al was taken off.
+    layout : Layout
+        Of the N accelerometers that are used.
+    level : float
+        Cosine of the roll.
+    rate, acceleration : (n,) rad/s, rad/s^2
+        0 where not known.
+    compensated : (n,) 0 or 1
+        1 where q w^2 of the gyro was added to the readings; elsewhere the term counts as an error of its own size, as
+        does p al where it was left in.
+    step : float
+        Interval [s] of the gyro's samples, for their differences.
+    """
+    prior, noise, n = settings.prior, settings.noise, len(layout.names)
+    q, p = centrifugal_arms(layout, level), tangential_arms(layout, level)
+    cosine, sine = np.cos(layout.angle), np.sin(layout.angle)
+    of_r = prior.lever_common**2 + prior.lever**2 * np.eye(n)
+    of_z = prior.height**2 * np.eye(n)
+    r_w, r_al = np.diag(-cosine), np.diag(-level * sine)
+    z_w, z_al = np.diag(level**2 * sine), np.diag(-level * cosine)
+    ww, wa, aa = (
+        first @ of_r @ second + third @ of_z @ fourth
+        for first, second, third, fourth in (
+            (r_w, r_w, z_w, z_w),
+            (r_w, r_al, z_w, z_al),
+            (r_al, r_al, z_al, z_al),
+        )
+    )
+    w2, gyro = rate**2, noise.gyro**2 / level**2
+    both = gyro + noise.gyro_bias**2 / level**2
+    qq = np.outer(q, q)
+    half = 0.5 * noise.accelerometer_bias**2  # of the biases is common
+    always, doubt = (noise.accelerometer**2 + half) * np.eye(n) + half, 0.0
+    if tangential == "differentiated":
+        doubt = 2.0 * gyro / step**2
+        always = always + doubt * np.outer(p, p)
+    errors: list[tuple[Array | float, Array]] = [
+        (1.0, always),
+        (w2 * compensated, 4.0 * both * qq),
+        (w2 * w2 * compensated, 4.0 * prior.gyro_scale**2 * qq),
+        (w2 * w2 * (1.0 - compensated), qq),
+        (w2 * w2, ww),
+        (w2 * acceleration, wa + wa.T),
+        (acceleration**2 + doubt, aa),
+    ]
+    if tangential == "none" and (weights := all_weights(layout)) is not None:
+        of_noise = (noise.accelerometer / level) ** 2 * float(weights @ weights)
+        errors.append((np.maximum(acceleration**2 - of_noise, 0.0), np.outer(p, p)))
+    if tangential == "differentiated":
+        cross = np.outer(q, p)
+        errors.append((rate * compensated, -2.0 * gyro / step * (cross + cross.T)))
+    return [(weight, matrix) for weight, matrix in errors if matrix.any()]

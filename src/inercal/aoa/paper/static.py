@@ -1,9 +1,9 @@
 """The angle of a model at rest from the readings of N accelerometers along any axes, in five ways.
 
 At rest axis i reads A_i = g h_i . (sin theta, cos theta), h_i = (cos lambda_i, -c sin lambda_i) with c the cosine of
-the roll; in motion the readings are to be freed of lever-arm terms before (`inercal.aoa.paper.lever`). Each way gives,
-beside the angle, by how much it errs with each reading (`Still.gain`): `spread` makes its uncertainty of that, and
-`bound` what errors of a given size may do.
+the roll; in motion the readings are to be freed of lever-arm terms before (`inercal.aoa.paper.lever`). Each way gives
+the angle and its derivatives by the readings (`Still.gain`): from these `spread` computes the uncertainty, and `bound`
+the effect of errors of a given size.
 
 Sources: Tan et al. 2021 for segmented, complementary and improved; `difference` and `gls` are ours.
 """
@@ -30,13 +30,13 @@ Errors: TypeAlias = Sequence[tuple[Array | float, Array]]
 """Error covariance of the readings at n rows: the sum of weights (n,) times matrices (N, N) [(m/s^2)^2]."""
 
 _BACKWARD = 1.0 - 1e-9
-"""What an axis that looks backward counts for, so that of two antiparallel axes that which looks forward is taken."""
+"""Weight of an axis that looks backward, so that of two antiparallel axes the forward one is taken."""
 
 _LATER = 1e-9
-"""What a later pair of axes counts as worse by, so that of two that are opposite the first is taken."""
+"""Penalty of a later pair of axes, so that of two opposite pairs the first is taken."""
 
 _FLAT = 1e-2
-"""Slope of a reading over g against theta below which it is taken to be that."""
+"""Smallest slope of a reading over g against theta; smaller ones are replaced by it."""
 
 _ROUNDS = 10
 _CONVERGED = 1e-11
@@ -44,7 +44,7 @@ _NO_WEIGHT = 1e-9
 
 
 class Still(NamedTuple):
-    """``theta`` (n,) [rad] within (-pi, pi], and ``gain`` (n, N) [rad s^2/m], by how much it errs with each reading."""
+    """``theta`` (n,) [rad] within (-pi, pi], and ``gain`` (n, N) [rad s^2/m], its derivative by each reading."""
 
     theta: Array
     gain: Array
@@ -201,7 +201,7 @@ def spread(gain: Array, errors: Errors) -> Array:
 
 
 def bound(gain: Array, size: float, kind: Literal["alike", "independent", "any"]) -> Array:
-    """(n,) rad: what errors of one ``size`` [m/s^2] in each axis do to the angle, to first order.
+    """(n,) rad: error of the angle by errors of one ``size`` [m/s^2] in each axis, to first order.
 
     ``alike``: equal with their signs; ``independent``: standard deviation of random ones; ``any``: the worst signs.
     """
@@ -220,7 +220,7 @@ def _axes(layout: Layout, level: float) -> Array:
 
 
 def _pairs(layout: Layout, level: float) -> Array:
-    """(K, 2, N): for each pair of square axes what makes (sin theta, cos theta) of readings over g."""
+    """(K, 2, N): for each pair of square axes the matrix from readings over g to (sin theta, cos theta)."""
     h, square = axes(layout, level), layout.square()
     made = np.zeros((len(square), 2, len(h)))
     for matrix, (i, j) in zip(made, square, strict=True):
@@ -229,7 +229,7 @@ def _pairs(layout: Layout, level: float) -> Array:
 
 
 def _by_two(acc: Array, ways: Array, taken: Indices, gravity: float) -> Still:
-    """The angle of (sin theta, cos theta) that one of the ``ways`` (K, 2, N) makes of each row, by ``taken`` (n,)."""
+    """The angle of (sin theta, cos theta) by one of the matrices ``ways`` (K, 2, N) for each row, by ``taken`` (n,)."""
     theta, gain = np.empty(len(acc)), np.empty(acc.shape)
     for k, way in enumerate(ways):
         rows = slice(None) if len(ways) == 1 else taken == k
@@ -246,5 +246,5 @@ def _direction(force: Array) -> Array:
 
 
 def _slopes(direction: Array, h: Array) -> Array:
-    """(n, N): how h . (sin theta, cos theta) grows with theta."""
+    """(n, N): derivative of h . (sin theta, cos theta) by theta."""
     return np.asarray(direction[:, ::-1] @ (h * [1.0, -1.0]).T)

@@ -1,4 +1,4 @@
-"""Indications of a sensor as what it measures, in SI: of a whole record and of a single sample alike."""
+"""Indications of a sensor as measured values, in SI, for a whole record and for a single sample."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def check_unit(column: Column, how: Calibration, where: object) -> None:
     Raises
     ------
     RecordError
-        What the study's scale is for is not what the record holds.
+        The unit of the column is not that of the study's scale.
     """
     holds = _PER.get(column.unit.dimension, "1")
     if holds == how.per:
@@ -47,10 +47,10 @@ def indication(column: Column, values: Array) -> Array:
 
 
 def at_range(indicated: Array, measured: Array, how: Calibration) -> NDArray[np.bool_]:
-    """Which samples (m,) are at or beyond the range, ``measured`` or, of a column in physical units, ``indicated``.
+    """Mask (m,) of samples at or beyond the range, ``measured`` or, in a column of physical units, ``indicated``.
 
-    Such an output ends at its range before its bias is taken off; either way it is at an end. A range about a zero
-    point of some volts or counts is of what is measured alone.
+    An output in physical units ends at its range before its bias is taken off; either way it is at an end. With a zero
+    point of some volts or counts the range is that of the measured value alone.
     """
     if how.range is None:
         return np.zeros(np.shape(indicated), dtype=np.bool_)
@@ -60,17 +60,17 @@ def at_range(indicated: Array, measured: Array, how: Calibration) -> NDArray[np.
 
 
 def check_axes(there: Collection[str], columns: Iterable[str], layout: Layout, where: object) -> None:
-    """Refuse accelerometers ``there`` among ``columns`` that do not tell the angle all around.
+    """Refuse accelerometers ``there`` among ``columns`` that do not show the angle all around.
 
     Raises
     ------
     RecordError
-        There is none, or their axes are parallel.
+        There are none, or their axes are parallel.
     """
     if not there:
-        found = counted_names([*columns], 12) or "no columns"
+        names = counted_names([*columns], 12) or "no columns"
         raise RecordError(
-            where, f"found no accelerometer among {found}, expected t, {', '.join(layout.names)} and gyro"
+            where, f"found no accelerometer among {names}, expected t, {', '.join(layout.names)} and gyro"
         )
     if not layout.of(*(layout.names.index(name) for name in there)).spans:
         lacking = ", ".join(name for name in layout.names if name not in there) or "one of another axis"

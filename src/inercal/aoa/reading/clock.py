@@ -1,4 +1,4 @@
-"""Rows that go on in time, and those that do not; gaps of time, and what is put on an even grid."""
+"""Rows that go on in time, gaps of time, and the step of an even grid."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from inercal.arrays import Array
 from inercal.errors import RecordError
 
 PATIENCE = 1000
-"""Rows in a row without a later stamp that are left out; more are no accident."""
+"""Successive rows without a later stamp that are left out; more are no accident."""
 
 HELD = 20
 """Rows from which the filter starts."""
@@ -27,7 +27,7 @@ def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.
     Raises
     ------
     RecordError
-        So many rows in a row are not that the clock was set back.
+        `PATIENCE` successive rows are not later: the clock was set back.
     """
     before = np.maximum.accumulate(np.append(last, np.where(np.isnan(t), -np.inf, t)))
     taken = np.flatnonzero(t > before[:-1])
@@ -43,9 +43,8 @@ def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.
 
 
 def shortened(t: Array, longest: float) -> Array:
-    """Times ``t`` (n,) [s], increasing, with gaps above ``longest`` [s] made as long: a clock that jumped, or runs that
-    are hours apart, are not to be filled with hours of nothing.
-    """
+    """Times ``t`` (n,) [s], increasing, with gaps above ``longest`` [s] shortened to it: a clock that jumped, or runs
+    hours apart, must not make hours of an even grid."""
     excess = np.maximum(np.diff(t, prepend=t[:1]) - longest, 0.0)
     return t - np.cumsum(excess) if excess.any() else t
 

@@ -24,20 +24,20 @@ from inercal.records.temperature import recorded_temperature
 Flags = NDArray[np.bool_]
 
 _STUCK = 50
-"""Equal samples in a row that noise of the size of the steps makes with a probability below 1e-7."""
+"""Successive equal samples, which noise of the size of the steps makes with a probability below 1e-7."""
 
 _APART = 2.5
 """Intervals of another clock over which its samples are interpolated."""
 
 
 def recording_of(record: Record, settings: AoaSettings) -> Recording:
-    """The recording in a record, sensors calibrated as the study says, and what is to be said of it.
+    """The recording in a record, its sensors calibrated as the study states, with findings on them.
 
     Parameters
     ----------
     record : Record
-        ``t``, the accelerometers of the study's layout on one clock, and where there are such ``gyro``, ``gyro_roll``
-        and ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; those on clocks of their own are
+        ``t``, the accelerometers of the study's layout on one clock, and where present ``gyro``, ``gyro_roll`` and
+        ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; columns on other clocks are
         interpolated to that of the accelerometers.
     settings : AoaSettings
         Calibrations (indications, counts or volts, times scale less bias) and ranges by sensor.
@@ -45,8 +45,8 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     Returns
     -------
     Recording
-        One row for each row of the accelerometers. Samples that are missing, saturated (at or beyond the range that is
-        stated, or flat at an extreme) or stuck are NaN, and so are sensors that are not there; findings say which.
+        One row for each row of the accelerometers. Samples that are missing, saturated (at or beyond the stated
+        range, or flat at an extreme) or stuck are NaN, and so are absent sensors; findings name them.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     """
     where = record.sources[0].path if record.sources else "record"
     names = settings.layout.names
-    there = [name for name in names if name in record and _told(record[name], settings)]
+    there = [name for name in names if name in record and _speaks(record[name], settings)]
     check_axes(there, record.columns, settings.layout, where)
     t = record[there[0]].t
     for name in there[1:]:
@@ -72,7 +72,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         )
     usable_interval(float(np.median(np.diff(t[taken]))), where)
     rows = _Rows(record, settings, t, where)
-    gyros = [name for name in GYROS if name in record and _told(record[name], settings)]
+    gyros = [name for name in GYROS if name in record and _speaks(record[name], settings)]
     values = {name: rows.calibrated(name) for name in (*there, *gyros)}
     measured = [*names, GYROS[0]]
     lost = {name: _lost(record[name], settings, values) for name in (*there, *gyros)}
@@ -84,7 +84,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         if name in measured and record[name].t is t:
             masked[:, measured.index(name)] = out
         values[name] = on_rows
-        findings += _said(name, out, stuck, settings.calibration(name))
+        findings += _left_out(name, out, stuck, settings.calibration(name))
     findings += of_sensors(there, gyros, record, settings)
     both = all(name in gyros for name in GYROS[1:])
     turns = np.column_stack([values[name] if both else none for name in GYROS[1:]])
@@ -93,10 +93,10 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         acc=np.column_stack([values.get(name, none) for name in names]),
         gyro=values.get(GYROS[0], none),
         turns=turns,
-        stated=np.full((len(t), 2), np.nan),
+        zero_angle=np.full((len(t), 2), np.nan),
         point=rows.held("point"),
         trigger=rows.held("trigger"),
-        # told without jumps of a turn, which would be interpolated over, and spoil means
+        # without jumps of a turn, which would be interpolated over, and spoil means
         reference=rows.on_rows("theta_ref", continuous(record["theta_ref"].si()))
         if "theta_ref" in record
         else None,
@@ -107,14 +107,14 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     )
 
 
-def _told(column: Column, settings: AoaSettings) -> bool:
-    """True for a column that says something: numbers, and not always the same one where it should be noisy."""
+def _speaks(column: Column, settings: AoaSettings) -> bool:
+    """True for a column with numbers, which are not all the same where it should be noisy."""
     noise = settings.noise.gyro if column.name in GYROS else settings.noise.accelerometer
     return bool(np.isfinite(column.values).any()) and not (noise > 0.0 and is_dead(column.values))
 
 
 class _Rows:
-    """Columns of a record on the rows of its accelerometers, at ``t``; ``findings`` grow with what is said of them."""
+    """Columns of a record on the rows of its accelerometers, at ``t``; ``findings`` on them are collected."""
 
     def __init__(self, record: Record, settings: AoaSettings, t: Array, where: str) -> None:
         self.record, self.settings, self.t, self.where = record, settings, t, where
@@ -134,21 +134,21 @@ class _Rows:
             self.findings.append(Finding("not_stated", text, harm=EVERYTHING))
             return None
         column = self.record["temperature"]
-        known = later(column.t, where=self.where)
-        known = known[np.isfinite(column.values[known])]
-        return np.interp(self.record[name].t, column.t[known], column.si()[known])
+        usable = later(column.t, where=self.where)
+        usable = usable[np.isfinite(column.values[usable])]
+        return np.interp(self.record[name].t, column.t[usable], column.si()[usable])
 
     def on_rows(self, name: str, values: Array) -> Array:
         """(n,) of ``values`` (m,) on the column's own clock, linear between its samples; NaN where these are far.
 
-        A sensor with fewer than half as many samples speaks at the rows nearest to them alone.
+        A sensor with fewer than half as many samples has values at the rows nearest to them alone.
         """
         column = self.record[name]
         if column.t is self.t:
             return values
-        known = later(column.t, where=self.where)
-        theirs, values = column.t[known], values[known]
-        if len(known) < 2:
+        taken = later(column.t, where=self.where)
+        theirs, values = column.t[taken], values[taken]
+        if len(taken) < 2:
             return np.full(len(self.t), np.nan)
         interval = float(np.median(np.diff(theirs)))
         text = f"{name}: on a clock of its own of {1.0 / interval:.5g} Hz, interpolated to that of the accelerometers"
@@ -156,7 +156,7 @@ class _Rows:
         there = np.searchsorted(theirs, self.t).clip(1, len(theirs) - 1)
         out = np.interp(self.t, theirs, values, left=np.nan, right=np.nan)
         out[(theirs[there] - theirs[there - 1] > _APART * interval) | np.isnan(self.t)] = np.nan
-        if 2 * len(known) < len(self.t):
+        if 2 * len(taken) < len(self.t):
             mine = later(self.t, where=self.where)
             nearest = np.searchsorted(self.t[mine], theirs).clip(1, len(mine) - 1)
             nearest -= theirs - self.t[mine[nearest - 1]] < self.t[mine[nearest]] - theirs
@@ -166,15 +166,15 @@ class _Rows:
         return out
 
     def held(self, name: str) -> Array | None:
-        """(n,) numbers as of the last sample before each row; None where there is no such column."""
+        """(n,) numbers of the last sample before each row; None without the column."""
         if name not in self.record:
             return None
         column = self.record[name]
         if column.t is self.t:
             return column.values
-        known = later(column.t, where=self.where)
-        last = np.searchsorted(column.t[known], self.t, side="right") - 1
-        return np.where(last >= 0, column.values[known[last.clip(0)]], np.nan)
+        taken = later(column.t, where=self.where)
+        last = np.searchsorted(column.t[taken], self.t, side="right") - 1
+        return np.where(last >= 0, column.values[taken[last.clip(0)]], np.nan)
 
 
 def _lost(column: Column, settings: AoaSettings, values: dict[str, Array]) -> tuple[Flags, Flags]:
@@ -187,30 +187,30 @@ def _lost(column: Column, settings: AoaSettings, values: dict[str, Array]) -> tu
     noise = settings.noise.gyro if name in GYROS else settings.noise.accelerometer
     others = [other for key, other in values.items() if key != name and len(other) == len(read)]
     stuck = _stuck(read, noise / abs(how.scale * column.unit.factor), others)
-    # one that stands still at an extreme has met its range
-    known = read[np.isfinite(read)]
-    out |= stuck & ((read == known.max()) | (read == known.min()))
+    # a sensor that stands still at an extreme has met its range
+    finite = read[np.isfinite(read)]
+    out |= stuck & ((read == finite.max()) | (read == finite.min()))
     return out, stuck & ~out
 
 
 def _stuck(read: Array, noise: float, others: list[Array]) -> Flags:
     """Samples (m,) in long runs of one number that ``noise``, as large as the steps between numbers, would end while
     ``others`` go on."""
-    found = np.zeros(len(read), dtype=np.bool_)
+    stuck = np.zeros(len(read), dtype=np.bool_)
     step = np.abs(np.diff(read))
     moving = step > 0.0
     if not moving.any() or noise < step[moving].min():
-        return found
+        return stuck
     starts, ends = plateaus(step)
     long = ends - starts + 1 >= _STUCK
     for start, end in zip(starts[long], ends[long], strict=True):
         if any(np.any(np.diff(other[start : end + 1]) != 0.0) for other in others):
-            found[start : end + 1] = True
-    return found
+            stuck[start : end + 1] = True
+    return stuck
 
 
 def _findings_of(record: Record, lost: dict[str, tuple[Flags, Flags]]) -> list[Finding]:
-    """Findings of the record, less those that are said here again, with what becomes of it."""
+    """Findings of the record, without those that this module replaces by its own."""
     again = {f"{name}:" for name in lost}
     return [
         each
@@ -220,8 +220,8 @@ def _findings_of(record: Record, lost: dict[str, tuple[Flags, Flags]]) -> list[F
     ]
 
 
-def _said(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding]:
-    """What was left out of a sensor."""
+def _left_out(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding]:
+    """Findings on the samples of a sensor that are left out."""
     findings = []
     if rows := np.flatnonzero(out).tolist():
         where = "flat at an extreme" if how.range is None else "at or beyond the range, or flat at an extreme"
@@ -236,7 +236,7 @@ def _said(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding
 
 
 def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding]:
-    """Rows that do not go on in time."""
+    """Findings on rows that do not go on in time."""
     left = np.delete(np.arange(len(t)), taken)
     if not left.size:
         return []
@@ -255,8 +255,8 @@ def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding
 
 
 def of_sensors(there: list[str], gyros: list[str], record: Record, settings: AoaSettings) -> list[Finding]:
-    """Sensors that are not there or say nothing, accelerometers that the study does not know, and calibrations that
-    ended badly."""
+    """Findings on sensors that are absent or dead, accelerometers that the study does not know, and calibrations with a
+    bad verdict."""
     both = all(name in gyros for name in GYROS[1:])
     used = [*there, *(name for name in gyros if both or name == GYROS[0])]
     cautions = ((name, settings.calibration(name).caution) for name in used)

@@ -1,6 +1,6 @@
-"""Pauses of a model: where its angle stands still but for noise and buffet.
+"""Pauses of a model, in which its angle stands still but for noise and buffet.
 
-In a window of half a second the angle is a line and what scatters about it. The model rests where the line changes,
+In a window of half a second the angle is a line and its scatter. The model rests where the line changes,
 over the window, by less than three times that scatter and the angle's own uncertainty together: oscillations slower
 than some 2 Hz are motion, and a creep within the uncertainty counts as rest.
 
@@ -32,7 +32,7 @@ _FEWEST = 8
 _TIMES = 3.0
 
 _OF_RANGE = 1.0 / 20.0
-"""Scatter of a model at rest, of the range of the angle in the record, at most; and whatever that range,"""
+"""Largest scatter of a model at rest, over the range of the angle in the record; whatever that range,"""
 
 _SWING = (math.radians(0.1), math.radians(0.5))
 """at least and at most [rad]."""
@@ -41,8 +41,8 @@ _SWING = (math.radians(0.1), math.radians(0.5))
 def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
     """Pauses in angles ``theta`` (n,) [rad] of standard uncertainty ``u``, at times ``t`` (n,) [s], increasing.
 
-    Half a window beside a move is left out, and after a move so much of the pause, as long as the sting rings down, as
-    scatters twice as much as its middle.
+    Half a window beside a move is left out, and after a move, while the sting rings down, the part of the pause that
+    scatters more than twice its median.
     """
     if len(t) < 2 * _FEWEST:
         return ()
@@ -51,7 +51,7 @@ def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
     shortest = max(1, round(SHORTEST / _step(t)))
     cuts = breaks(t, WINDOW)
     bounds = {0, len(t), *cuts.tolist()}
-    found = []
+    dwells = []
     for run in static_intervals(still, cuts, shortest):
         start = run.start + (0 if run.start in bounds else half)
         stop = run.stop - (0 if run.stop in bounds else half)
@@ -59,15 +59,15 @@ def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
         if run.start not in bounds:
             start += int(np.argmax(calm)) if len(calm) else 0
         if stop - start >= shortest:
-            found.append(Dwell(start, stop))
-    return tuple(found)
+            dwells.append(Dwell(start, stop))
+    return tuple(dwells)
 
 
 def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Whether the model rests at each row (n,), and how much the angle scatters about its line there (n,) [rad].
+    """Mask (n,) of the rows in which the model rests, and scatter (n,) [rad] of the angle about its line there.
 
-    Near the ends rows are judged by the first and last whole window. A record shorter than that, or of which most
-    rows have the time of the one before, rests.
+    Rows near the ends are judged by the first and last whole window. A record shorter than a window rests, and so does
+    one in which most rows have the time of the row before.
     """
     n = len(t)
     w = _rows(t) if n > 1 and _step(t) > 0.0 else n + 1
@@ -89,7 +89,7 @@ def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]
     reach = float(np.ptp(s0 / w + overall * middle))
     allowed = np.maximum(_TIMES * u, np.clip(_OF_RANGE * reach, *_SWING))
     still = (change < _TIMES * np.hypot(scatter, u)) & (scatter < 2.0 * allowed)
-    # a buffet comes and goes: how large it is, is seen from all of a quiet stretch
+    # a buffet comes and goes: its size is that over all of a quiet stretch
     starts = np.flatnonzero(np.diff(still, prepend=not still[0]))
     power, most = (np.add.reduceat(np.square(each), starts) for each in (scatter, allowed))
     return still & np.repeat(power < most, np.diff(starts, append=n)), scatter

@@ -1,4 +1,4 @@
-"""A recording of a wind-tunnel model, as estimators take it: in SI, calibrated, one clock; what is missing is NaN."""
+"""A recording of a wind-tunnel model for the estimators: in SI, calibrated, on one clock, NaN where samples lack."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from inercal.units import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What the sensors of a model recorded, one row for each row of the record.
+    """Samples of the sensors of a model, one row for each row of the record.
 
     Attributes
     ----------
     t : (n,) s
-        As recorded: it may stand still or run backward; estimators leave such rows out.
+        As recorded. Time may stand still or run backward; estimators leave these rows out.
     acc : (n, N) m/s^2
         Calibrated accelerometers, in the order of the layout. Samples that are missing or saturated are NaN.
     gyro : (n,) rad/s
         Nose-up; all NaN where there is none.
     turns : (n, 2) rad/s
         Roll gyro (about x) and yaw gyro (about z), right-handed; all NaN where there are none.
-    stated : (n, 2) rad
-        An angle that is known, as at wind-off, and its standard uncertainty; NaN elsewhere.
+    zero_angle : (n, 2) rad
+        Angle known from elsewhere, as at wind-off, and its standard uncertainty; NaN in other rows.
     point, trigger, reference : (n,) or None
         Numbers of test points and triggers, to be handed on; the reference angle ``theta_ref`` [rad], without jumps
         of a turn.
     masked : (n, N + 1) bool or None
         Samples of accelerometers and gyro that were saturated.
     temperature : Quantity or None
-        That was recorded: its mean and standard deviation.
+        Mean and standard deviation of the recorded temperature.
     """
 
     t: Array
     acc: Array
     gyro: Array
     turns: Array
-    stated: Array
+    zero_angle: Array
     point: Array | None = None
     trigger: Array | None = None
     reference: Array | None = None
@@ -54,7 +54,7 @@ class Recording:
     @property
     def rows(self) -> Array:
         """(n, N + 5) as `inercal.aoa.fusion.loop.advance` takes them."""
-        return np.column_stack([self.acc, self.gyro, self.stated, self.turns])
+        return np.column_stack([self.acc, self.gyro, self.zero_angle, self.turns])
 
     @property
     def spatial(self) -> bool:

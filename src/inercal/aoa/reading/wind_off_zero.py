@@ -1,9 +1,9 @@
-"""Wind-off zero and tare: a stretch of the record at rest, at an angle that is known from elsewhere.
+"""Wind-off zero and tare: a stretch of the record at rest, at an angle known from elsewhere.
 
-The fusion takes the angle as measured in every row of the stretch, each so uncertain that all of them together know it
-as well as it is stated: its error is the same in all rows, while noise and flexure average out. Through it the filter
-learns the biases at that angle. The paper's methods learn nothing; from them the biases seen in the stretch are
-subtracted.
+The fusion takes the angle as measured in every row of the stretch, each so uncertain that all of them together have the
+stated uncertainty: the error of the angle is the same in all rows, while noise and flexure average out. Through it the
+filter learns the biases at that angle. The paper's methods learn nothing: the biases seen in the stretch are subtracted
+from their readings.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _FEWEST = 10 * _PARTS
 
 
 def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
-    """The recording with the study's zero as an angle that is stated; as it is where there is none.
+    """The recording with the angle of the study's zero; unchanged where the study has none.
 
     Raises
     ------
@@ -42,18 +42,18 @@ def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
     taken = later(recording.t)
     before = np.full(len(recording.t), -np.inf)
     before[taken[1:]] = recording.t[taken[:-1]]
-    stated = recording.stated.copy()
-    stated[rows] = [
-        stated_at(settings.zero, t, last)
+    zero_angle = recording.zero_angle.copy()
+    zero_angle[rows] = [
+        angle_at(settings.zero, t, last)
         for t, last in zip(recording.t[rows].tolist(), before[rows].tolist(), strict=True)
     ]
-    return replace(recording, stated=stated)
+    return replace(recording, zero_angle=zero_angle)
 
 
-def stated_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
-    """The angle of a row at ``t`` [s] and its standard uncertainty [rad], NaN out of the stretch.
+def angle_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
+    """The angle of a row at ``t`` [s] and its standard uncertainty [rad], NaN outside of the stretch.
 
-    The row before was at ``before``. Its time is the row's share of the stretch, and of what the stretch tells.
+    The time since the row ``before`` [s] is the row's share of the stretch, and of its information.
     """
     share = min(t - before, t - zero.start) / (zero.end - zero.start)
     if not (share > 0.0 and t <= zero.end):
@@ -62,7 +62,7 @@ def stated_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
 
 
 def tare(recording: Recording, settings: AoaSettings) -> Recording:
-    """The recording less what its sensors read too much at the study's zero; as it is where there is none.
+    """The recording less the biases of its sensors at the study's zero; unchanged where the study has none.
 
     Raises
     ------
@@ -81,14 +81,14 @@ def tare(recording: Recording, settings: AoaSettings) -> Recording:
 
 
 def at_rest(settings: AoaSettings, theta: float) -> Array:
-    """(N,) m/s^2 what perfect accelerometers read at rest, at the stated roll."""
+    """(N,) m/s^2: readings of perfect accelerometers at rest, at the stated roll."""
     level = _level(settings)
     cosine, sine, *_ = settings.layout.geometry.T
     return np.asarray(settings.site.gravity * (math.sin(theta) * cosine - level * math.cos(theta) * sine))
 
 
 def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices:
-    """Rows of the stretch with all accelerometers, after it has been seen that the model rests."""
+    """Rows of the stretch with all accelerometers; refuses one in which the model moves."""
     where = f"zero.start = {zero.start:g} s, zero.end = {zero.end:g} s"
     taken = later(recording.t)
     t = recording.t[taken]
@@ -113,10 +113,10 @@ def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices
 
 
 def _moved(recording: Recording, settings: AoaSettings, rows: Indices, u: float) -> tuple[float, float]:
-    """By how much the angle changes over some rows, and how much may be noise [rad]: the worse of two looks.
+    """Change of the angle over some rows, and the largest change by noise [rad]: the worse of two tests.
 
-    Accelerometers, from part to part of the stretch; the gyro's angle about its line, which also shows what goes to
-    and fro. Beside three times the stated uncertainty their own noise, as it scatters, is allowed.
+    One compares the accelerometers from part to part of the stretch; the other takes the gyro's angle about its line,
+    which also shows motion to and fro. Three times the stated uncertainty and the observed noise are allowed.
     """
     parts = np.array_split(rows, _PARTS)
     forward, up = np.array([_force(settings, recording.acc[each].mean(axis=0)) for each in parts]).T
@@ -152,8 +152,8 @@ def _level(settings: AoaSettings) -> float:
 
 
 def _means(x: Array) -> Array:
-    """Means of the columns over the numbers in them; NaN of those without."""
-    known = np.isfinite(x)
-    count = known.sum(axis=0)
-    total = np.where(known, x, 0.0).sum(axis=0)
+    """Means of the columns over the numbers in them; NaN without any."""
+    finite = np.isfinite(x)
+    count = finite.sum(axis=0)
+    total = np.where(finite, x, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,8 +1,8 @@
-"""What a turntable says of the sensors, as corrections of a study and as the prior of its fusion.
+"""A fit of the sensors to a turntable, as corrections of a study and as the prior of its fusion.
 
-The fusion knows biases, positions, and the gyro's scale and delay, but no scale and axis of an accelerometer, which it
-could not tell apart from them. So scale S and axis error dlambda that a turntable shows are put right in the study: a
-sensor that was read as A is read as A / S, along lambda + dlambda.
+The fusion estimates biases, positions, and the gyro's scale and delay, but no scale and axis of an accelerometer, which
+it could not separate from them. So scale S and axis error dlambda of the fit are corrected in the study: the reading A
+of a sensor becomes A / S, along lambda + dlambda.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from inercal.estimate.result import Estimate
 from inercal.units import STANDARD_GRAVITY
 
 
-def told(verified: Verified) -> dict[str, Any]:
+def report_of(verified: Verified) -> dict[str, Any]:
     """A fit as the key ``verified`` of a result."""
     rows = zip(verified.names, verified.values.tolist(), verified.u.tolist(), verified.units, strict=True)
     return {
@@ -38,17 +38,17 @@ def told(verified: Verified) -> dict[str, Any]:
 def is_verified(earlier: Estimate) -> bool:
     """True for a result with a fit to a reference angle that is worth more than the fusion of the same record.
 
-    A short record, or one that covers few angles, hardly tells a scale or an axis from a bias: where that would leave a
-    sensor worse known than the fusion left its bias, the fit is not used.
+    A short record, or one of few angles, hardly separates a scale or an axis from a bias: where a sensor would be worse
+    known than its bias is by the fusion, the fit is not used.
     """
     fit = earlier.result.get("verified", {})
     if not fit.get("converged", False):
         return False
     left = {each["name"]: float(each["u"]) for each in fit["parameters"]}
-    known = dict(zip(earlier.names, np.sqrt(np.diag(earlier.covariance)).tolist(), strict=True))
+    of_fusion = dict(zip(earlier.names, np.sqrt(np.diag(earlier.covariance)).tolist(), strict=True))
     count = sum(name.startswith("S_") for name in left)
     return all(
-        STANDARD_GRAVITY * left[f"{kind}_{k}"] <= known.get(f"b_{k}", math.inf)
+        STANDARD_GRAVITY * left[f"{kind}_{k}"] <= of_fusion.get(f"b_{k}", math.inf)
         and f"{kind}_{k}" not in fit["unseen"]
         for kind in ("S", "dlambda")
         for k in range(1, count + 1)
@@ -56,7 +56,7 @@ def is_verified(earlier: Estimate) -> bool:
 
 
 def corrected(earlier: Estimate, settings: AoaSettings) -> AoaSettings:
-    """The study with what an earlier result says of scales and axes put right, beside what it had put right itself."""
+    """The study with scales and axes corrected by the fit of an earlier result and by that result's own corrections."""
     names = settings.layout.names
     before = earlier.result.get("corrections", {})
     of = {name: (before[name]["scale"], before[name]["angle_rad"]) for name in names if name in before}
@@ -69,13 +69,13 @@ def corrected(earlier: Estimate, settings: AoaSettings) -> AoaSettings:
 
 
 def as_stated(settings: AoaSettings) -> AoaSettings:
-    """The study before anything was put right: the inverse of `corrected`."""
+    """The study without corrections: the inverse of `corrected`."""
     undone = {name: (1.0 / scale, -angle) for name, (scale, angle) in settings.corrections.items()}
     return replace(_applied(settings, undone), corrections={})
 
 
 def _applied(settings: AoaSettings, of: Mapping[str, tuple[float, float]]) -> AoaSettings:
-    """The study with scales and axis angles put right by name."""
+    """The study with scales and axis angles corrected by name."""
     layout, sensors = settings.layout, dict(settings.sensors)
     angle = layout.angle + [of.get(name, (1.0, 0.0))[1] for name in layout.names]
     for name, (scale, _) in of.items():
@@ -93,8 +93,8 @@ def _applied(settings: AoaSettings, of: Mapping[str, tuple[float, float]]) -> Ao
 def prior_of(earlier: Estimate, settings: AoaSettings) -> tuple[tuple[str, ...], Array, Array]:
     """Names, values (p,) and covariance (p, p) of the fusion's coefficients after a fit to a reference angle.
 
-    The fit took the study's prior ten times as wide: here it is added. What remains uncertain of scale and axis is
-    added to the bias, as at the angle at which it does most.
+    The fit took the study's prior ten times as wide: here it is added. The rest of the uncertainty of scale and axis is
+    added to the bias, as at the angle of its largest effect.
     """
     fit = earlier.result["verified"]
     names = [each["name"] for each in fit["parameters"]]
@@ -120,7 +120,7 @@ def prior_of(earlier: Estimate, settings: AoaSettings) -> tuple[tuple[str, ...],
 
 
 def _inverse(matrix: Array) -> Array:
-    """The inverse of a positive matrix whose rows are of very different size."""
+    """The inverse of a positive matrix with rows of very different size."""
     size = np.sqrt(np.diag(matrix))
-    found = np.linalg.inv(matrix / np.outer(size, size)) / np.outer(size, size)
-    return np.asarray(0.5 * (found + found.T))
+    inverse = np.linalg.inv(matrix / np.outer(size, size)) / np.outer(size, size)
+    return np.asarray(0.5 * (inverse + inverse.T))

@@ -1,9 +1,9 @@
-"""What sensors should read under a reference motion, and what of it a fit can use.
+"""Motion of the sensors by a reference angle, and the part of it that a fit can use.
 
 The reference angle is interpolated by a quintic spline, whose derivatives are rate, acceleration and jerk at any
-time, also where stamps are uneven. Derivatives of a reference with noise are noisier by far; but the fit is linear in
-them, and if reading and model are smoothed alike, noise that the smoothing takes out does no harm and motion that it
-takes out leaves no bias, whatever its length. Both pass four moving averages of 50 ms, and each 50 ms one row is kept.
+time, also where stamps are uneven. Derivatives of a noisy reference are noisier by far; but the fit is linear in them,
+and if reading and model are smoothed alike, noise that the smoothing removes does no harm and motion that it removes
+leaves no bias, whatever its length. Both pass four moving averages of 50 ms, and each 50 ms one row is kept.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ _EDGE = 10
 _FEWEST = 50
 
 _ABOVE = 10.0
-"""Power of a derivative over that of its noise from which it is a motion; noise would pass for knowledge."""
+"""Power of a derivative over that of its noise from which it counts as motion: noise would pass for knowledge."""
 
 _GAP = 3.0
-"""Steps of time from which rows are apart."""
+"""Steps of time that make a break between rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,16 +67,16 @@ class Reference:
         return kernel
 
     def motion(self, delay: float) -> tuple[Array, Array, Array, Array, Array]:
-        """Angle [rad], rate, its square, acceleration and jerk (n,) that sensors show which lag by ``delay`` [s].
+        """Angle [rad], rate, its square, acceleration and jerk (n,) as seen by sensors that lag by ``delay`` [s].
 
-        The square is less what noise adds to it in the mean.
+        The mean contribution of noise to the square is taken off.
         """
         theta, w, al, jerk = (of(self.t - delay) for of in self.derivatives)
         step = float(np.median(np.diff(self.t)))
         return theta, w, w**2 - _gain(1, np.ones(1)) * (self.noise / step) ** 2, al, jerk
 
     def smoothed(self, x: Array) -> Array:
-        """(k,) rows that are kept of ``x`` (n,), smoothed; NaN where a break or a missing value lies in the kernel."""
+        """(k,) kept rows of ``x`` (n,), smoothed; NaN where a break or a missing value lies in the kernel."""
         x = np.where(self.whole, x, np.nan)
         windows = np.lib.stride_tricks.sliding_window_view(x, len(self.kernel))
         return np.asarray(windows[:: self.span] @ self.kernel)
@@ -111,14 +111,14 @@ def reference(recording: Recording) -> Reference:
     # differences of the eighth order leave nothing of a motion; their noise is the root of 16! / 8!^2 times larger
     noise = float(np.median(np.abs(np.diff(theta, 8)))) / 0.6745 / np.sqrt(12870.0)
     spline = make_interp_spline(t, theta, k=5)
-    found = Reference(rows, t, whole, span, noise, (spline, *(spline.derivative(k) for k in (1, 2, 3))))
-    shown = [found.derivatives[0]]
+    measured = Reference(rows, t, whole, span, noise, (spline, *(spline.derivative(k) for k in (1, 2, 3))))
+    shown = [measured.derivatives[0]]
     for order in (1, 2, 3):
-        derivative = found.smoothed(found.derivatives[order](t))
+        derivative = measured.smoothed(measured.derivatives[order](t))
         power = float(np.nanmean(derivative**2)) if np.isfinite(derivative).any() else 0.0
-        of_noise = (noise / step**order) ** 2 * _gain(order, found.kernel)
-        shown.append(found.derivatives[order] if power > _ABOVE * of_noise else np.zeros_like)
-    return replace(found, derivatives=tuple(shown))
+        of_noise = (noise / step**order) ** 2 * _gain(order, measured.kernel)
+        shown.append(measured.derivatives[order] if power > _ABOVE * of_noise else np.zeros_like)
+    return replace(measured, derivatives=tuple(shown))
 
 
 def _gain(order: int, kernel: Array) -> float:

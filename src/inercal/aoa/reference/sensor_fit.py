@@ -32,7 +32,7 @@ from inercal.estimate.result import Parameter
 
 KINDS = ("S", "b", "dlambda", "dr", "zo")
 _WIDER = 10.0
-"""By what the study's prior is widened."""
+"""Factor by which the study's prior is widened."""
 
 _USUAL = 1e-3
 """Usual error of a scale, and of an axis [rad]."""
@@ -41,7 +41,7 @@ _SPIKE = 6.0
 """Standard deviations from which a row of a sensor is left out."""
 
 _NEAR = 6
-"""Rows from which on residuals are not correlated; the smoothing reaches over four."""
+"""Distance in rows from which on residuals are not correlated; the smoothing reaches over four."""
 
 _ITERATIONS = 8
 _SMALL = 1e-3
@@ -50,7 +50,7 @@ _SMALL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """What a turntable says of the sensors.
+    """Sensors as fitted to a turntable.
 
     Attributes
     ----------
@@ -61,9 +61,9 @@ class Verified:
     values : (p,)
     covariance : (p, p)
     learned : Learned
-        What the record added to what was known; its condition and weakest combinations.
+        Information of the record beyond the prior; its condition and weakest combinations.
     unseen : tuple of str
-        Names of which no more is known than the study's prior says.
+        Names of coefficients no better known than by the study's prior.
     noise : (N + 1,) m/s^2, rad/s
         Of one sample of accelerometers and gyro, from the residuals below some 5 Hz; NaN where there is no sensor.
     reference_noise : float
@@ -105,13 +105,13 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
     RecordError
         There is no reference angle, too little of it, or none that a sensor follows.
     """
-    known = reference(recording)
+    truth = reference(recording)
     names, units, usual, start = _terms(settings)
     wide = np.where([name == "tau" for name in names], usual, _WIDER * usual)
     x, weights = start.copy(), np.full(len(settings.layout.names) + 1, np.nan)
     converged = False
     for _ in range(_ITERATIONS):
-        residuals, jacobian = _linearised(recording, settings, known, x)
+        residuals, jacobian = _linearised(recording, settings, truth, x)
         seen = _sound(residuals)
         residuals, jacobian = np.where(seen, residuals, 0.0), np.where(seen[..., None], jacobian, 0.0)
         count = seen.sum(axis=0)
@@ -138,9 +138,9 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
         if converged:
             break
     more = learned(covariance, wide, names)
-    noise = np.sqrt(power / OVERLAP[0] * known.span) * np.where(count > 0, 1.0, np.nan)
+    noise = np.sqrt(power / OVERLAP[0] * truth.span) * np.where(count > 0, 1.0, np.nan)
     return Verified(
-        names, units, x, covariance, more, more.at_prior(1.0 / _WIDER), noise, known.noise, len(known.rows),
+        names, units, x, covariance, more, more.at_prior(1.0 / _WIDER), noise, truth.noise, len(truth.rows),
         converged,
     )  # fmt: skip
 
@@ -169,18 +169,18 @@ def _terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Arr
 
 
 def _linearised(
-    recording: Recording, settings: AoaSettings, known: Reference, x: Array
+    recording: Recording, settings: AoaSettings, truth: Reference, x: Array
 ) -> tuple[Array, Array]:
-    """Smoothed residuals (k, N + 1) and derivatives (k, N + 1, p) of the model; NaN where nothing was read."""
+    """Smoothed residuals (k, N + 1) and derivatives (k, N + 1, p) of the model; NaN without readings."""
     layout, g = settings.layout, settings.site.gravity
     n = len(layout.names)
     S, b, dlambda, dr, zo = x[: 5 * n].reshape(5, n)
     tau, b_g, k_g, tau_g = x[5 * n :]
     roll = settings.attitude.roll
     c = 1.0 if roll is None else math.cos(roll.value)
-    theta, w, w2, al, jerk = known.motion(tau)
+    theta, w, w2, al, jerk = truth.motion(tau)
     sine, cosine = np.sin(theta), np.cos(theta)
-    ones = known.smoothed(np.ones(len(theta)))
+    ones = truth.smoothed(np.ones(len(theta)))
     residuals, jacobian = np.empty((len(ones), n + 1)), np.zeros((len(ones), n + 1, len(x)))
     for i in range(n):
         ca, sa = math.cos(layout.angle[i] + dlambda[i]), math.sin(layout.angle[i] + dlambda[i])
@@ -198,21 +198,21 @@ def _linearised(
             -S[i] * (c * al * ca - c * c * w2 * sa),
         )
         for kind, column in enumerate(columns):
-            jacobian[:, i, kind * n + i] = S[i] * ones if column is None else known.smoothed(column)
-        jacobian[:, i, 5 * n] = known.smoothed(-S[i] * (fx_dot * ca - fz_dot * sa))
-        residuals[:, i] = known.smoothed(recording.acc[known.rows, i] - S[i] * (force + b[i]))
-    w, al = (known.derivatives[order](known.t - tau - tau_g) for order in (1, 2))
+            jacobian[:, i, kind * n + i] = S[i] * ones if column is None else truth.smoothed(column)
+        jacobian[:, i, 5 * n] = truth.smoothed(-S[i] * (fx_dot * ca - fz_dot * sa))
+        residuals[:, i] = truth.smoothed(recording.acc[truth.rows, i] - S[i] * (force + b[i]))
+    w, al = (truth.derivatives[order](truth.t - tau - tau_g) for order in (1, 2))
     scale = c * (1.0 + k_g)
-    residuals[:, n] = known.smoothed(recording.gyro[known.rows] - scale * w - b_g)
-    late = -scale * known.smoothed(al)
-    jacobian[:, n, 5 * n :] = np.stack([late, ones, c * known.smoothed(w), late], axis=-1)
+    residuals[:, n] = truth.smoothed(recording.gyro[truth.rows] - scale * w - b_g)
+    late = -scale * truth.smoothed(al)
+    jacobian[:, n, 5 * n :] = np.stack([late, ones, c * truth.smoothed(w), late], axis=-1)
     return residuals, jacobian
 
 
 def _spread(scores: Array) -> Array:
     """(p, p) covariance of the sum of scores (k, p), of which rows nearby are correlated by the smoothing.
 
-    With weights that fall to 0 at `_NEAR` rows, which keep it positive; what these take from white noise is added.
+    Weights that fall to 0 at `_NEAR` rows keep it positive; the share that they take from white noise is restored.
     """
     total, white = scores.T @ scores, OVERLAP[0]
     for lag in range(1, _NEAR):
@@ -224,7 +224,7 @@ def _spread(scores: Array) -> Array:
 
 
 def _sound(residuals: Array) -> NDArray[np.bool_]:
-    """Where residuals (k, N + 1) are numbers and no spikes."""
+    """Mask of residuals (k, N + 1) that are numbers and no spikes."""
     sound = np.isfinite(residuals)
     for i, column in enumerate(residuals.T):
         if sound[:, i].any():

@@ -1,8 +1,8 @@
-"""What the angle and the coefficients of the sensors are uncertain by: noise, prior, and what is stated.
+"""Uncertainty budget of the angle and of the coefficients of the sensors: noise, prior, and stated inputs.
 
-The covariance P of the best filter is homogeneous in the variances q_s of all its sources, and to first order no change
-of its gains changes it. So the part of a source is its slope, and the parts add up to the whole (Euler's theorem on
-homogeneous functions):
+The covariance P of the best filter is homogeneous in the variances q_s of all its sources, and to first order changes
+of its gains do not change it. So the part of a source is its slope, and the parts add up to the whole (Euler's theorem
+on homogeneous functions):
 
     P_s = q_s dP/dq_s        sum_s P_s = P
 
@@ -39,16 +39,16 @@ _STEP = 1e-3
 """Relative change of a variance, for its slope."""
 
 MOST = 20_000
-"""Rows that are looked at, from the first with an angle on; half of them where they are smoothed."""
+"""Rows that are examined, from the first with an angle on; half of them where they are smoothed."""
 
 _NOTHING = 1e-5
-"""Share of a variance below which a source does nothing."""
+"""Share of a variance below which a source is left out."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """One source, ``u`` in ``unit``, and where a problem holds it: in ``constants`` of the model that are variances, in
-    those that are standard deviations (``levels``), in the prior of ``states``, or in the angle that is stated."""
+    """One source, ``u`` in ``unit``, and its places in a problem: ``constants`` of the model that are variances or, in
+    ``levels``, standard deviations; ``states`` by their prior; the angle of the ``zero``."""
 
     name: str
     type: str
@@ -57,7 +57,7 @@ class Source:
     constants: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
     states: tuple[str, ...] = ()
-    stated: bool = False
+    zero: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,9 @@ class Parts:
     budget : tuple of BudgetItem
         With the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first 2 s.
     common : (p, p)
-        Covariance of the coefficients by gravity and roll as they are stated: by what the same site and mounting share.
+        Covariance of the coefficients by stated gravity and roll, which runs at the same site and mounting share.
     by_gravity : (p,) or None
-        Change of the coefficients per change of gravity [m/s^2]; None where that is known well enough.
+        Change of the coefficients per change of gravity [m/s^2]; None where gravity is known well enough.
     """
 
     budget: tuple[BudgetItem, ...]
@@ -80,18 +80,18 @@ class Parts:
 
 
 def parts(
-    recording: Recording, problem: FilterProblem, settings: AoaSettings, smoothed: bool, known: Mask
+    recording: Recording, problem: FilterProblem, settings: AoaSettings, smoothed: bool, answered: Mask
 ) -> Parts:
-    """Split what the fusion says of its uncertainty by where it comes from.
+    """Split the uncertainty of the fusion by source.
 
-    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``known`` (n,): the rows
-    with an angle; before the first, as where sensors are switched on late, there is nothing to split.
+    ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``answered`` (n,) marks
+    the rows with an angle; those before the first, as where sensors are switched on late, are left out.
     """
     taken = later(recording.t)
-    taken = taken[taken >= np.argmax(known)][: MOST // 2 if smoothed else MOST]
+    taken = taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.rows[taken]
-    settled = known[taken] & (t - t[:1] >= SETTLED)
-    judged = settled if settled.any() else known[taken]
+    settled = answered[taken] & (t - t[:1] >= SETTLED)
+    judged = settled if settled.any() else answered[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
     changed = [_enlarged(problem, rows, each) for each in of]
@@ -103,29 +103,29 @@ def parts(
             lambda run: _run(run[0], t, run[1], smoothed, judged), [(problem, rows), *changed, *moved]
         )
         (angle, P, x, theta), *others = runs
-    found: list[tuple[Source, Array]] = []
+    variances: list[tuple[Source, Array]] = []
     for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
         slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
-        found.append((source, np.maximum(slope, 0.0)))
-    stated: list[tuple[Source, Array]] = []
+        variances.append((source, np.maximum(slope, 0.0)))
+    shifts: list[tuple[Source, Array]] = []
     by_gravity: Array | None = None
     for lean, (_, _, state, turned) in zip(changes, others[len(of) :], strict=True):
         apart = (turned - theta)[np.isfinite(turned - theta)]
         slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (state - x)[at]) / lean.step
         if lean.name == "gravity":
             by_gravity = slope[1:]
-            stated += [
+            shifts += [
                 (Source(each.source, "B", each.u, each.unit), slope * each.sensitivity * each.u)
                 for each in settings.site.inputs
             ]
         else:
             of_roll = uncertain_roll(settings, problem.spatial)
-            stated.append((Source("stated roll", "B", of_roll, "rad"), slope * of_roll))
-    found += [(source, np.square(shift)) for source, shift in stated]
+            shifts.append((Source("stated roll", "B", of_roll, "rad"), slope * of_roll))
+    variances += [(source, np.square(shift)) for source, shift in shifts]
     common = np.zeros((len(at), len(at)))
-    for _, shift in stated:
+    for _, shift in shifts:
         common += np.outer(shift[1:], shift[1:])
-    return Parts(_items(found, (ANGLE, *problem.nuisances)), common, by_gravity)
+    return Parts(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
 
 
 def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]:
@@ -159,13 +159,13 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]
         Source("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
         *(each for each in of_states if each.states),
         *([Source("common delay", "B", timing.common_delay_u, "s", levels=delay)] if timing.common_delay_u else []),
-        *([Source("stated zero", "B", zero.u, "rad", stated=True)] if zero is not None else []),
+        *([Source("stated zero", "B", zero.u, "rad", zero=True)] if zero is not None else []),
         Source("motion between samples", "B", 1.0, "1", motion),
     )  # fmt: skip
 
 
 def _known_before(problem: FilterProblem, settings: AoaSettings) -> tuple[str, ...]:
-    """States whose prior is not that of the study."""
+    """States whose prior is of an earlier run, not of the study."""
     usual = stated_problem(settings, problem.spatial).covariance
     return tuple(
         name
@@ -192,15 +192,15 @@ def _enlarged(problem: FilterProblem, rows: Array, source: Source) -> tuple[Filt
         constants = constants._replace(**{name: factor * getattr(constants, name) for name in names})
     at = [problem.names.index(name) for name in source.states]
     covariance[np.ix_(at, at)] *= by
-    if source.stated:
+    if source.zero:
         rows = rows.copy()
         rows[:, problem.count + 2] *= by**0.5
     return replace(problem, constants=constants, covariance=covariance), rows
 
 
-def _items(found: list[tuple[Source, Array]], names: tuple[str, ...]) -> tuple[BudgetItem, ...]:
+def _items(variances: list[tuple[Source, Array]], names: tuple[str, ...]) -> tuple[BudgetItem, ...]:
     """Lines of a budget from parts (1 + p,) of variances."""
-    whole = np.sum([part for _, part in found], axis=0)
+    whole = np.sum([part for _, part in variances], axis=0)
     return tuple(
         BudgetItem(
             source.name,
@@ -213,5 +213,5 @@ def _items(found: list[tuple[Source, Array]], names: tuple[str, ...]) -> tuple[B
                 if own > _NOTHING * total
             },
         )
-        for source, part in found
+        for source, part in variances
     )

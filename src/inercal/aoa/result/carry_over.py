@@ -1,4 +1,4 @@
-"""What an earlier run learned of the sensors, as the prior of the next."""
+"""Errors of the sensors found by an earlier run, as the prior of the next."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from inercal.estimate.result import Estimate
 WHERE = "estimator.prior"
 
 _SAME = 1e-6
-"""Change [m, rad, parts] below which a sensor is where it was."""
+"""Change [m, rad, parts] below which a sensor counts as unchanged."""
 
 _USUAL = {"scale": 1.0, "bias_si": 0.0}
-"""Calibration of a sensor for which none is stated."""
+"""Calibration of a sensor without a stated one."""
 
 _IN_WORDS = {
     "angle_rad": "lambda = {:.6g} rad",
@@ -41,9 +41,9 @@ _IN_WORDS = {
 def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
     """Coefficients by name, and their covariances by pairs of names, for `inercal.aoa.fusion.problem.problem`.
 
-    They are errors of the sensors as the earlier study stated them, so that this study must state them alike: a
-    position that was measured anew, or a sensor that was moved, makes them meaningless. Those of a result with a
-    reference angle are those fitted to it, and belong to the study as `corrected` gives it.
+    They are errors of the sensors as the earlier study stated them, so this study must state the same: a position that
+    was measured anew, or a sensor that was moved, makes them meaningless. The coefficients of a result with a reference
+    angle are those fitted to it, and belong to the study as `corrected` gives it.
 
     Raises
     ------
@@ -69,15 +69,15 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
 
 
 def _own(earlier: Estimate, settings: AoaSettings) -> Array:
-    """Covariance (p, p) without the part of gravity, which `inercal.aoa.result.systematic` carries on from run to run:
-    the error of all of them is one."""
+    """Covariance (p, p) without the part of gravity, whose error is the same in all runs:
+    `inercal.aoa.result.systematic` carries it on from run to run."""
     slopes = carried(earlier, settings)
     shift = gravity_u(settings) * np.array([slopes.get(name, 0.0) for name in earlier.names])
     return np.asarray(earlier.covariance - np.outer(shift, shift))
 
 
 def corrected(path: str | Path, settings: AoaSettings) -> AoaSettings:
-    """The study with scales and axes put right as the earlier run, or those before it, found them on a turntable.
+    """The study with scales and axes corrected as the earlier run, or those before it, found them on a turntable.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def corrected(path: str | Path, settings: AoaSettings) -> AoaSettings:
 
 @contextmanager
 def _in_form(path: str | Path) -> Iterator[None]:
-    """Refuse a file whose parts are not what this command writes: it was changed by hand, or by another program."""
+    """Refuse a file that was changed by hand, or by another program, so that this command did not write its parts."""
     try:
         yield
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
@@ -99,7 +99,7 @@ def _in_form(path: str | Path) -> Iterator[None]:
 
 
 def _usable(path: str | Path, settings: AoaSettings) -> Estimate:
-    """The earlier result, after it has been seen that it can be used."""
+    """The earlier result; refuses one that cannot be used."""
     earlier = load_estimate(path)
     if earlier.command != COMMAND:
         raise StudyError(WHERE, f"{path} is a result of {earlier.command}, expected one of {COMMAND}")
@@ -119,17 +119,17 @@ def _usable(path: str | Path, settings: AoaSettings) -> Estimate:
 
 
 def _same_sensors(earlier: Estimate, settings: AoaSettings, path: str | Path) -> None:
-    """Refuse a result of sensors that were stated in another way, or of another instrument."""
-    known: Any = earlier.conditions.get("sensors")
-    if not isinstance(known, Mapping) or not all(isinstance(of, Mapping) for of in known.values()):
+    """Refuse a result of sensors stated differently, or of another instrument."""
+    then: Any = earlier.conditions.get("sensors")
+    if not isinstance(then, Mapping) or not all(isinstance(of, Mapping) for of in then.values()):
         raise StudyError(WHERE, f"{path} does not say where its sensors were, expected conditions.sensors")
     now = geometry(settings)
-    found, wanted = (", ".join(name for name, of in all.items() if "angle_rad" in of) for all in (known, now))
-    if found != wanted:
-        raise StudyError(WHERE, f"{path} is of the sensors {found}, expected those of the study, {wanted}")
-    for name in dict.fromkeys((*now, *known)):
-        before, stated = (_USUAL | dict(all.get(name, {})) for all in (known, now))
-        for key, value in stated.items():
+    names, wanted = (", ".join(name for name, of in all.items() if "angle_rad" in of) for all in (then, now))
+    if names != wanted:
+        raise StudyError(WHERE, f"{path} is of the sensors {names}, expected those of the study, {wanted}")
+    for name in dict.fromkeys((*now, *then)):
+        before, current = (_USUAL | dict(all.get(name, {})) for all in (then, now))
+        for key, value in current.items():
             tolerance = 0.0 if key == "scale" else _SAME
             if not math.isclose(value, before[key], rel_tol=_SAME, abs_tol=tolerance):
                 words = _IN_WORDS[key]

@@ -5,8 +5,8 @@
     alpha, u_alpha [deg]              angle of attack
     beta, u_beta [deg]                sideslip, the wind from the right
 
-Alpha and beta are there where the study states how the model lies in the stream; without that theta is not called
-alpha. A row of the recording that was left out has no numbers.
+Alpha and beta need the attitude of the model in the stream, stated in the study; without it theta is not called alpha.
+A row of the recording that was left out has no numbers.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.flow import alpha_beta, stated, theta_u
+from inercal.aoa.flow import alpha_beta, gives_alpha, theta_u
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings, Attitude
@@ -43,7 +43,7 @@ _POINT = (
 
 def columns(attitude: Attitude) -> tuple[tuple[str, str], ...]:
     """Names and units, after ``t``."""
-    return _PITCH + (_FLOW if stated(attitude) else ())
+    return _PITCH + (_FLOW if gives_alpha(attitude) else ())
 
 
 def rows(
@@ -57,19 +57,19 @@ def rows(
 ) -> Array:
     """The columns (n, 3 or 7), in their units, of ``theta``, ``u`` [rad] and ``rate`` [rad/s], (n,) each.
 
-    ``u`` is that of theta, were the stated roll exact: the column has it with the roll's part, where ``roll`` is not
-    given. ``roll``, ``u_roll``, ``by_roll`` as in `inercal.aoa.flow.alpha_beta`.
+    ``u`` is that of theta for an exact stated roll; the column adds the part of the roll, unless ``roll`` is given.
+    ``roll``, ``u_roll``, ``by_roll`` as in `inercal.aoa.flow.alpha_beta`.
     """
-    found = [theta, theta_u(theta, u, attitude, by_roll) if roll is None else u, rate]
-    if stated(attitude):
+    values = [theta, theta_u(theta, u, attitude, by_roll) if roll is None else u, rate]
+    if gives_alpha(attitude):
         flow = alpha_beta(theta, u, attitude, roll, u_roll, by_roll)
-        found += [flow.alpha, flow.u_alpha, flow.beta, flow.u_beta]
-    return np.degrees(np.column_stack(found))
+        values += [flow.alpha, flow.u_alpha, flow.beta, flow.u_beta]
+    return np.degrees(np.column_stack(values))
 
 
 def angles_record(recording: Recording, angles: Angles, settings: AoaSettings) -> Record:
-    """Angles with the time stamps of the recording, a row for each of its own."""
-    told = rows(
+    """Angles with the time stamps of the recording, row by row."""
+    values = rows(
         angles.theta,
         angles.known_u,
         angles.rate,
@@ -79,21 +79,21 @@ def angles_record(recording: Recording, angles: Angles, settings: AoaSettings) -
         angles.by_roll,
     )
     source = Source(f"angles of {angles.method}", "")
-    return _record(columns(settings.attitude), told, recording.t, recording, source)
+    return _record(columns(settings.attitude), values, recording.t, recording, source)
 
 
 def points_record(points: Iterable[Point], recording: Recording, settings: AoaSettings) -> Record:
-    """Points in a row each: ``t`` in the middle, number and triggers of the record, mean angle, scatter."""
-    flow = stated(settings.attitude)
+    """Points, a row each: ``t`` in the middle, number and triggers of the record, mean angle, scatter."""
+    flow = gives_alpha(settings.attitude)
     # a point holds angles in rad
-    told = [
+    lines = [
         (p.number, p.trigger, p.last_trigger, p.begin, p.end, float(p.rows))
         + tuple(np.degrees([p.theta, p.u, p.rate, p.scatter]).tolist())
         + (tuple(np.degrees([p.alpha, p.u_alpha, p.beta, p.u_beta]).tolist()) if flow else ())
         for p in points
     ]
     names = _POINT + (_FLOW if flow else ())
-    values = np.array(told, dtype=float).reshape(len(told), len(names))
+    values = np.array(lines, dtype=float).reshape(len(lines), len(names))
     middle = 0.5 * (values[:, 3] + values[:, 4])
     return _record(names, values, middle, recording, Source("points", ""))
 

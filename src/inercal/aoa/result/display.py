@@ -16,34 +16,34 @@ from inercal.instruments.terms import term
 
 
 def in_words(name: str) -> str:
-    """What a coefficient is: ``b_2`` the bias of accelerometer 2."""
+    """A coefficient in words: ``b_2`` is the bias of accelerometer 2."""
     of = term(name)
     return "" if of is None else of.name
 
 
 def displayed(estimate: Estimate) -> Estimate:
     """The estimate for people, its sensors in words."""
-    stated = estimate.conditions.get("sensors", {})
+    nominal = estimate.conditions.get("sensors", {})
     shown = estimate.shown()
-    sensors = {name: _sensor(name, of) for name, of in stated.items()}
+    sensors = {name: _sensor(name, of) for name, of in nominal.items()}
     return replace(shown, conditions={**shown.conditions, "sensors": sensors})
 
 
-def _sensor(name: str, stated: Mapping[str, float]) -> str:
+def _sensor(name: str, nominal: Mapping[str, float]) -> str:
     """A sensor as the study states it: ``lambda 90 deg, r -0.25 m, z 0 m``."""
-    told = []
-    if "angle_rad" in stated:
-        angle = float(np.degrees(stated["angle_rad"]))
-        told += [f"lambda {angle:.6g} deg", f"r {stated['r_m']:.6g} m", f"z {stated['z_m']:.6g} m"]
-    if "scale" in stated:
+    parts = []
+    if "angle_rad" in nominal:
+        angle = float(np.degrees(nominal["angle_rad"]))
+        parts += [f"lambda {angle:.6g} deg", f"r {nominal['r_m']:.6g} m", f"z {nominal['z_m']:.6g} m"]
+    if "scale" in nominal:
         of_gyro = name in GYROS
-        bias = float(np.degrees(stated["bias_si"])) if of_gyro else stated["bias_si"]
-        told += [f"scale {stated['scale']:.8g}", f"bias {bias:.6g} {'deg/s' if of_gyro else 'm/s^2'}"]
-    return ", ".join(told)
+        bias = float(np.degrees(nominal["bias_si"])) if of_gyro else nominal["bias_si"]
+        parts += [f"scale {nominal['scale']:.8g}", f"bias {bias:.6g} {'deg/s' if of_gyro else 'm/s^2'}"]
+    return ", ".join(parts)
 
 
 def use_of_fit(estimate: Estimate) -> str:
-    """How the sensors that were fitted to a reference angle are used; nothing where there is no such fit."""
+    """A sentence on the use of the sensors fitted to a reference angle; empty without a fit."""
     fit = estimate.result.get("verified")
     if fit is None:
         return ""
@@ -61,12 +61,12 @@ def use_of_fit(estimate: Estimate) -> str:
 
 
 def off_stated(parameter: Mapping[str, Any]) -> float:
-    """A coefficient of such a fit less what it is where a sensor is as the study states: 1 of a scale, else 0."""
+    """A coefficient of the fit to a reference angle less its value for a sensor as stated: 1 for a scale, else 0."""
     return float(parameter["value"] - (1.0 if parameter["name"].startswith("S_") else 0.0))
 
 
 def off_statement(fit: Mapping[str, Any]) -> list[str]:
-    """Names of the coefficients that such a fit sees off what the study states, by more than two u."""
+    """Names of the coefficients that the fit to a reference angle puts more than two u from the study."""
     return [
         each["name"]
         for each in fit["parameters"]
@@ -75,48 +75,48 @@ def off_statement(fit: Mapping[str, Any]) -> list[str]:
 
 
 def rest_of_fit(estimate: Estimate) -> str:
-    """The coefficients of such a fit that are not `off_statement`, by name; nothing where there are none."""
+    """A sentence on the other coefficients of the fit (`off_statement`), by name; empty without any."""
     fit = estimate.result.get("verified")
     if fit is None:
         return ""
     off, unseen = off_statement(fit), list(fit["unseen"])
-    stated = [each["name"] for each in fit["parameters"] if each["name"] not in (*off, *unseen)]
-    told = (
-        (stated, "within two u of what the study states"),
+    agreeing = [each["name"] for each in fit["parameters"] if each["name"] not in (*off, *unseen)]
+    groups = (
+        (agreeing, "within two u of what the study states"),
         (unseen, "not seen in this motion"),
     )
-    parts = [f"{words}: {', '.join(names)}" for names, words in told if names]
+    parts = [f"{words}: {', '.join(names)}" for names, words in groups if names]
     return f"Fitted to theta_ref, but not listed: {'; '.join(parts)}." if parts else ""
 
 
 def delays(estimate: Estimate) -> str:
-    """Sentences on delays: that of the gyro, and what one common to all sensors costs."""
+    """Sentences on delays: that of the gyro, and the cost of one common to all sensors."""
     timing = estimate.result["timing"]
     sentences = [_of_gyro(estimate, timing["gyro_delay"]), _in_common(timing)]
     return " ".join(each for each in sentences if each)
 
 
-def _of_gyro(estimate: Estimate, known: Mapping[str, Any]) -> str:
-    """What is known of the delay of the gyro."""
-    told = []
+def _of_gyro(estimate: Estimate, delay: Mapping[str, Any]) -> str:
+    """A sentence on the delay of the gyro."""
+    estimates = []
     if "tau_g" in estimate.names:
-        told.append((estimate["tau_g"].value, estimate["tau_g"].u, "by the fusion"))
-    elif known["stated"]:
-        told.append((known["stated"], 0.0, "as stated"))
-    if known["spectra"] is not None:
-        told.append((known["spectra"]["value"], known["spectra"]["u"], "by the spectra"))
-    if not told:
+        estimates.append((estimate["tau_g"].value, estimate["tau_g"].u, "by the fusion"))
+    elif delay["stated"]:
+        estimates.append((delay["stated"], 0.0, "as stated"))
+    if delay["spectra"] is not None:
+        estimates.append((delay["spectra"]["value"], delay["spectra"]["u"], "by the spectra"))
+    if not estimates:
         return ""
-    shown = [value for value, u, _ in told if abs(value) > 2.0 * u]
+    shown = [value for value, u, _ in estimates if abs(value) > 2.0 * u]
     turned = -1.0 if shown and shown[0] < 0.0 else 1.0
-    values = ", ".join(f"{_ms(turned * value, u)} {how}" for value, u, how in told)
+    values = ", ".join(f"{_ms(turned * value, u)} {how}" for value, u, how in estimates)
     if not shown:
         return f"No delay of the gyro against the accelerometers is seen: {values}."
     return f"The gyro is {'later' if turned > 0.0 else 'earlier'} than the accelerometers by {values}."
 
 
 def _in_common(timing: Mapping[str, Any]) -> str:
-    """What a delay of all sensors does to the angle."""
+    """A sentence on the effect of a common delay on the angle."""
     delay, each = timing["common_delay"], timing["cost_per_ms"]
     if each["max"] is None:
         return ""

@@ -1,4 +1,4 @@
-"""The estimate of an angle of attack: what was learned of the sensors, how well the angle is known, and the verdict."""
+"""The estimate of an angle of attack: errors of the sensors, uncertainty of the angle, and the verdict."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.reference.corrections import as_stated, told
+from inercal.aoa.reference.corrections import as_stated, report_of
 from inercal.aoa.result import verdict
 from inercal.aoa.result.budget import ANGLE, parts
 from inercal.aoa.result.systematic import by_fusion, gravity_u
@@ -89,7 +89,7 @@ def assemble(
     verified: Verified | None = None,
     angles: Angles | None = None,
 ) -> Estimate:
-    """Put together what the fusion found.
+    """The estimate by the fusion.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def assemble(
     problem : FilterProblem
     filtered : FilterResult
     findings : sequence of Finding
-        Of plausibility and diagnosis, beside those of the recording.
+        Of the diagnosis, beside those of the recording.
     delay : Delay or None
-        Of the gyro against the accelerometers, as the spectra have it.
+        Of the gyro against the accelerometers, by the spectra.
     points : iterable of Point
     errors : mapping
         Against the reference angle, by method.
@@ -122,7 +122,7 @@ def assemble(
     values, P = filtered.state.x[at], filtered.state.P[np.ix_(at, at)]
     before = np.sqrt(np.diag(problem.covariance)[at])
     of_sting = verdict.shaken(problem, filtered, settings)
-    said = _said(recording, [*findings, *([] if of_sting is None else [of_sting])])
+    all_findings = _all_findings(recording, [*findings, *([] if of_sting is None else [of_sting])])
     result = _result(recording, settings, angles, delay, points, errors, compared)
     result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
     model = SPATIAL if problem.spatial else MODEL + FLAT
@@ -134,10 +134,16 @@ def assemble(
         "nis_mean": filtered.nis_mean,
         "starts": float(len(filtered.starts)),
     }
-    status, message = verdict.of_fusion(recording, filtered, angles, said)
+    status, message = verdict.of_fusion(recording, filtered, angles, all_findings)
     if status is Status.NOT_CONVERGED:
         return Estimate.without(
-            basis, status, message, findings=said, statistics=statistics, result=result, beside=(ANGLE,)
+            basis,
+            status,
+            message,
+            findings=all_findings,
+            statistics=statistics,
+            result=result,
+            beside=(ANGLE,),
         )
     split = parts(recording, problem, settings, filtered.smoothed, np.isfinite(filtered.theta))
     covariance = P + split.common
@@ -149,7 +155,7 @@ def assemble(
     if split.by_gravity is not None:
         slopes = dict(zip(names, split.by_gravity.tolist(), strict=True))
         result["gravity"] = {"value": settings.site.gravity, "u": gravity_u(settings), "slopes": slopes}
-    # of numbers that are not to be used, more would be noise
+    # numbers that are not to be used need no such finding
     at_prior = verdict.left_at_prior(names, np.sqrt(np.diag(P)) / before) if status is Status.OK else None
     return Estimate.of(
         basis,
@@ -158,7 +164,7 @@ def assemble(
         values,
         Uncertainty(covariance, np.full(len(names), dof), split.budget, split.common),
         (status, message),
-        findings=said if at_prior is None else (*said, at_prior),
+        findings=all_findings if at_prior is None else (*all_findings, at_prior),
         statistics=statistics,
         result=result,
         beside=(ANGLE,),
@@ -176,24 +182,24 @@ def assemble_paper(
     compared: Mapping[str, Angles] | None = None,
     verified: Verified | None = None,
 ) -> Estimate:
-    """Put together what one of the paper's methods found: angles, and no coefficients. Parameters as of `assemble`."""
-    said = _said(recording, findings)
+    """The estimate by one of the paper's methods: angles without coefficients. Parameters as of `assemble`."""
+    all_findings = _all_findings(recording, findings)
     result = _result(recording, settings, angles, delay, points, errors, compared)
     result |= _of_sensors(settings, verified) | {"nis_mean": None, "posterior": {}}
-    status, message = verdict.of_method(angles, said)
+    status, message = verdict.of_method(angles, all_findings)
     model = f"{angles.method}; {FLAT.removeprefix('; ')}"
     return Estimate.without(
         _basis(recording, settings, angles, model, REFERENCES),
         status,
         message,
-        findings=said,
+        findings=all_findings,
         statistics=_statistics(recording, angles),
         result=result,
         beside=(ANGLE,),
     )
 
 
-def _said(recording: Recording, findings: Sequence[Finding]) -> tuple[Finding, ...]:
+def _all_findings(recording: Recording, findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """All findings, each once."""
     return tuple(dict.fromkeys([*recording.findings, *findings]))
 
@@ -204,30 +210,30 @@ def unit_of(name: str) -> str:
 
 
 def geometry(settings: AoaSettings) -> dict[str, dict[str, float]]:
-    """Sensors as the study states them, by name: to what the errors that were found of them are relative [SI]."""
+    """Sensors as the study states them, by name [SI]; the coefficients are errors of these."""
     settings = as_stated(settings)
     layout = settings.layout
     each = zip(layout.names, layout.angle.tolist(), layout.r.tolist(), layout.z.tolist(), strict=True)
-    stated = {name: {"angle_rad": angle, "r_m": r, "z_m": z} for name, angle, r, z in each}
+    sensors = {name: {"angle_rad": angle, "r_m": r, "z_m": z} for name, angle, r, z in each}
     for name in (*layout.names, *GYROS):
         calibration = settings.calibration(name)
         if (calibration.scale, calibration.bias) != (1.0, 0.0):
             of = {"scale": calibration.scale, "bias_si": calibration.bias}
-            stated[name] = stated.get(name, {}) | of
-    return stated
+            sensors[name] = sensors.get(name, {}) | of
+    return sensors
 
 
 def _of_sensors(settings: AoaSettings, verified: Verified | None) -> dict[str, Any]:
-    """What was put right of the sensors, and what their reference angle says of them, where there is any of it."""
+    """Corrections of the sensors, and their fit to the reference angle, where present."""
     changed = {name: {"scale": s, "angle_rad": by} for name, (s, by) in settings.corrections.items()}
     return {
         **({"corrections": changed} if changed else {}),
-        **({} if verified is None else {"verified": told(verified)}),
+        **({} if verified is None else {"verified": report_of(verified)}),
     }
 
 
 def _statistics(recording: Recording, angles: Angles) -> dict[str, float]:
-    """Figures of all methods."""
+    """Statistics of all methods."""
     t = recording.t[later(recording.t)]
     step = float(np.median(np.diff(t))) if len(t) > 1 else math.nan
     return {
@@ -240,7 +246,7 @@ def _statistics(recording: Recording, angles: Angles) -> dict[str, float]:
 def _basis(
     recording: Recording, settings: AoaSettings, angles: Angles, model: str, references: tuple[str, ...]
 ) -> Basis:
-    """What an estimate by any method rests on."""
+    """Basis of an estimate by any method."""
     t = recording.t[later(recording.t)]
     rate = angles.rate[np.isfinite(angles.rate)]
     ranges = {
@@ -278,24 +284,24 @@ def _result(
 
 
 def _timing(settings: AoaSettings, angles: Angles, delay: Delay | None) -> dict[str, Any]:
-    """Delays [s], and what a common one does to the angle [rad]: its rate times the delay."""
+    """Delays [s], and the effect of a common one on the angle [rad]: its rate times the delay."""
     rate = np.abs(angles.rate[np.isfinite(angles.rate)])
     largest, rms = _of(np.max, rate), _of(lambda w: np.sqrt(np.mean(np.square(w))), rate)
     timing = settings.timing
-    found: dict[str, Any] = {
+    delays: dict[str, Any] = {
         "gyro_delay": {"stated": timing.gyro_delay, "spectra": None if delay is None else asdict(delay)},
         "common_delay": {"value": timing.common_delay, "u": timing.common_delay_u},
     }
     for name, by in (("cost", timing.common_delay), ("cost_u", timing.common_delay_u), ("cost_per_ms", 1e-3)):
-        found[name] = {
+        delays[name] = {
             "max": None if largest is None else abs(by) * largest,
             "rms": None if rms is None else abs(by) * rms,
         }
-    return found
+    return delays
 
 
 def _beside(other: Angles, angles: Angles, judged: Errors | None) -> dict[str, Any]:
-    """What a comparison tells of a method: its difference from the one that counts, and its error."""
+    """A method in a comparison: its difference from the chosen one, and its error."""
     apart = np.remainder(other.theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
     apart = apart[np.isfinite(apart)]
     return {
@@ -342,5 +348,5 @@ def _of(of: Any, values: Array) -> float | None:
 
 def _rms(innovations: Array) -> float:
     """Root mean square of normalised innovations; NaN without any."""
-    known = innovations[np.isfinite(innovations)]
-    return math.sqrt(float(np.mean(np.square(known)))) if known.size else math.nan
+    finite = innovations[np.isfinite(innovations)]
+    return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else math.nan

@@ -1,9 +1,8 @@
 """Test points: one angle for each pause, with the uncertainty of the mean.
 
-What is wrong with an angle through a pause (biases, positions, axes) is wrong with it in each row: the mean of n rows
-is no better known than one of them, and the mean of their standard uncertainties is its own. To it comes what noise
-and buffet leave in the mean of rows that are correlated, often negatively. It is found from the spectrum near zero:
-with the lowest K cosines of the pause,
+Errors of biases, positions and axes are the same in all rows of a pause: the mean of n rows is no better known than one
+of them, and its standard uncertainty is the mean of theirs. Noise and buffet add to it by the mean of rows that are
+correlated, often negatively. This part is found from the spectrum near zero: with the lowest K cosines of the pause,
 
     L_k = sqrt(2/n) sum_i x_i cos(pi k (i + 1/2) / n),   var(mean) = (1/n) (1/K) sum_k L_k^2,
 
@@ -49,7 +48,7 @@ class Point:
         the last; ``rows`` of them have an angle.
     theta, u : float
         rad, mean and its standard uncertainty: ``u_angle`` common to all rows and ``u_scatter`` of noise and buffet,
-        which is not to be counted where something else is averaged over the same rows.
+        not to be counted where another quantity is averaged over the same rows.
     scatter, rate : float
         rad, standard deviation about the mean; rad/s, slope of the line through the point.
     alpha, u_alpha, beta, u_beta : float
@@ -79,24 +78,24 @@ class Point:
 def points(recording: Recording, angles: Angles, settings: AoaSettings) -> tuple[Point, ...]:
     """The test points of a recording.
 
-    A point is a stretch with one number in the record's ``point`` column, a number that comes again later another one;
-    without that column it is a pause of the angle itself (`inercal.aoa.reading.pauses`). Rows without an angle are
-    left out, and end no point.
+    A point is a stretch with one number in the record's ``point`` column; the same number later is another point.
+    Without that column a point is a pause of the angle itself (`inercal.aoa.reading.pauses`). Rows without an angle
+    are left out, and end no point.
     """
-    known = np.flatnonzero(np.isfinite(angles.theta) & np.isfinite(recording.t))
-    theta = np.unwrap(angles.theta[known])
+    answered = np.flatnonzero(np.isfinite(angles.theta) & np.isfinite(recording.t))
+    theta = np.unwrap(angles.theta[answered])
     if recording.point is None:
-        found = pauses(recording.t[known], theta, angles.known_u[known])
-        stretches = [(float(k), each.start, each.stop) for k, each in enumerate(found, start=1)]
+        dwells = pauses(recording.t[answered], theta, angles.known_u[answered])
+        stretches = [(float(k), each.start, each.stop) for k, each in enumerate(dwells, start=1)]
     else:
-        stretches = _numbered(recording.point[known])
+        stretches = _numbered(recording.point[answered])
     return tuple(
-        _point(number, known[a:b], theta[a:b], recording, angles, settings) for number, a, b in stretches
+        _point(number, answered[a:b], theta[a:b], recording, angles, settings) for number, a, b in stretches
     )
 
 
 def _numbered(number: Array) -> list[tuple[float, int, int]]:
-    """Stretches of one number: it, the first row and the one after the last."""
+    """Stretches of one number: the number, the first row and the one after the last."""
     last, now = number[:-1], number[1:]
     changes = np.flatnonzero((last != now) & ~(np.isnan(last) & np.isnan(now))) + 1
     bounds = [0, *changes.tolist(), len(number)]
@@ -152,12 +151,12 @@ def _point(
 
 
 def mean_u(x: Array) -> float:
-    """Standard uncertainty that noise and oscillations leave in the mean of ``x`` (n,), evenly sampled; 0 for one."""
+    """Standard uncertainty of the mean of ``x`` (n,), evenly sampled, by noise and oscillations; 0 for one value."""
     n = len(x)
     count = min(COSINES, n - 1)
     if count < 1:
         return 0.0
     k = np.arange(1, count + 1)
     cosines = np.cos(math.pi / n * k[:, None] * (np.arange(n) + 0.5))
-    found = math.sqrt(2.0 / n) * (cosines @ (x - x.mean()))
-    return math.sqrt(float(found @ found) / (count * n))
+    coefficients = math.sqrt(2.0 / n) * (cosines @ (x - x.mean()))
+    return math.sqrt(float(coefficients @ coefficients) / (count * n))

@@ -1,8 +1,8 @@
-"""Gravity and roll, which a study states with uncertainties: what their errors do to the angle.
+"""Gravity and roll, stated with uncertainties: the effect of their errors on the angle.
 
-No estimator learns them here. How a wrong one moves theta depends on how the method settles the contradiction between
-sensors that follows, for the fusion on all that it may learn: so the method is run again with each a little off, and
-the change of theta, row by row, is the slope.
+No estimator learns them here. The change of theta by a wrong one depends on how the method resolves the contradiction
+between sensors that follows, for the fusion on all states that it may learn: so the method is run again with each
+changed a little, and the change of theta, row by row, is the slope.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion
+from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import FilterProblem
-from inercal.aoa.fusion.roll import tracked
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import tare
@@ -39,7 +38,8 @@ _KNOWN = 1e-6
 
 
 class Lean(NamedTuple):
-    """What is changed, ``gravity`` or ``roll``, by a ``step`` [m/s^2 or rad]; ``gravity`` and ``roll`` are then so."""
+    """One systematic input, by ``name`` gravity or roll, moved by a ``step`` [m/s^2 or rad]; ``gravity`` and ``roll``
+    are the moved values [m/s^2, rad]."""
 
     name: str
     step: float
@@ -48,18 +48,18 @@ class Lean(NamedTuple):
 
 
 def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
-    """A change of each of what is stated with an uncertainty; a roll that gyros track is a state, and has none."""
+    """A change of each input that is stated with an uncertainty; a roll that gyros track is a state instead."""
     g, roll = settings.site.gravity, settings.attitude.roll
-    level, found = 0.0 if roll is None else roll.value, []
+    level, inputs = 0.0 if roll is None else roll.value, []
     if gravity_u(settings) > _KNOWN * g:
-        found.append(Lean("gravity", g * GRAVITY_STEP, g * (1.0 + GRAVITY_STEP), level))
+        inputs.append(Lean("gravity", g * GRAVITY_STEP, g * (1.0 + GRAVITY_STEP), level))
     if uncertain_roll(settings, tracked):
-        found.append(Lean("roll", ROLL_STEP, g, level + ROLL_STEP))
-    return tuple(found)
+        inputs.append(Lean("roll", ROLL_STEP, g, level + ROLL_STEP))
+    return tuple(inputs)
 
 
 def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> FilterProblem:
-    """The problem of the fusion under a change, which moves also what an earlier run found."""
+    """The problem of the fusion under a change, which also moves the coefficients of an earlier run."""
     constants = problem.constants._replace(gravity=float(lean.gravity), roll_cosine=math.cos(lean.roll))
     mean = problem.mean.copy()
     prior = settings.estimator.prior
@@ -71,23 +71,26 @@ def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> Filter
 
 
 def carried(earlier: Estimate, settings: AoaSettings) -> dict[str, float]:
-    """By how much gravity [m/s^2] moved the coefficients [SI] of an earlier run of the fusion, by their names.
+    """Change of the coefficients [SI] of an earlier run of the fusion per change of gravity [m/s^2], by name.
 
-    Empty where they were found with another gravity than that of the study, whose error is another, or without its
-    uncertainty, or from a reference angle.
+    Empty where they were found with another gravity or another uncertainty of it than the study's, or from a reference
+    angle.
     """
-    known = earlier.result.get("gravity")
-    if known is None or is_verified(earlier):
+    gravity = earlier.result.get("gravity")
+    if gravity is None or is_verified(earlier):
         return {}
-    same = zip((known["value"], known["u"]), (settings.site.gravity, gravity_u(settings)), strict=True)
-    return dict(known["slopes"]) if all(math.isclose(a, b, rel_tol=1e-9) for a, b in same) else {}
+    same = zip((gravity["value"], gravity["u"]), (settings.site.gravity, gravity_u(settings)), strict=True)
+    return dict(gravity["slopes"]) if all(math.isclose(a, b, rel_tol=1e-9) for a, b in same) else {}
 
 
 def by_fusion(
     recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
 ) -> Angles:
-    """The angles of the fusion, with the roll where gyros track it, and with what is stated in their uncertainty."""
-    angles, turned = of_fusion(filtered, settings.estimator.states), tracked(recording, problem, filtered)
+    """The angles of the fusion, with the roll where gyros track it; stated inputs count in their uncertainty."""
+    angles, turned = (
+        of_fusion(filtered, settings.estimator.states),
+        tracked_roll(recording, problem, filtered),
+    )
     if turned is not None:
         angles = replace(angles, roll=turned[0], roll_u=turned[1])
     return _with_stated(
@@ -98,23 +101,23 @@ def by_fusion(
 
 
 def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
-    """The angles of the paper's methods (`inercal.aoa.paper.methods.measure`) less the biases that the study's zero
-    shows, with what is stated in their uncertainty."""
+    """The angles of the paper's methods (`inercal.aoa.paper.methods.measure`) after a tare by the study's zero; stated
+    inputs count in their uncertainty."""
 
-    def found(chosen: AoaSettings) -> Angles:
+    def angles(chosen: AoaSettings) -> Angles:
         return measure(tare(recording, chosen), chosen, methods)
 
     def run(lean: Lean) -> Array:
         attitude, site = settings.attitude, replace(settings.site, gravity=lean.gravity)
         if attitude.roll is not None:
             attitude = replace(attitude, roll=replace(attitude.roll, value=lean.roll))
-        return found(replace(settings, site=site, attitude=attitude)).theta
+        return angles(replace(settings, site=site, attitude=attitude)).theta
 
-    return _with_stated(found(settings), settings, run)
+    return _with_stated(angles(settings), settings, run)
 
 
 def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Array]) -> Angles:
-    """The angles with what is stated in their uncertainty; ``run`` gives theta under a change."""
+    """The angles with stated inputs in their uncertainty; ``run`` gives theta under a change."""
     changes = leans(settings, angles.roll is not None)
     with ThreadPoolExecutor() as pool:
         return widened(angles, settings, changes, list(pool.map(run, changes)))
@@ -123,9 +126,9 @@ def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Ar
 def widened(
     angles: Angles, settings: AoaSettings, changes: Sequence[Lean], turned: Sequence[Array]
 ) -> Angles:
-    """The angles with what is stated in their uncertainty, from theta (n,) under each of the ``changes``.
+    """The angles with stated inputs in their uncertainty, from ``turned``, theta (n,) under each of the ``changes``.
 
-    A row in which there is no such theta goes without.
+    Rows without a changed theta keep their uncertainty.
     """
     for lean, theta in zip(changes, turned, strict=True):
         off = np.remainder(theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
@@ -143,6 +146,6 @@ def gravity_u(settings: AoaSettings) -> float:
 
 
 def uncertain_roll(settings: AoaSettings, tracked: bool) -> float:
-    """Standard uncertainty [rad] of the roll that is stated; 0 where gyros track it: then it is a state."""
+    """Standard uncertainty [rad] of the stated roll; 0 where gyros track it, as the roll is a state then."""
     roll = settings.attitude.roll
     return 0.0 if roll is None or tracked else roll.u

@@ -1,4 +1,4 @@
-"""Tables of an angle of attack for people: the angle, points, sensors, where u comes from, methods side by side."""
+"""Tables of an angle of attack for people: the angle, points, sensors, sources of u, methods side by side."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.aoa.flow import stated
+from inercal.aoa.flow import gives_alpha
 from inercal.aoa.result.budget import ANGLE
 from inercal.aoa.result.display import (
     in_words,
@@ -31,35 +31,35 @@ _SMALL = 0.001
 
 
 def answer(estimate: Estimate, points: Iterable[Point], settings: AoaSettings) -> list[Table]:
-    """What was asked for: the angle, and the points where there are any."""
+    """Tables of the answer: the angle, and the points where there are any."""
     return _with_rows(angle(estimate), points_table(points, settings))
 
 
 def on_page(estimate: Estimate) -> list[Table]:
-    """What a page shows besides the answer, and the errors of the sensors as its coefficients."""
+    """Tables of a page beside the answer and the errors of the sensors."""
     return _with_rows(fitted(estimate), uncertainty(estimate), methods(estimate))
 
 
 def on_terminal(estimate: Estimate) -> list[Table]:
-    """What a terminal shows besides the answer: of a fit to a reference what is off."""
+    """Tables of a terminal beside the answer: of a fit to a reference only coefficients that differ from the study."""
     fit = estimate.result.get("verified")
     off = fitted(estimate, () if fit is None else off_statement(fit))
     return _with_rows(sensors(estimate), off, uncertainty(estimate), methods(estimate))
 
 
 def _with_rows(*tables: Table) -> list[Table]:
-    """Those that have any."""
+    """Tables with rows."""
     return [each for each in tables if each.rows]
 
 
 def angle(estimate: Estimate) -> Table:
     """Range of the angle, its uncertainty, and its error where there is a reference."""
-    told = estimate.result
-    found, u, judged = told["angle"]["range"], told["angle"]["u"], told.get("reference", {})
+    result = estimate.result
+    span, u, judged = result["angle"]["range"], result["angle"]["u"], result.get("reference", {})
     rate = estimate.conditions["ranges"]["rate_rad_s"]
     rows = [
-        ("angle, smallest", *_degrees(None if found is None else found[0], 6)),
-        ("angle, largest", *_degrees(None if found is None else found[1], 6)),
+        ("angle, smallest", *_degrees(None if span is None else span[0], 6)),
+        ("angle, largest", *_degrees(None if span is None else span[1], 6)),
         ("u of the angle, median after 2 s", *_degrees(u["median"])),
         ("u of the angle, largest after 2 s", *_degrees(u["max"])),
         ("rate, largest", short(None if rate is None else math.degrees(rate)), "deg/s"),
@@ -71,12 +71,12 @@ def angle(estimate: Estimate) -> Table:
     ):
         if key in judged:
             rows.append((f"{words} against theta_ref", short(judged[key]), "deg"))
-    return Table("Angle", f"By {told['method']}.", (("", ""), ("value", ""), ("unit", "")), tuple(rows))
+    return Table("Angle", f"By {result['method']}.", (("", ""), ("value", ""), ("unit", "")), tuple(rows))
 
 
 def points_table(points: Iterable[Point], settings: AoaSettings) -> Table:
-    """Points in a row each, with alpha and beta where the study says how the model lies in the stream."""
-    flow = stated(settings.attitude)
+    """Points, a row each, with alpha and beta where the study states how the model lies in the stream."""
+    flow = gives_alpha(settings.attitude)
     rows = []
     for each in points:
         alpha, u_alpha = _rounded(each.alpha, each.u_alpha)
@@ -111,7 +111,7 @@ def points_table(points: Iterable[Point], settings: AoaSettings) -> Table:
 
 
 def sensors(estimate: Estimate) -> Table:
-    """What was learned of the sensors, with the uncertainty before and after."""
+    """Errors of the sensors, with the uncertainty before and after."""
     rows = []
     for name, each in estimate.parameters.items():
         unit, size = shown_unit(each.unit)
@@ -129,7 +129,7 @@ def sensors(estimate: Estimate) -> Table:
 
 
 def fitted(estimate: Estimate, names: Container[str] | None = None) -> Table:
-    """What the reference angle says of the sensors: of those with these ``names``, or of all."""
+    """Coefficients of the fit to the reference angle: those with these ``names``, or all."""
     fit = estimate.result.get("verified")
     heads = (("", ""), ("what it is", ""), ("value", ""), ("u", ""), ("unit", ""), ("as angle", "deg"))
     title, rows = "Sensors as fitted to the reference angle", []
@@ -142,8 +142,8 @@ def fitted(estimate: Estimate, names: Container[str] | None = None) -> Table:
         unit, size = _OF_AXIS if name.startswith("dlambda_") else shown_unit(each["unit"])
         shown, u = rounded(value / size, each["u"] / size)
         angle = f"{math.degrees(value):.4f}" if name.startswith("dlambda_") else ""
-        told = ("not seen", "–", "", "") if name in fit["unseen"] else (shown, u, unit, angle)
-        rows.append((name, in_words(name), *told))
+        cells = ("not seen", "–", "", "") if name in fit["unseen"] else (shown, u, unit, angle)
+        rows.append((name, in_words(name), *cells))
     title += "" if fit["converged"] else ": it did not converge, and is not to be used"
     noise = short(math.degrees(fit["reference_noise_rad"]))
     rows.append(("", "noise of theta_ref from sample to sample", noise, "–", "deg", ""))
@@ -152,11 +152,11 @@ def fitted(estimate: Estimate, names: Container[str] | None = None) -> Table:
 
 
 def uncertainty(estimate: Estimate) -> Table:
-    """Where the uncertainty of the angle comes from, the largest part first."""
+    """Sources of the uncertainty of the angle, the largest first."""
     variance = estimate.result["angle"]["u"]["median"]
-    found = sorted(estimate.budget, key=lambda each: -each.share.get(ANGLE, 0.0))
+    largest_first = sorted(estimate.budget, key=lambda each: -each.share.get(ANGLE, 0.0))
     rows = []
-    for each in found:
+    for each in largest_first:
         share = each.share.get(ANGLE, 0.0)
         if share >= _SMALL and variance is not None:
             stated_u, unit = sized(each.u, each.unit)
@@ -175,16 +175,16 @@ def uncertainty(estimate: Estimate) -> Table:
 
 def methods(estimate: Estimate) -> Table:
     """Methods side by side: errors against the reference angle where there is one, else differences from the first."""
-    told = estimate.result
-    judged = "reference" in told
+    result = estimate.result
+    judged = "reference" in result
     rows = [
         (
-            told["method"],
-            _errors(told.get("reference")) if judged else ("–", "–"),
-            told["angle"]["u"]["median"],
+            result["method"],
+            _errors(result.get("reference")) if judged else ("–", "–"),
+            result["angle"]["u"]["median"],
         )
     ]
-    for name, each in told["compare"].items():
+    for name, each in result["compare"].items():
         u = each["u_median_deg"]
         u = None if u is None else math.radians(u)
         apart = each["difference"]
@@ -194,14 +194,14 @@ def methods(estimate: Estimate) -> Table:
             else (short(apart["max_abs_deg"]), short(apart["rms_deg"]))
         )
         rows.append((name, numbers, u))
-    lines = tuple((name, *numbers, _degrees(u)[0]) for name, numbers, u in rows) if told["compare"] else ()
+    lines = tuple((name, *numbers, _degrees(u)[0]) for name, numbers, u in rows) if result["compare"] else ()
     caption, heads = (
         (
             "Angle less theta_ref after the first 2 s, also where the reference rests and moves.",
             ("largest error", "rms", "mean", "rms at rest", "rms moving"),
         )
         if judged
-        else (f"Difference of the angle from that of {told['method']}.", ("largest difference", "rms"))
+        else (f"Difference of the angle from that of {result['method']}.", ("largest difference", "rms"))
     )
     return Table(
         "Methods side by side",

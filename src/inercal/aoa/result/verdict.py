@@ -1,4 +1,4 @@
-"""Whether angles can be used: the status of an estimate, its sentence, and what is found beside it."""
+"""The verdict on angles: the status of an estimate, its sentence, and findings beside it."""
 
 from __future__ import annotations
 
@@ -24,48 +24,47 @@ NIS_LIMIT = 2.0
 """Mean squared innovation, over its variance, above which a recording contradicts the model."""
 
 NIS_CHANCE = 1e-5
-"""Chance to find a sound recording above the limit, where that is so short that scatter alone may be."""
+"""Chance of a sound recording above the limit, where few innovations scatter."""
 
 SHAKING = 5.0
 """Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
 
 _LOSSES = 3
-"""Losses of the angle without a gap from which a filter does not hold it."""
+"""Losses of the angle without a gap from which on a filter counts as lost."""
 
 _BLIND = 0.1
 """Time [s] without accelerometers after which no filter has the angle."""
 
 
 def of_fusion(
-    recording: Recording, filtered: FilterResult, angles: Angles, said: Sequence[Finding]
+    recording: Recording, filtered: FilterResult, angles: Angles, findings: Sequence[Finding]
 ) -> tuple[Status, str]:
-    """Status and sentence of what the fusion found; ``said`` all findings.
+    """Status and sentence of a result of the fusion, by all its findings.
 
-    ``inconsistent`` where the mean NIS is beyond its limit, and also below it where sensors contradict each other so
-    grossly that a fault of sign, unit or order is named: resonators and gates take much of it up, and the angle is
-    wrong all the same.
+    ``inconsistent`` where the mean NIS is beyond its limit, and also below it where a gross fault of sign, unit or
+    order is named: resonators and gates absorb much of the contradiction, and the angle is wrong all the same.
     """
-    state, known, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
-    if 2 * known.sum() <= len(known):
-        return Status.NOT_CONVERGED, _because(_missing(known), said)
+    state, answered, mean = filtered.state, np.isfinite(filtered.theta), filtered.nis_mean
+    if 2 * answered.sum() <= len(answered):
+        return Status.NOT_CONVERGED, _because(_missing(answered), findings)
     if not (np.isfinite(state.x).all() and is_covariance(state.P)):
-        return Status.NOT_CONVERGED, _because("the filter has lost its numbers", said)
+        return Status.NOT_CONVERGED, _because("the filter has lost its numbers", findings)
     limit = nis_limit(filtered.nis_count)
     if mean > limit:
         text = f"the recording contradicts the model: mean NIS {mean:.4g}, expected at most {limit:.3g}"
-        return Status.INCONSISTENT, _because(text, said)
-    gross = [each for each in said if CODES[each.code].gross and each not in recording.findings]
+        return Status.INCONSISTENT, _because(text, findings)
+    gross = [each for each in findings if CODES[each.code].gross and each not in recording.findings]
     if gross:
         return Status.INCONSISTENT, _because("the sensors contradict each other or the study", gross)
     lost = _lost(recording, filtered)
     if lost is not None:
-        return Status.NOT_CONVERGED, _because(lost, said)
+        return Status.NOT_CONVERGED, _because(lost, findings)
     judged = f"mean NIS {mean:.3g}" if math.isfinite(mean) else "too few readings for a NIS"
     return Status.OK, f"{_words(angles)}, {judged}"
 
 
 def nis_limit(count: int) -> float:
-    """Most that the mean of ``count`` squared innovations may be: `NIS_LIMIT`, and more where they are few.
+    """Limit of the mean of ``count`` squared innovations: `NIS_LIMIT`, and more where they are few.
 
     A sound filter's squares are chi-square with one degree of freedom each (Bar-Shalom et al., Estimation with
     Applications to Tracking and Navigation, 2001, section 5.4).
@@ -75,16 +74,16 @@ def nis_limit(count: int) -> float:
     return max(NIS_LIMIT, float(chdtri(count, NIS_CHANCE)) / count) if count else NIS_LIMIT
 
 
-def of_method(angles: Angles, said: Sequence[Finding]) -> tuple[Status, str]:
-    """Status and sentence of what one of the paper's methods found."""
-    known = np.isfinite(angles.theta)
-    if 2 * known.sum() <= len(known):
-        return Status.NOT_CONVERGED, _because(_missing(known), said)
+def of_method(angles: Angles, findings: Sequence[Finding]) -> tuple[Status, str]:
+    """Status and sentence of a result of the paper's methods."""
+    answered = np.isfinite(angles.theta)
+    if 2 * answered.sum() <= len(answered):
+        return Status.NOT_CONVERGED, _because(_missing(answered), findings)
     return Status.OK, f"{angles.method}: {_words(angles)}"
 
 
 def is_covariance(P: Array) -> bool:
-    """Whether no combination of states has a negative variance, but for rounding."""
+    """True where no combination of states has a negative variance, but for rounding."""
     if not (np.isfinite(P).all() and (np.diag(P) >= 0.0).all()):
         return False
     u = np.sqrt(np.diag(P))
@@ -95,7 +94,7 @@ def is_covariance(P: Array) -> bool:
 
 
 def _lost(recording: Recording, filtered: FilterResult) -> str | None:
-    """That a filter lost the angle too often, in words; None where it did not."""
+    """A sentence on a filter that lost the angle too often; None otherwise."""
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
     losses = [
         row
@@ -110,13 +109,13 @@ def _lost(recording: Recording, filtered: FilterResult) -> str | None:
     )
 
 
-def _missing(known: NDArray[np.bool_]) -> str:
-    """That most rows have no angle."""
-    return f"{counted(int((~known).sum()), 'row')} of {len(known)} have no angle"
+def _missing(answered: NDArray[np.bool_]) -> str:
+    """A sentence on rows without an angle."""
+    return f"{counted(int((~answered).sum()), 'row')} of {len(answered)} have no angle"
 
 
 def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
-    """Of all coefficients whose u is a ``ratio`` (p,) of their prior's: those of which the recording says nothing."""
+    """``at_prior``: coefficients that the recording does not show, by the ``ratio`` (p,) of their u to the prior's."""
     left = [name for name, each in zip(names, ratio, strict=True) if each > UNSEEN]
     if not left:
         return None
@@ -128,7 +127,7 @@ def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
 
 
 def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings) -> Finding | None:
-    """That the sting shakes the model, where it does."""
+    """``flexure``: a sting that shakes the model; None where it does not."""
     at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
     if not at or not len(filtered.kept_t):
         return None
@@ -147,17 +146,17 @@ def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings
     return Finding("flexure", text, harm=("theta",))
 
 
-def _because(text: str, said: Sequence[Finding]) -> str:
-    """A bad verdict with the finding that explains it best."""
-    ranked = causes(said)
+def _because(text: str, findings: Sequence[Finding]) -> str:
+    """The sentence of a bad verdict with the finding that explains it best."""
+    ranked = causes(findings)
     cause = ranked[0].message if ranked else "check signs, units, positions, noise and gravity"
     return f"{text}; {cause}"
 
 
 def _words(angles: Angles) -> str:
-    """How many angles, from where to where, and how well they are known."""
-    known = np.isfinite(angles.theta)
-    low, high = np.degrees([angles.theta[known].min(), angles.theta[known].max()])
+    """Number, range and median uncertainty of the angles, in words."""
+    answered = np.isfinite(angles.theta)
+    low, high = np.degrees([angles.theta[answered].min(), angles.theta[answered].max()])
     u = angles.u[np.isfinite(angles.u)]
-    told = f", u {math.degrees(float(np.median(u))):.2g} deg (median)" if len(u) else ""
-    return f"{counted(int(known.sum()), 'angle')} from {low:.4g} to {high:.4g} deg{told}"
+    spread = f", u {math.degrees(float(np.median(u))):.2g} deg (median)" if len(u) else ""
+    return f"{counted(int(answered.sum()), 'angle')} from {low:.4g} to {high:.4g} deg{spread}"

@@ -1,4 +1,4 @@
-"""How far angles are from a reference angle, as a turntable gives it."""
+"""Errors of angles against a reference angle, as of a turntable."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REFERENCE_U = 1e-5
 class Error:
     """Angle less reference over some ``rows`` [rad]: largest magnitude, root mean square and mean; NaN without rows.
 
-    ``ratio`` is the root mean square of the error over its standard uncertainty: about 1, or below, where that holds.
+    ``ratio`` is the root mean square of the error over its standard uncertainty: about 1, or below, where u is right.
     """
 
     max_abs: float
@@ -55,10 +55,10 @@ def errors(recording: Recording, angles: Angles, after: float = SETTLED) -> Erro
     """
     if recording.reference is None or not np.isfinite(recording.reference).any():
         raise RecordError("theta_ref", "missing, expected a reference angle to verify angles against")
-    known = np.flatnonzero(np.isfinite(recording.reference) & np.isfinite(recording.t))
-    t, reference = recording.t[known], np.unwrap(recording.reference[known])
-    off = np.remainder(angles.theta[known] - reference + math.pi, 2.0 * math.pi) - math.pi
-    u = angles.u[known]
+    rows = np.flatnonzero(np.isfinite(recording.reference) & np.isfinite(recording.t))
+    t, reference = recording.t[rows], np.unwrap(recording.reference[rows])
+    off = np.remainder(angles.theta[rows] - reference + math.pi, 2.0 * math.pi) - math.pi
+    u = angles.u[rows]
     still, _ = at_rest(t, reference, np.full(len(t), REFERENCE_U))
     taken = np.isfinite(off) & (t >= t[0] + after)
     return Errors(
@@ -70,12 +70,12 @@ def errors(recording: Recording, angles: Angles, after: float = SETTLED) -> Erro
 
 
 def _error(off: Array, u: Array, taken: NDArray[np.bool_]) -> Error:
-    """Of the rows that are taken."""
+    """Error over the taken rows."""
     off, u = off[taken], u[taken]
     if len(off) == 0:
         return Error(math.nan, math.nan, math.nan, math.nan, 0)
-    told = np.isfinite(u) & (u > 0.0)
-    ratio = math.sqrt(float(np.mean((off[told] / u[told]) ** 2))) if told.any() else math.nan
+    usable = np.isfinite(u) & (u > 0.0)
+    ratio = math.sqrt(float(np.mean((off[usable] / u[usable]) ** 2))) if usable.any() else math.nan
     return Error(
         float(np.abs(off).max()), math.sqrt(float(np.mean(off**2))), float(off.mean()), ratio, len(off)
     )
