@@ -7,7 +7,6 @@ from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.display import displayed
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.platform.coefficients import GROUPS
@@ -76,7 +75,7 @@ def _run(done, draws):
     estimate = found.estimate
     done.outcome = estimate.status.value
     done.wrong += laws.of_estimate(estimate)
-    displayed(estimate).table()
+    estimate.shown().table()
     history_record(found.filtered, found.recording, found.problem.world)
     if beside:
         compared(found)
