@@ -24,7 +24,6 @@ from inercal.report.courses import turning
 from inercal.selfcal.before.bounds import Bounds
 from inercal.selfcal.before.observability import seen
 from inercal.selfcal.before.path_design import Designed, Judged
-from inercal.selfcal.display import of_field
 from inercal.selfcal.figures.design import page as design_page
 from inercal.selfcal.figures.filters import attitude_errors
 from inercal.selfcal.figures.monte_carlo import page as campaign_page
@@ -32,7 +31,14 @@ from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.monte_carlo import Campaign
-from inercal.selfcal.platform.coefficients import names, product_slope, to_linear, to_product, units
+from inercal.selfcal.platform.coefficients import (
+    names,
+    product_slope,
+    shown_units,
+    to_linear,
+    to_product,
+    units,
+)
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.result.comparison import side_by_side
@@ -262,7 +268,7 @@ def test_what_people_see_is_the_same_in_other_units():
     si = evidence(filtered(p=24)).estimate
     shown = si.shown()
     factor = [parse_unit(unit).factor for unit in shown.units]
-    assert shown.units == of_field(24)[0]
+    assert shown.units == shown_units(24)[0]
     assert shown.values * factor == pytest.approx(si.values)
     assert shown.u * factor == pytest.approx(si.u)
     assert shown.correlation == pytest.approx(si.correlation)

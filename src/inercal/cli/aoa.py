@@ -11,12 +11,12 @@ from cyclopts import Parameter
 
 from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
-from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
+from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError, StudyError
 
 if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
-    from inercal.stream.lines import Lines
+    from inercal.cli.streaming import Estimators
 
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
@@ -109,8 +109,7 @@ def aoa(
     keys = [*(overrides or ()), *how.keys]
     how.check(stream)
     if stream:
-        span.refuse("a stream")
-        _live(streamed(files), study, map_file, keys, interval_of(every), streaming, output)
+        stream_study("aoa", _live, files, study, keys, every, map_file, span, streaming, output)
         return 0
     paths = recorded("aoa", files, streaming, every)
 
@@ -135,35 +134,17 @@ def aoa(
     return give(result, output, read_s, "angles")
 
 
-def _live(
-    file: Path | None,
-    study: Path,
-    map_file: Path | None,
-    keys: list[str],
-    interval: float,
-    streaming: StreamOptions,
-    output: ReportOutput,
-) -> None:
-    """Measure row by row."""
+def _live(settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
+    """Prepare a measurement row by row."""
     from inercal._jit import compiling
     from inercal.aoa.fusion.live import load_kernels
     from inercal.aoa.fusion.problem import problem
-    from inercal.face.study import read_study
     from inercal.stream.aoa import Aoa
 
-    streaming.check(output, (file, map_file, study))
-    the_study = read_study("aoa", study, keys)
-    settings = the_study.settings
-    with the_study.at_fault():
-        if settings.estimator.smooth:
-            raise StudyError(
-                "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
-            )
-        with compiling("aoa", output.say):
-            load_kernels(problem(settings))
-
-    def measurement(lines: Lines) -> Aoa:
-        with the_study.at_fault():
-            return Aoa(lines, settings, interval, output.say_finding)
-
-    run_stream(measurement, file, map_file, output, streaming)
+    if settings.estimator.smooth:
+        raise StudyError(
+            "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
+        )
+    with compiling("aoa", output.say):
+        load_kernels(problem(settings))
+    return lambda lines: Aoa(lines, settings, interval, output.say_finding)

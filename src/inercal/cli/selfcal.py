@@ -10,11 +10,12 @@ from cyclopts import Parameter
 
 from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
-from inercal.cli.streaming import Every, StreamOptions, interval_of, recorded, run_stream, streamed
+from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.stream.lines import Lines
+    from inercal.cli.streaming import Estimators
+    from inercal.selfcal.settings import SelfcalSettings
 
 Kind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
 
@@ -54,8 +55,7 @@ def selfcal(
     if stream:
         if compare:
             raise InputError("--compare", "found with a stream, expected one estimator")
-        span.refuse("a stream")
-        _live(streamed(files), study, map_file, keys, interval_of(every), streaming, output)
+        stream_study("selfcal", _live, files, study, keys, every, map_file, span, streaming, output)
         return 0
     paths = recorded("selfcal", files, streaming, every)
 
@@ -65,7 +65,7 @@ def selfcal(
     from inercal.records.write import SUFFIXES
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
-    the_study = read_study("selfcal", study, keys)
+    of = read_study("selfcal", study, keys)
     clock = time.perf_counter()
     records = read_repeats(paths, map_file, output, span)
     read_s = time.perf_counter() - clock
@@ -73,41 +73,24 @@ def selfcal(
         raise InputError("--compare", f"found {len(records)} runs, expected one")
     if len(records) > 1 and output.out is not None and output.out.suffix.lower() in SUFFIXES:
         raise InputError(output.out, f"found {len(records)} runs, expected one for a history, or .json")
-    of_all = " all" if compare else f" {the_study.settings.filter.kind}"
+    of_all = " all" if compare else f" {of.settings.filter.kind}"
     with compiling(f"selfcal{of_all}", output.say):
-        system.prepare(the_study, compare)
+        system.prepare(of, compare)
     with working(output) as progress:
-        result = system.calibrate(records, the_study, compare, progress)
-    return give(result, output, read_s)
+        outcome = system.calibrate(records, of, compare, progress)
+    return give(outcome, output, read_s)
 
 
-def _live(
-    file: Path | None,
-    study: Path,
-    map_file: Path | None,
-    keys: list[str],
-    interval: float,
-    streaming: StreamOptions,
-    output: ReportOutput,
-) -> None:
-    """Calibrate row by row."""
+def _live(settings: SelfcalSettings, interval: float, output: ReportOutput) -> Estimators:
+    """Prepare a calibration row by row."""
     from inercal._jit import compiling
-    from inercal.face.study import read_study
     from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.find_base import stated_well
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
 
-    streaming.check(output, (file, map_file, study))
-    of = read_study("selfcal", study, keys)
-    with of.at_fault():
-        stated_well(of.settings, "a stream")
-        filter_problem = problem(of.settings)
-        filter_of(filter_problem)
-        with compiling(f"selfcal stream {filter_problem.filter.kind}", output.say):
-            load_kernels(filter_problem)
-
-    def calibration(lines: Lines) -> Selfcal:
-        with of.at_fault():
-            return Selfcal(lines, filter_problem, interval, output.say_finding)
-
-    run_stream(calibration, file, map_file, output, streaming)
+    stated_well(settings, "a stream")
+    of = problem(settings)
+    filter_of(of)
+    with compiling(f"selfcal stream {of.filter.kind}", output.say):
+        load_kernels(of)
+    return lambda lines: Selfcal(lines, of, interval, output.say_finding)

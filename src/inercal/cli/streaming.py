@@ -1,4 +1,4 @@
-"""Streams on the command line: their options, and an estimator run from lines to lines."""
+"""Streams of the commands: their options, and an estimator run from lines to lines."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import abandon_output
-from inercal.cli.options import FileOutput, Output, ReportOutput, whole_number
+from inercal.cli.options import FileOutput, Output, ReportOutput, Span, whole_number
 from inercal.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:
     from inercal.stream.lines import Lines
     from inercal.stream.run import Recursive
+
+    Estimators = Callable[[Lines], Recursive[Any]]
 
 _STANDARD_INPUT = "standard input"
 
@@ -104,8 +106,37 @@ def recorded(
     return files
 
 
+def stream_study(
+    kind: str,
+    prepare: Callable[[Any, float, ReportOutput], Estimators],
+    files: list[Path] | None,
+    study: Path,
+    keys: list[str],
+    every: str | None,
+    map_file: Path | None,
+    span: Span,
+    options: StreamOptions,
+    output: ReportOutput,
+) -> None:
+    """Run the estimator of a study on a stream; ``prepare`` takes its settings, the interval [s] and the output."""
+    from inercal.face.study import read_study
+
+    span.refuse("a stream")
+    file, interval = streamed(files), interval_of(every)
+    options.check(output, (file, map_file, study))
+    of = read_study(kind, study, keys)
+    with of.at_fault():
+        make = prepare(of.settings, interval, output)
+
+    def estimator(lines: Lines) -> Recursive[Any]:
+        with of.at_fault():
+            return make(lines)
+
+    run_stream(estimator, file, map_file, output, options)
+
+
 def run_stream(
-    estimator: Callable[[Lines], Recursive[Any]],
+    estimator: Estimators,
     file: Path | None,
     map_file: Path | None,
     output: Output,

@@ -35,12 +35,12 @@ class Convention:
     ``si`` is true where its samples are in SI units; outputs in another physical unit are then converted, counts
     are not. The functions:
 
-    terms : model -> terms; raises `InputError` where the convention has no place for something.
+    terms : model -> terms; raises `InputError` where the convention has no place for a term.
     model : terms, output units by sensor -> model; the inverse of ``terms``.
     term_units : output units -> unit of each term.
     render : terms, output units -> text by the ending of its file's name ("" where there is one file).
     parse : [(path, text), ...] -> terms, output units as far as the files state them; raises `InputError`.
-    notes : terms -> what a user should know of this conversion.
+    notes : terms -> findings on this conversion.
     """
 
     name: str

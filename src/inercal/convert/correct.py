@@ -22,7 +22,7 @@ Samples = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class Correction:
-    """Correction of the samples of a record, or its inverse, from corrected samples to outputs of the instrument.
+    """Correction of the samples of a record, or its inverse.
 
     ``work`` takes samples by sensor, times ``factors``, to results in ``units``; ``settings`` hold all that decides
     them.

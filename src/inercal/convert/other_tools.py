@@ -40,7 +40,7 @@ MODEL = "y = S M x + b, and for the gyro + G f (K1, M, K0; S, T, D_F, G), frame 
 class Converted:
     """A calibration in another tool's terms: an ``estimate`` of them, and the ``texts`` of the tool's files.
 
-    ``texts`` are by what is put between the stem and the suffix of a file's name.
+    The key of a text goes between the stem and the suffix of its file's name.
     """
 
     estimate: Estimate
@@ -57,7 +57,7 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
     Raises
     ------
     InputError
-        The estimate is none of an IMU, or the convention has no place for something that matters.
+        The estimate is not of an IMU, or the convention has no place for a term that matters.
     """
     convention = CONVENTIONS[name]
 
@@ -87,7 +87,7 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
             largest = float(np.max(np.abs(model.g_sensitivity))) * STANDARD_GRAVITY
             text += f" (G is up to {largest:.2g} {model.units['gyro']} at 1 g)"
         findings.append(Finding("not_held", text))
-    said = [
+    earlier = [
         replace(each, harm=_touched(each.harm, estimate.names, matters, [names[i] for i in rows]))
         for each in estimate.findings
     ]
@@ -100,7 +100,7 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
         covariance=J @ estimate.covariance @ J.T,
         common=None if estimate.common is None else J @ estimate.common @ J.T,
         dof=dof,
-        findings=(*said, *findings),
+        findings=(*earlier, *findings),
         budget=(),
         model=convention.equation,
         timing={},
@@ -152,7 +152,7 @@ def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None 
     Raises
     ------
     InputError
-        The files are not what was said, hold what a triad cannot, or the units are neither stated nor given.
+        The files are not of that convention, hold terms that a triad cannot, or units are neither stated nor given.
     """
     convention = CONVENTIONS[name]
     terms, in_files = convention.parse([(path, _text(path, name)) for path in paths])

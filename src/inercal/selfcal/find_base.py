@@ -1,8 +1,8 @@
-"""How the base stands, found from the record before the calibration where a study says it too roughly.
+"""The base found from the record before the calibration, where a study states it too roughly.
 
-Filters linearise at what they know so far. About a base that is a degree off, the first rows turn beta by far more than
-what the record tells of it in the end, while all else is known poorly too; what is lost there does not come back, and
-information is made up. The batch estimator linearises all rows again and again where it stands, and so ends right.
+Filters linearise at their present estimate. About a base that is a degree off, the first rows turn beta by far more
+than the record supports in the end, while all else is known poorly too; information lost there does not come back, and
+some is made up. The batch estimator linearises all rows again and again where it stands, and so ends right.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ LAST = 10.0
 
 
 def is_rough(settings: SelfcalSettings) -> bool:
-    """Whether the base is to be found before the calibration: heading unknown, or a wide prior of beta."""
+    """True for a base to be found before the calibration: heading unknown, or a wide prior of beta."""
     wide = settings.filter.extended and bool((settings.prior[BETA] > NEAR).any())
     return settings.heading_unknown or wide
 
@@ -62,17 +62,16 @@ def stated_well(settings: SelfcalSettings, use: str) -> None:
 
 
 def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSettings:
-    """The study with the base that its recording tells, and beta, relative to that, to correct it.
+    """The study with the base found from its recording, and beta, relative to that, to correct it.
 
     The most probable base is the batch estimator's, with the prior of the study; one of unknown heading is looked for
     from four headings, a quarter turn apart, and the most probable of these is taken. The prior of beta about the base
     found is `LAST` times its bound, the study's where that is narrower; about level axes too, as a tilt of a minute of
-    arc by a wide heading is enough to make up information. The bound is linearised at one base: it does not add up what
-    different headings would tell. Where residuals are larger than the noise that is stated, so is the prior. Where
-    rounding leaves no bound the prior stays as it is: the covariance of the calibration is lost too, and its verdict
-    says so.
+    arc by a wide heading is enough to make up information. The bound is linearised at one base: it does not add up
+    different headings. Where residuals are larger than the stated noise, so is the prior. Where rounding leaves no
+    bound the prior stays as it is: the covariance of the calibration is lost too, and its verdict says so.
 
-    What the study knows enters twice, in the base and about it: that is nothing where the recording tells a hundred
+    The prior of the study enters twice, in the base and about it: that is nothing where the recording tells a hundred
     times more, a tenth too little in u where it tells as much.
 
     Raises
@@ -87,17 +86,17 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
         guesses = [replace(base, heading=0.5 * math.pi * k) for k in range(4)]
     wide = replace(settings, prior=prior, filter=replace(settings.filter, extended=True))
     tried = [(guess, _batch(recording, replace(wide, base=guess))) for guess in guesses]
-    base, found = min(tried, key=lambda each: _misfit(each[1]))
-    if not math.isfinite(_misfit(found)):
+    base, batch = min(tried, key=lambda each: _misfit(each[1]))
+    if not math.isfinite(_misfit(batch)):
         return wide  # a recording that contradicts the model: the diagnosis says how
-    near = replace(wide, base=base.turned(found.coefficients[BETA]))
-    bound = _bound(recording, near, found)
+    near = replace(wide, base=base.turned(batch.coefficients[BETA]))
+    bound = _bound(recording, near, batch)
     if singular(prior[BETA], bound) is not None:
         return near
     u = np.sqrt(np.diag(bound))
     if settings.heading_unknown:
         _told(float(vertical @ u), settings)
-    scatter = math.sqrt(max(1.0, np.nansum(found.nis) / max(found.dims.sum(), 1)))
+    scatter = math.sqrt(max(1.0, np.nansum(batch.nis) / max(batch.dims.sum(), 1)))
     last = prior.copy()
     last[BETA] = np.minimum(prior[BETA], LAST * scatter * u)
     return replace(near, prior=last)
@@ -111,9 +110,9 @@ def heading(base: Base, beta: Array, covariance: Array) -> tuple[float, float]:
     return base.turned(beta).heading, math.sqrt(slope @ covariance @ slope)
 
 
-def relative(beta: Array, stated: Base, found: Base) -> Array:
-    """Beta (3,) [rad], stated against one base, against another."""
-    between = stated.from_geographic() @ found.from_geographic().T
+def relative(beta: Array, old: Base, new: Base) -> Array:
+    """Beta (3,) [rad] against a ``new`` base, from that against an ``old`` one."""
+    between = old.from_geographic() @ new.from_geographic().T
     return log(multiply(exp(beta), from_matrix(between)))
 
 
@@ -122,18 +121,18 @@ def _batch(recording: Recording, settings: SelfcalSettings) -> FilterResult:
     return estimate(recording, problem(settings), "map")
 
 
-def _misfit(found: FilterResult) -> float:
+def _misfit(batch: FilterResult) -> float:
     """Sum of squares that the batch estimator made smallest; infinite where it did not end."""
-    return float(np.nansum(found.nis)) if found.converged else math.inf
+    return float(np.nansum(batch.nis)) if batch.converged else math.inf
 
 
-def _bound(recording: Recording, settings: SelfcalSettings, found: FilterResult) -> Array:
+def _bound(recording: Recording, settings: SelfcalSettings, batch: FilterResult) -> Array:
     """(3, 3) covariance of beta about the base of ``settings`` [rad^2], along the path found."""
-    assert found.history is not None
-    coefficients = found.coefficients.copy()
+    assert batch.history is not None
+    coefficients = batch.coefficients.copy()
     coefficients[BETA] = 0.0
-    along = found.history.attitude, coefficients
-    bounds = recorded_bounds(recording, problem(settings), *along, restarts=found.restarts)
+    along = batch.history.attitude, coefficients
+    bounds = recorded_bounds(recording, problem(settings), *along, restarts=batch.restarts)
     return bounds.covariance[BETA, BETA]
 
 

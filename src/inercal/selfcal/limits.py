@@ -1,4 +1,4 @@
-"""Limits by which the diagnosis of a platform judges: one table, printed in the book."""
+"""Limits of the diagnosis of a platform: one table, printed in the book."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Limits:
     """Ratio of sums of NIS, after to before, below which a gross fault is taken though the rest is not sound."""
 
     explained_ratio: float = 0.5
-    """The same from which a gross fault is not what happened."""
+    """The same ratio from which a gross fault is not what happened."""
 
     single_rows: int = 60
     """Rows that are left out one after the other before they no longer count as single."""
@@ -53,7 +53,7 @@ class Limits:
     """Share of a leap by which it may differ from a multiple of the commanded turn."""
 
     widened_prior: float = 10.0
-    """Times a coefficient, or its prior, to which a prior that is in its way is widened."""
+    """Multiple of a coefficient, or of its prior, to which a contradicted prior is widened."""
 
     harmonic_orders: int = 64
     """Largest number of periods a turn at which an error of an encoder is looked for."""
@@ -68,13 +68,13 @@ class Limits:
     """Standard uncertainties of a parameter from which it is named with its value."""
 
     low_noise_ratio: float = 1.1
-    """Ratio of stated noise to scatter from which it is worth a word: 10 % in every u."""
+    """Ratio of stated noise to scatter from which it is reported: 10 % in every u."""
 
     even_parts: int = 10
     """Parts of a recording over which noise must be the same to be called even."""
 
     scatter_scalars: int = 100
-    """Innovations of a sensor at least from which its scatter is told."""
+    """Least number of innovations of a sensor from which its scatter is reported."""
 
     compared_stretches: int = 100
     """Stretches of a recording that are compared roughly, so long that the noise of encoders does not matter."""
@@ -92,7 +92,7 @@ class Limits:
     """Share by which the median norm of the accelerometers may differ from gravity."""
 
     off_the_path: float = math.radians(5.0)
-    """Angle [rad] from the study's path that is said: earth rate moves a platform less, which is not told to follow."""
+    """Angle [rad] from the study's path that is reported: earth rate moves a platform less that does not follow it."""
 
 
 LIMITS = Limits()

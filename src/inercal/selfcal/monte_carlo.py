@@ -1,4 +1,4 @@
-"""Monte Carlo of self-calibration: are the stated uncertainties true, and do they reach the bound?"""
+"""Monte Carlo of self-calibration: stated uncertainties against errors and bounds."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ AWAY = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """What many simulated runs say of one estimator; coefficients in the product form, SI.
+    """Errors of one estimator over many simulated runs; coefficients in the product form, SI.
 
     Attributes
     ----------
@@ -81,9 +81,9 @@ class Campaign:
 
     @property
     def passed(self) -> bool:
-        """Whether all runs converged, and neither coverage nor NEES nor NIS says that uncertainties are too small.
+        """True where all runs converged, and neither coverage nor NEES nor NIS says that uncertainties are too small.
 
-        Too large they may seem: a truth well within the prior makes what is left at its prior look so.
+        They may seem too large: so look coefficients left at their prior, of a truth well within it.
         """
         coverage, nees = self.coverage, self.nees
         held = coverage.fraction.min() >= coverage.limits[0] and coverage.pooled >= coverage.pooled_limits[0]
@@ -97,17 +97,17 @@ class Campaign:
 
     @property
     def harmless(self) -> str:
-        """What is outside its limits on the side where uncertainties are rather too large, in words; or nothing."""
+        """Names and statistics outside their limits as uncertainties are rather too large, in words, if any."""
         coverage, nees = self.coverage, self.nees
         high = np.append(coverage.fraction > coverage.limits[1], coverage.pooled > coverage.pooled_limits[1])
-        found = [name for name, out in zip((*self.names, "all together"), high, strict=True) if out]
-        found += ["NEES"] if nees.mean < nees.limits[0] else []
+        outside = [name for name, out in zip((*self.names, "all together"), high, strict=True) if out]
+        outside += ["NEES"] if nees.mean < nees.limits[0] else []
         text = "outside, but harmless, as their uncertainties are rather too large"
-        return f"{text}: {', '.join(found)}" if found else ""
+        return f"{text}: {', '.join(outside)}" if outside else ""
 
     @property
     def message(self) -> str:
-        """What was found, in words."""
+        """Verdict and number of runs, in words."""
         text = f"{self.verdict}: {self.attempted} runs, {self.runs} of them converged"
         return "; ".join(filter(None, [text, self.harmless]))
 
@@ -137,21 +137,21 @@ class Campaign:
 
     @property
     def coverage(self) -> Coverage:
-        """How often 95 % intervals held the truth."""
+        """Coverage of the 95 % intervals."""
         from inercal.estimate.coverage import coverage
 
         return coverage(self.error, self.u)
 
     @property
     def nees(self) -> Nees:
-        """Do the stated covariances match the errors, all together?"""
+        """Normalised estimation error squared of all coefficients together."""
         from inercal.estimate.coverage import nees
 
         return nees(self.joint_error, self.joint_covariance)
 
     @property
     def nis_limits(self) -> tuple[float, float]:
-        """Where the mean of ``nis`` lies in 99 of 100 campaigns of a consistent filter."""
+        """Limits of the mean of ``nis`` in 99 of 100 campaigns of a consistent filter."""
         half = 2.576 * math.sqrt(2.0 * self.nis_expected / (self.rows * self.runs))
         return self.nis_expected - half, self.nis_expected + half
 
@@ -259,30 +259,30 @@ def one_run(
 ) -> Mapping[str, Array | float]:
     """Simulate once, estimate, and compare with the truth; fields of `Campaign` by name."""
     simulated = simulate(experiment, rng)
-    found = estimate(simulated.recording, problem, kind, history=False)
+    filtered = estimate(simulated.recording, problem, kind, history=False)
     size = len(problem.prior)
-    slope = product_slope(found.coefficients)
-    error = to_product(found.coefficients) - to_product(experiment.truth)[:size]
-    joint_error, joint = _joint(found, simulated, error, slope)
+    slope = product_slope(filtered.coefficients)
+    error = to_product(filtered.coefficients) - to_product(experiment.truth)[:size]
+    joint_error, joint = _joint(filtered, simulated, error, slope)
     away = np.abs(np.cos(simulated.angles[1:, 1])) > AWAY
-    counted = away & np.isfinite(found.nis)
+    counted = away & np.isfinite(filtered.nis)
     return {
         "error": error,
-        "u": np.sqrt(np.diag(slope @ found.covariance @ slope.T)),
+        "u": np.sqrt(np.diag(slope @ filtered.covariance @ slope.T)),
         "joint_error": joint_error,
         "joint_covariance": joint,
-        "nis": found.nis[counted].mean() if counted.any() else np.nan,
-        "dims": found.dims[counted].mean() if counted.any() else 0.0,
+        "nis": filtered.nis[counted].mean() if counted.any() else np.nan,
+        "dims": filtered.dims[counted].mean() if counted.any() else 0.0,
         "rows": float(counted.sum()),
-        "converged": float(found.converged),
+        "converged": float(filtered.converged),
     }
 
 
-def _joint(found: FilterResult, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
+def _joint(filtered: FilterResult, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
     """Errors of attitude and coefficients together, and their covariance; coefficients alone without an attitude."""
-    if found.state is None or len(found.state.attitude) != 4:
-        return error, slope @ found.covariance @ slope.T
-    q, P = found.attitude, found.state.covariance
+    if filtered.state is None or len(filtered.state.attitude) != 4:
+        return error, slope @ filtered.covariance @ slope.T
+    q, P = filtered.attitude, filtered.state.covariance
     if len(P) == 4 + len(error):
         # from components of the quaternion to a rotation in p: dtheta = 2 Im(q* dq)
         to_rotation = np.zeros((3 + len(error), len(P)))

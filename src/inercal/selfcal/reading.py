@@ -28,13 +28,13 @@ from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.settings import SelfcalSettings
 
 FEWEST = 10
-"""Rows below which there is nothing to find out."""
+"""Rows at least of a recording."""
 
 _EXPECTED = "expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z"
 
 
 def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
-    """The recording in a record, and what is suspicious about it in the light of the study.
+    """The recording in a record, with findings on all that contradicts the study.
 
     Parameters
     ----------
@@ -78,16 +78,16 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
-    said = (*worth_saying(record, columns), *findings)
+    of_record = (*worth_saying(record, columns), *findings)
     gained = all(column.increment for column in columns[:3])
     rate, held = with_held(t, rate, th, settings.world, gained)
     warm = recorded_temperature(record)
-    recording = Recording(t, rate, th, acc, sensor == "gyro", said, record.sources, held, warm)
+    recording = Recording(t, rate, th, acc, sensor == "gyro", of_record, record.sources, held, warm)
     findings = implausible(recording, settings, where)
     if settings.plan is not None:
         began = float(time[np.argmax(np.isfinite(time))])
         findings += off_the_path(recording, settings.plan, settings.world, began, rows)
-    return replace(recording, findings=(*said, *findings))
+    return replace(recording, findings=(*of_record, *findings))
 
 
 def _rate_sensor(record: Record, where: str) -> str:
@@ -107,7 +107,7 @@ def _rate_sensor(record: Record, where: str) -> str:
 
 
 def worth_saying(record: Record, columns: Collection[Column]) -> list[Finding]:
-    """Findings of the record but for numbers that nobody needs: the last row's rate, the first row's accelerometers."""
+    """Findings of the record but for unused numbers: the last row's rate, the first row's accelerometers."""
     needless = {
         column.name: 0 if column.name.startswith("acc") else len(column.values) - 1 for column in columns
     }
@@ -180,7 +180,7 @@ def _lacking(rate: Array, rows: NDArray[np.int64], sensor: str) -> list[Finding]
 
 
 def _gaps(t: Array, record: Record) -> list[Finding]:
-    """What a ``gap`` of the record means here."""
+    """``gap``: time through which the platform is taken to turn on as before."""
     if all(finding.code != "gap" for finding in record.findings):
         return []
     step = np.diff(t)
@@ -196,10 +196,10 @@ def _continuous(th: Array) -> tuple[Array, list[str]]:
     """Angles (n, 3) [rad] without jumps by full turns, missing ones aside; names of those that had some."""
     th, turned = th.copy(), []
     for k, axis in enumerate("xyz"):
-        known = np.flatnonzero(np.isfinite(th[:, k]))
-        turns = np.round((th[known, k] - np.unwrap(th[known, k])) / TWO_PI)
+        read = np.flatnonzero(np.isfinite(th[:, k]))
+        turns = np.round((th[read, k] - np.unwrap(th[read, k])) / TWO_PI)
         if turns.any():
             turned.append(f"th_{axis}")
         # to the digits of `inercal.selfcal.platform.kinematics.nearest_turn`, so that a stream gives what a file gives
-        th[known, k] -= TWO_PI * turns
+        th[read, k] -= TWO_PI * turns
     return th, turned

@@ -1,4 +1,4 @@
-"""What a study of self-calibration says, in SI: rig, plan, truth, noise, prior, goal, filter."""
+"""Settings of a study of self-calibration, in SI: rig, plan, truth, noise, prior, goal, filter."""
 
 from __future__ import annotations
 
@@ -52,11 +52,6 @@ class Noise:
         bounds=_OF_A_SAMPLE,
     )
 
-    @property
-    def levels(self) -> Array:
-        """(3,) the same in this order, for kernels."""
-        return np.array([self.angle_random_walk, self.accelerometer, self.encoder])
-
 
 @dataclass(frozen=True)
 class Gating:
@@ -74,10 +69,7 @@ class Gating:
 
 @dataclass(frozen=True)
 class Filter:
-    """Which estimator, and how.
-
-    ``gating`` None is off.
-    """
+    """The estimator and its options; ``gating`` None is off."""
 
     kind: FilterKind = option("the estimator; --filter overrides it", "error-state")
     extended: bool = option("estimate gyro scale errors and the encoders' zero too", False)
@@ -90,7 +82,7 @@ class Filter:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """What a simulation adds to the model; nothing if absent.
+    """Errors that a simulation adds to the model; none if absent.
 
     ``harmonics`` are errors of encoders: joint 0, 1, 2, order k, amplitude [rad], phase [rad]: a sin(k th + phase).
     ``substeps`` of the truth lie between two rows.

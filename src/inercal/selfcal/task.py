@@ -1,4 +1,4 @@
-"""What the commands run on a study of self-calibration: a calibration of a record, by one estimator or by all."""
+"""A calibration of a record by a study of self-calibration, with one estimator or with all."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ from inercal.selfcal.settings import KINDS, SelfcalSettings
 class Calibration:
     """An ``estimate``, and the evidence behind it for pictures and tests.
 
-    ``settings`` are those of the study; ``compared`` holds what the other estimators found, by kind, where a comparison
-    was asked for; ``truth`` (p,) are the coefficients in the product form where the study states them.
+    ``settings`` are those of the study; ``compared`` are the other estimators' results, by kind, where a comparison was
+    asked for; ``truth`` (p,) are the coefficients in the product form where the study states them.
     """
 
     estimate: Estimate
@@ -79,7 +79,7 @@ def calibrate(
     compare : bool
         Run all other estimators too.
     progress : callable
-        Told, in words, what is being done.
+        Told each step of the work, in words.
 
     Returns
     -------
@@ -94,42 +94,42 @@ def calibrate(
     """
     clock = time.perf_counter()
     recording = recording_of(record, settings)
-    stated, rough = settings.base, is_rough(settings)
+    stated_base, rough = settings.base, is_rough(settings)
     if rough:
         progress("looking for the heading" if settings.heading_unknown else "looking for the base")
         settings = with_base(recording, settings)
         recording = recording_of(record, settings)  # rates over gaps depend on it
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
-    found = filtering.estimate(recording, of)
-    assert found.history is not None
-    along = found.history.attitude, found.coefficients
-    bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=found.restarts)
+    filtered = filtering.estimate(recording, of)
+    assert filtered.history is not None
+    along = filtered.history.attitude, filtered.coefficients
+    bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
     progress("looking for faults")
-    faults = [*diagnose(recording, of, found, stated_errors(settings)), *taken_anew(recording, found)]
+    faults = [*diagnose(recording, of, filtered, stated_errors(settings)), *taken_anew(recording, filtered)]
     compared: dict[str, FilterResult] = {}
     for kind in KINDS if compare else ():
-        if kind != found.kind:
+        if kind != filtered.kind:
             progress(f"filtering ({kind})")
             compared[kind] = filtering.estimate(recording, of, kind)
     progress("assembling")
-    estimate = assemble(recording, settings, found, bounds, faults)
-    told = dict(estimate.result)
+    estimate = assemble(recording, settings, filtered, bounds, faults)
+    result = dict(estimate.result)
     message = estimate.message
     if rough and estimate.names:
         base, words = _base(settings, estimate)
-        told, message = told | base, message + words
+        result, message = result | base, message + words
     for name, other in compared.items():
-        told["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
-    timed = replace(estimate, result=told, message=message, timing={"solve": time.perf_counter() - clock})
+        result["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
+    timed = replace(estimate, result=result, message=message, timing={"solve": time.perf_counter() - clock})
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
-        truth[BETA] = relative(truth[BETA], stated, settings.base)
-    return Calibration(timed, of, recording, found, bounds, settings, compared, truth)
+        truth[BETA] = relative(truth[BETA], stated_base, settings.base)
+    return Calibration(timed, of, recording, filtered, bounds, settings, compared, truth)
 
 
 def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
-    """What a comparison tells of an estimator."""
+    """An estimator's part of a comparison."""
     values, u = product_form(other)
     each = zip(names(len(values)), values, u, strict=True)
     return {
@@ -140,19 +140,19 @@ def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
 
 
 def _base(settings: SelfcalSettings, estimate: Estimate) -> tuple[dict[str, Any], str]:
-    """What a result tells of a base that was found [rad], and in words: the one to which beta is relative; of a heading
-    that was unknown, what beta makes of it."""
+    """The base found [rad], to which beta is relative, and a heading that was unknown, corrected by beta; both also in
+    words."""
     base = settings.base
-    told: dict[str, Any] = {"base": {"heading": base.heading, "tilt": list(base.tilt)}}
+    result: dict[str, Any] = {"base": {"heading": base.heading, "tilt": list(base.tilt)}}
     degrees = np.degrees([base.heading, *base.tilt]).tolist()
     words = "; beta is relative to the base found, heading {:.5f} deg, tilt {:.5f} and {:.5f} deg".format(
         *degrees
     )
     if settings.heading_unknown:
         value, u = heading(base, estimate.values[BETA], estimate.covariance[BETA, BETA])
-        told["heading"] = {"value": value, "u": u}
+        result["heading"] = {"value": value, "u": u}
         words = "; heading {} deg, u {} deg".format(*rounded(math.degrees(value), math.degrees(u))) + words
-    return told, words
+    return result, words
 
 
 def compared(calibration: Calibration) -> list[Table]:

@@ -60,8 +60,8 @@ class Apply:
         """The corrected sample."""
         values = sample.values.copy()
         triads = {sensor: np.array([values[i] for i in places]) for sensor, places in self._places.items()}
-        for sensor, found in self._correct(triads).items():
-            for i, value in zip(self._places[sensor], found.tolist(), strict=True):
+        for sensor, triad in self._correct(triads).items():
+            for i, value in zip(self._places[sensor], triad.tolist(), strict=True):
                 values[i] = value
         return state, [[sample.t, *values, *([quoted(sample.label)] if self._labelled else [])]]
 

@@ -1,7 +1,7 @@
 """Samples from a stream of lines, read as the same lines in a file are read.
 
 The layout is found out from the header and the first row. A row is handed on as soon as its line has ended:
-nothing is read ahead. What is no number becomes NaN, and is said with its line.
+nothing is read ahead. A field that is no number becomes NaN, and a finding names its line.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Sample(NamedTuple):
 
 
 class _Field(NamedTuple):
-    """Where a value is in a row, and what it is multiplied by, one factor after the other."""
+    """Column of a value in a row, and its factors, applied one after the other."""
 
     name: str
     column: int
@@ -70,7 +70,7 @@ class _Field(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Form:
-    """What is in the rows: ``time`` (None where rows are counted at ``rate`` [Hz]), values, and labels."""
+    """Fields of a row: ``time`` (None where rows are counted at ``rate`` [Hz]), values, and labels."""
 
     layout: Layout
     time: _Field | None
@@ -88,7 +88,7 @@ class Lines:
     stream : binary file
         Lines of text, under a canonical header unless there is a map.
     where : str
-        What to call the stream in errors.
+        Name of the stream in errors.
     record_map : RecordMap or None
         The columns of one file. Increments need its ``[time] rate``, for the median interval of a stream is
         not known before its end.
@@ -133,7 +133,7 @@ class Lines:
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """What decides which numbers the samples hold: a state that has a fingerprint."""
+        """All that decides the numbers of the samples: a state that has a fingerprint."""
         form = self._form
         units = {name: column.unit.symbol for name, column in form.record.columns.items()}
         columns = [f"{field.name} [{units.get(field.name)}] {field.factors}" for field in form.fields]
@@ -144,8 +144,8 @@ class Lines:
         }
 
     def leave_unsaid(self, first: Collection[str], last: Collection[str]) -> None:
-        """Say nothing of values that are missing where nobody needs them: of these channels in the first row of the
-        record, or in the last."""
+        """Say nothing of missing values that are not needed: of channels in the first row of the record, or in the
+        last."""
         self._first, self._last = first, last
 
     def next(self) -> Line | None:
@@ -168,18 +168,18 @@ class Lines:
         bad = fields is None
         t, values = math.nan, [math.nan] * len(form.fields)
         if fields is not None:
-            found = [self._layout.number(fields[field.column]) for field in form.fields]
-            for field, value in zip(form.fields, found, strict=True):
+            numbers = [self._layout.number(fields[field.column]) for field in form.fields]
+            for field, value in zip(form.fields, numbers, strict=True):
                 if value is not None and is_rounded(fields[field.column], value):
                     self._flaw(
                         "resolution", f"{field.name}: whole number beyond 2^53, rounded to 53 bits", line
                     )
             stamp = 0.0 if form.time is None else self._layout.number(fields[form.time.column])
-            bad = stamp is None or None in found
+            bad = stamp is None or None in numbers
             t = self._stamp(form.time, stamp, bad, line) if form.time is not None else t
             values = [
                 self._value(field, value, bad or (row == 0 and field.name in self._first), line)
-                for field, value in zip(form.fields, found, strict=True)
+                for field, value in zip(form.fields, numbers, strict=True)
             ]
         if bad:
             self._bad_row(line)
@@ -187,7 +187,7 @@ class Lines:
         return Sample(row, row / form.rate if form.time is None else t, values, label)
 
     def close(self) -> None:
-        """Say how many more there were of what has been said too often."""
+        """Give the number of findings that were left unsaid."""
         for (code, text), count in self._flaws.items():
             if count > _SAID:
                 self._say(Finding(code, f"{text}: {count - _SAID} more"))
@@ -228,7 +228,7 @@ class Lines:
             self._flaw("truncated", "the stream ends within a row", line)
 
     def _flaw(self, code: str, text: str, line: Line) -> None:
-        """Say what is wrong with a line, unless it has been said too often."""
+        """Give a finding on a line, unless it has been given too often."""
         self._flaws[code, text] += 1
         if self._flaws[code, text] <= _SAID:
             self._say(Finding(code, text, f"line {line.number}"))
@@ -248,7 +248,7 @@ class Lines:
         return Line(data.rstrip(b"\r\n"), self._number, data.endswith(b"\n"))
 
     def _begin(self, record_map: RecordMap | None) -> tuple[_Form, list[Line]]:
-        """What the rows hold, from as few of them as tell, and the rows that had to be read for that."""
+        """Fields of a row, from as few rows as show them, and the rows read for that."""
         part, path = _part(record_map), Path(self.where)
         marks, rows = comment_marks(part.options), list[Line]()
         problem: InputError = RecordError(path, "ended without a row, expected a header and lines of numbers")
@@ -285,20 +285,20 @@ def _part(record_map: RecordMap | None) -> Part:
 
 
 def _form(
-    layout: Layout, found: Mapping[Channel, int], path: Path, part: Part, record_map: RecordMap | None
+    layout: Layout, indices: Mapping[Channel, int], path: Path, part: Part, record_map: RecordMap | None
 ) -> _Form:
-    """What is in the rows, checked as where files are joined."""
+    """Fields of a row, checked as where files are joined."""
     source = Source(str(path), "")
     if record_map is not None:
-        table = Table(tuple(found), {}, contents(layout), 0)
+        table = Table(tuple(indices), {}, contents(layout), 0)
         check_present([FileTable(path, source, part, table)], record_map.path)
     rate = None if record_map is None else record_map.rate
-    if rate is None and any(channel.increment for channel in found):
+    if rate is None and any(channel.increment for channel in indices):
         where = f"{record_map.path if record_map else path}: time.rate"
         raise MapError(where, 'missing, expected a rate such as "100 Hz" for increments in a stream')
     interval = 0.0 if rate is None else 1.0 / rate
     time, label, fields, columns, t = None, None, [], {}, np.empty(0)
-    for channel, index in found.items():
+    for channel, index in indices.items():
         factors, unit = conversion(channel, interval)
         field = _Field(channel.name, index, tuple(factor for factor in factors if factor != 1.0))
         if channel.name == "label":
@@ -310,5 +310,5 @@ def _form(
             columns[channel.name] = Column(channel.name, unit, t, t, source, increment=channel.increment)
     if not columns:
         raise RecordError(path, "found a time column alone, expected a channel")
-    counted_at = math.nan if time is not None else row_rate(tuple(found), rate, path)
+    counted_at = math.nan if time is not None else row_rate(tuple(indices), rate, path)
     return _Form(layout, time, counted_at, tuple(fields), label, Record(columns, (), (source,)))

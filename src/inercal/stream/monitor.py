@@ -1,7 +1,7 @@
-"""A live monitor: is the instrument at rest, for how long, and how noisy is it since it was last moved?
+"""A live monitor: rest of an instrument, its duration, and the noise since the last motion.
 
-Rest is told as in a recording (`inercal.imu.recording`): by the variance in a window of about a second against
-that of a quiet start; but the window ends at the present sample. The quiet start is the first five seconds in
+Rest is told from motion as in a recording (`inercal.imu.recording`): by the variance in a window of about a second
+against that of a quiet start; but the window ends at the present sample. The quiet start is the first five seconds in
 which no window varies by more than the same multiple of the calmest one.
 """
 
@@ -30,7 +30,7 @@ _FEWEST = 8
 
 
 class MonitorState(NamedTuple):
-    """What the monitor knows.
+    """State of the monitor.
 
     ``stamps`` (k,) are the first time stamps [s], until the ``interval`` [s] is known (0 before). ``quiet``
     (groups,) is the variance of the quiet start; before that is known (0), ``start`` (3, channels) holds its
@@ -61,7 +61,7 @@ class Monitor:
     window over that of the quiet start, of the sensor where that is largest; the longest averaging time tau of
     which there are at least eight differences since the last motion; and for each channel mean and standard
     deviation in the window, random walk N with its standard uncertainty, and the Allan deviation at tau. N is
-    read at the octave nearest to 1 s. What is not known is empty.
+    read at the octave nearest to 1 s. Unknown values are empty.
 
     Time stamps and values that are missing, stamps that run backward, and gaps of half a window end a rest.
 
@@ -86,8 +86,8 @@ class Monitor:
         self._places = [i for i, column in enumerate(columns) if _MEASURED.fullmatch(column.name)]
         watched = [columns[i] for i in self._places]
         if not watched:
-            found = ", ".join(column.name for column in columns)
-            raise RecordError(lines.where, f"found {found}, expected accelerometers, gyros or drift outputs")
+            names = ", ".join(column.name for column in columns)
+            raise RecordError(lines.where, f"found {names}, expected accelerometers, gyros or drift outputs")
         sensors = [column.sensor for column in watched]
         self._groups = [
             [i for i, sensor in enumerate(sensors) if sensor == name] for name in dict.fromkeys(sensors)
@@ -143,11 +143,11 @@ class Monitor:
         """Take a sample into the window, and tell rest from motion."""
         window, t = state.window, sample.t
         values = [sample.values[i] for i in self._places]
-        known = all(map(math.isfinite, values))
-        if not (known and 0.0 <= t - state.t <= 0.5 * len(window.samples) * state.interval):
+        complete = all(map(math.isfinite, values))
+        if not (complete and 0.0 <= t - state.t <= 0.5 * len(window.samples) * state.interval):
             window.clear()
             state = _ended(state)
-        if not known:
+        if not complete:
             return state._replace(t=t)
         x = np.array(values)
         slide(x, *window)
@@ -196,8 +196,8 @@ class Monitor:
         walk, u, adev, tau = unknown, unknown, unknown, math.nan
         near = max(0, round(-math.log2(interval))) if interval > 0.0 else 0
         if octaves.clusters[near] > 1:
-            found, dof = octaves.variance(near)
-            walk = np.sqrt(found * interval * 2.0**near).tolist()
+            spread, dof = octaves.variance(near)
+            walk = np.sqrt(spread * interval * 2.0**near).tolist()
             u = [value / math.sqrt(2.0 * dof) for value in walk]
         if (longest := octaves.longest(_FEWEST)) >= 0:
             adev, tau = np.sqrt(octaves.variance(longest)[0]).tolist(), interval * 2.0**longest
@@ -228,7 +228,7 @@ def _restlessness(state: MonitorState, sizes: list[float]) -> float:
 
 
 def _titles(column: Column) -> list[str]:
-    """Titles of what is said of a channel."""
+    """Titles of the columns of a channel."""
     name, unit = column.name, column.unit.symbol
     walk = f"{unit}/sqrt(Hz)"
     return [

@@ -1,6 +1,6 @@
 """A recursive estimator on a stream: samples in, lines out, the state saved now and then and resumed.
 
-What is saved says which rows the state has seen. A stream that begins with the row that the saved one began
+A saved state says which rows it has seen. A stream that begins with the row that the saved one began
 with is that stream again: the rows seen are passed over, without output, and must be the same ones. Any other
 stream is one that goes on: there, rows with a time stamp no later than the last one seen are passed over. From
 then on every line is, digit for digit, what a run without interruption gives for that row.
@@ -101,14 +101,14 @@ class Recursive(Protocol[S]):
 
 @dataclass(frozen=True)
 class Saving:
-    """Where the state is saved, and every how many rows."""
+    """File of the saved state, and rows from one save to the next."""
 
     path: Path
     every: int
 
 
 class _Position(NamedTuple):
-    """What a state has seen: rows, the CRC-32 of each of the first and of all of them, and the last time stamp [s]."""
+    """Rows that a state has seen: their number, CRC-32 of each of the first and of all, and the last time stamp [s]."""
 
     rows: int = 0
     head: NDArray[np.int64] = np.empty(0, np.int64)
@@ -123,7 +123,7 @@ class _Position(NamedTuple):
 
 
 class _Whole(NamedTuple):
-    """What is saved."""
+    """A saved state with its position."""
 
     position: _Position
     state: Any

@@ -2,7 +2,7 @@
 
 A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file
 (`inercal.selfcal.reading` says how rows are taken): the first row with all angles and a rate is the start; where no
-rate is recorded the platform is taken to turn on as before (`inercal.selfcal.filters.gaps`); what else is missing is
+rate is recorded the platform is taken to turn on as before (`inercal.selfcal.filters.gaps`); other missing values are
 not measured. Only time is treated more kindly: a row that is not later than the one before is left out.
 """
 
@@ -40,9 +40,9 @@ _PATIENCE = 10
 
 
 class SelfcalState(NamedTuple):
-    """What is known after a row.
+    """State after a row.
 
-    ``begun``: a start was found; until then the others mean nothing. ``filter`` is the state of the filter; ``next``
+    ``begun``: a start was found; until then the others mean nothing. ``filter`` is that of the filter; ``next``
     (3,) [rad/s] the rate that the last row has for the step to come (NaN where it has none, or rates of the step
     before); ``rate`` (3,) [rad/s] the last one known whole and ``rated`` [s] the row that it stands in; ``read`` [s]
     the row of the last whole angles, which are in ``filter``. ``t`` [s] of the last row, ``steps`` (9,) [s] the last
@@ -107,16 +107,16 @@ class Selfcal:
         self._module, self._problem, self._every, self._say = filter_of(problem), problem, every, say
         self._where, record = lines.where, lines.record
         sensor = "gyro" if "gyro_x" in record and "wc_x" not in record else "wc"
-        found = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
-        for column in found:
+        channels = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
+        for column in channels:
             column.si()  # refuses counts
-        rates = {column.name for column in found[:3] if not column.increment}
-        first = {column.name for column in found if column.name not in rates and column.sensor != "th"}
+        rates = {column.name for column in channels[:3] if not column.increment}
+        first = {column.name for column in channels if column.name not in rates and column.sensor != "th"}
         lines.leave_unsaid(first, rates)
         names = list(record.columns)
-        self._places = [names.index(column.name) for column in found]
-        self._factors = [column.unit.factor for column in found]
-        self._gained = np.array([column.increment for column in found[:3]])
+        self._places = [names.index(column.name) for column in channels]
+        self._factors = [column.unit.factor for column in channels]
+        self._gained = np.array([column.increment for column in channels[:3]])
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(len(problem.prior))]]
 
     @property

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.selfcal.filters.gaps import anew
 from inercal.selfcal.filters.gating import admitted, updating, watch
@@ -41,7 +42,6 @@ from inercal.selfcal.platform.model import (
 from inercal.selfcal.platform.plan import Motion
 from inercal.selfcal.platform.recording import Recording
 
-Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
 
 BAYESIAN_BOUNDS: Final = (
@@ -51,7 +51,7 @@ BAYESIAN_BOUNDS: Final = (
 """The publication behind these bounds."""
 
 SOURCES: Final = ("angle random walk", "accelerometer", "encoder", "prior")
-"""Where the errors of an estimate come from, in the order of `Bounds.contributions`."""
+"""Sources of the errors of an estimate, in the order of `Bounds.contributions`."""
 
 
 #: parts of accelerometer and encoder; an array, for numba compiles a kernel anew for each literal number
@@ -60,7 +60,7 @@ _PARTS: Final = np.array([2, 3])
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What a path can tell.
+    """Cramer-Rao bounds of the coefficients along a path.
 
     Attributes
     ----------
@@ -70,10 +70,10 @@ class Bounds:
     prior : (p,)
         Standard deviations before it.
     history : (n, p)
-        Standard uncertainties from row to row, linear form; without rows where not asked for.
+        Standard uncertainties from row to row, linear form; no rows unless asked for.
     contributions : mapping
-        Source (`SOURCES`) -> its part (p, p) of the covariance; they add up to it. Empty where not asked for. The first
-        encoder reading, from which the attitude is known at the start, belongs to the encoder.
+        Source (`SOURCES`) -> its part (p, p) of the covariance; they add up to it. Empty unless asked for. The first
+        encoder reading, which gives the attitude at the start, belongs to the encoder.
     """
 
     names: tuple[str, ...]
@@ -110,13 +110,11 @@ def bounds(
     problem : FilterProblem
         Noise, prior and near-level gating; the other settings of its filter play no part.
     truth : (p,) or longer, optional
-        True coefficients, product form: the path is the one on which they take the platform. The nominal path if
-        absent.
+        True coefficients, product form, that make the path; the nominal path if absent.
     measured : (n, 4) bool, optional
-        Which rows have a measurement by accelerometer x, y, z and by the encoders; all if absent. The first row's play
-        no part.
+        Rows that accelerometers x, y, z and the encoders measure; all if absent. The first row's play no part.
     history, contributions : bool
-        Whether to return these.
+        Return these too.
     """
     p = len(problem.prior)
     c = np.zeros(p) if truth is None else to_linear(truth[:p])
@@ -149,7 +147,7 @@ def recorded_bounds(
     coefficients : (p,)
         Estimated, linear form.
     history, contributions : bool
-        Whether to return these.
+        Return these too.
     restarts : sequence of int
         Rows at which the attitude was taken anew from the encoders.
     """
@@ -224,7 +222,7 @@ def observe(P: Array, row: Row, r: float, source: int, work: Array) -> None:
 
 class Path(NamedTuple):
     """A path of n rows: attitudes ``q`` (n, 4), gimbal angles ``th`` (n, 3) [rad], steps ``dt`` (n - 1,) [s], commanded
-    ``rate`` (n - 1, 3) [rad/s], and which of accelerometers x, y, z and the encoders were ``measured`` (n, 4)."""
+    ``rate`` (n - 1, 3) [rad/s], and rows ``measured`` (n, 4) by accelerometers x, y, z and the encoders."""
 
     q: Array
     th: Array

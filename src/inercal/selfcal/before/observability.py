@@ -1,4 +1,4 @@
-"""What a path cannot see, for reports: bounds against prior and goal, the worst combinations in words."""
+"""Coefficients that a path cannot see: bounds against prior and goal, the worst combinations in words."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
 from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.selfcal.before.bounds import Bounds
-from inercal.selfcal.display import of_field
 from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.platform.coefficients import shown_units
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Seen:
 
     @property
     def rank(self) -> int:
-        """Number of combinations of coefficients of which the path tells something."""
+        """Number of combinations of coefficients that the path sees."""
         return int(np.sum(self.learned.left <= UNSEEN))
 
     @property
@@ -43,7 +43,7 @@ class Seen:
         return tuple(name for name, ratio in self.to_goal.items() if ratio > 1.0)
 
     def findings(self) -> tuple[Finding, ...]:
-        """What the path cannot see: one for each coefficient at its prior, or wider than wanted."""
+        """A finding for each coefficient at its prior, or wider than wanted."""
         ratio = dict(zip(self.bounds.names, self.learned.ratio, strict=True))
         u = {name: f"{size} {unit}" for name, size, unit in self._shown()}
         left = [
@@ -64,14 +64,14 @@ class Seen:
         return (*left, *wide)
 
     def worst(self, count: int = 3) -> list[str]:
-        """The worst-known combinations in words, with what is left of the prior of each."""
+        """The worst-known combinations in words, with the share of its prior that is left of each."""
         weakest = self.learned.weakest(count)
         return [
             f"{words}: {100 * left:.3g} %" for words, left in zip(weakest, self.learned.left, strict=False)
         ]
 
     def table(self) -> str:
-        """Bounds, what is left of the prior, and what the goal asks, as aligned text."""
+        """Bounds over prior and over goal, as aligned text."""
         lines = [f"{'':<7}  {'bound u':>9}  {'unit':<7} {'of prior':>9}  {'of goal':>8}"]
         for (name, u, unit), ratio in zip(self._shown(), self.learned.ratio, strict=True):
             goal = f"{self.to_goal[name]:8.3g}" if name in self.to_goal else "       –"
@@ -80,7 +80,7 @@ class Seen:
 
     def _shown(self) -> list[tuple[str, str, str]]:
         """Name, u and unit of each coefficient for people."""
-        unit, size = of_field(len(self.bounds.names))
+        unit, size = shown_units(len(self.bounds.names))
         texts = (rounded(u, u)[1] for u in self.bounds.u / size)
         return list(zip(self.bounds.names, texts, unit, strict=True))
 
@@ -94,8 +94,8 @@ def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:
 
 
 def useless(filtered: FilterResult, bounds: Bounds, by_filter: Array) -> tuple[Status, str] | None:
-    """Status and sentence where there are no numbers to be used, None where there are: ``by_filter`` (p, p), product
-    form, and the bounds must be covariances."""
+    """Status and sentence of numbers that must not be used, else None: ``by_filter`` (p, p), product form, and the
+    bounds must be covariances."""
     if not filtered.converged:
         return Status.NOT_CONVERGED, filtered.message
     if not filtered.dims.any():
@@ -106,7 +106,7 @@ def useless(filtered: FilterResult, bounds: Bounds, by_filter: Array) -> tuple[S
 
 
 def singular(prior: Array, *covariances: Array) -> tuple[Status, str] | None:
-    """Status and sentence where a covariance (p, p) is none within rounding, in units of the ``prior`` (p,)."""
+    """Status and sentence where a covariance (p, p) over the ``prior`` (p,) is not positive within rounding."""
     scale = np.outer(prior, prior)
     if all(_positive(P / scale) for P in covariances):
         return None

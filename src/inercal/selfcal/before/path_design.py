@@ -18,7 +18,6 @@ from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import SelfcalSettings
 
-Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
 
 REFERENCES = (BAYESIAN_BOUNDS,)
@@ -27,7 +26,7 @@ REFERENCES = (BAYESIAN_BOUNDS,)
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A plan, what its bounds say, its ``criterion``, and the joints it takes ``beyond`` their limits."""
+    """A plan judged by its bounds and its ``criterion``, and the joints it takes ``beyond`` their limits."""
 
     name: str
     plan: Plan
@@ -46,9 +45,9 @@ class Designed:
         The path found first, then those it is compared with: the study's own, and the named ones that take no more
         than the time; each has a rest at the end where it takes less.
     message : str
-        What was searched, in words.
+        The search, in words.
     findings : tuple of Finding
-        What the path found cannot see, and whether it comes close to gimbal lock.
+        Coefficients that the path found cannot see, and gimbal lock where it comes close.
     """
 
     compare: tuple[Judged, ...]
@@ -95,7 +94,7 @@ def design(
 ) -> Designed:
     """Search for a path within rate, time and limits, and set it beside others.
 
-    Bounds are those of the nominal path: nothing has to be known of the coefficients but their prior.
+    Bounds are those of the nominal path: the prior of the coefficients is enough.
 
     Parameters
     ----------
@@ -109,18 +108,18 @@ def design(
     StudyError
         No time is stated, or no turn fits into time and limits.
     """
-    found = search(settings, progress)
+    best = search(settings, progress)
     asked = settings.search
-    plans = {"found": found}
+    plans = {"found": best}
     if settings.plan is not None:
-        plans["study"] = lasting(settings.plan, found.duration)
+        plans["study"] = lasting(settings.plan, best.duration)
     for name in PATHS:
-        other = replace(path(name, found.step), rate=found.rate, start=found.start)
-        left = found.duration - other.duration
-        if left > -found.step / 2.0 and (settings.plan is None or other.moves != settings.plan.moves):
-            plans[name] = lasting(other, found.duration)
+        other = replace(path(name, best.step), rate=best.rate, start=best.start)
+        left = best.duration - other.duration
+        if left > -best.step / 2.0 and (settings.plan is None or other.moves != settings.plan.moves):
+            plans[name] = lasting(other, best.duration)
     judged = tuple(_judged(name, plan, settings) for name, plan in plans.items())
-    lock = float(np.abs(np.cos(found.angles()[:, 1])).min())
+    lock = float(np.abs(np.cos(best.angles()[:, 1])).min())
     near = (
         [
             Finding(
@@ -135,8 +134,8 @@ def design(
     by = {"worst": "largest u", "mean": "geometric mean of u"}[asked.criterion]
     return Designed(
         judged,
-        f"up to {asked.turns} turns of multiples of {math.degrees(asked.angle):g} deg in {found.duration:g} s, by the "
-        f"{by} over {'goal or prior' if settings.goal else 'prior'}: {found.words()}",
+        f"up to {asked.turns} turns of multiples of {math.degrees(asked.angle):g} deg in {best.duration:g} s, by the "
+        f"{by} over {'goal or prior' if settings.goal else 'prior'}: {best.words()}",
         (*judged[0].seen.findings(), *near),
     )
 
@@ -172,14 +171,14 @@ def with_stops(plan: Plan, angle: float, rate: float) -> Plan:
 
 
 def at_rest(plan: Plan) -> Mask:
-    """(n, 4) whether a row is measured, for `inercal.selfcal.before.bounds`, where that is done at rest alone."""
+    """Rows (n, 4) measured at rest alone, for `inercal.selfcal.before.bounds`."""
     resting = [isinstance(move, Rest) for move in plan.moves]
     rows = np.repeat([False, *resting], [1, *map(plan.steps, plan.moves)])
     return np.repeat(rows[:, None], 4, axis=1)
 
 
 def stated_moves(moves: tuple[Move, ...]) -> list[list[str]]:
-    """Moves as a study states them: joint, angle and where it is not the plan's the rate; or a rest."""
+    """Moves as a study states them: joint, angle and, unless it is the plan's, the rate; or a rest."""
     return [_stated(move) for move in moves]
 
 
@@ -192,14 +191,14 @@ def _stated(move: Move) -> list[str]:
 
 
 def _judged(name: str, plan: Plan, settings: SelfcalSettings) -> Judged:
-    """Bounds along a plan, and what they say."""
+    """A plan judged by its bounds."""
     along = bounds(motion(plan, settings.world), problem(settings))
     value = criterion(along, settings.goal, settings.search.criterion)
     return Judged(name, plan, seen(along, settings.goal), value, tuple(plan.beyond(settings.limits)))
 
 
 def _log_volume(judged: Judged) -> float:
-    """Mean logarithm of what is left of the prior of each combination."""
+    """Mean logarithm of the share of its prior that is left of each combination."""
     return float(np.mean(np.log(judged.seen.learned.left)))
 
 

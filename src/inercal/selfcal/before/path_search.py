@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.selfcal.before.bounds import Bounds, bounds
 from inercal.selfcal.filters.problem import FilterProblem, problem
@@ -22,7 +22,6 @@ from inercal.selfcal.platform.plan import MOST_ROWS, Plan, Rest, Turn, motion
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.settings import Search, SelfcalSettings
 
-Array: TypeAlias = NDArray[np.float64]
 Sequence: TypeAlias = tuple[tuple[int, int], ...]
 """Turns as joint 0, 1, 2 and signed number of angles."""
 
@@ -43,11 +42,7 @@ _EVEN: Final = 1e-6
 
 
 def criterion(bounds: Bounds, goal: Mapping[str, float], kind: str) -> float:
-    """How good a path is; small is good.
-
-    Each u is set over its goal, or over its prior where it has none: ``worst`` is the largest, ``mean`` the geometric
-    mean.
-    """
+    """Largest (``worst``) or geometric mean (``mean``) ratio of each u to its goal, or to its prior without one."""
     wanted = [goal.get(name, prior) for name, prior in zip(bounds.names, bounds.prior, strict=True)]
     ratio = bounds.u / wanted
     return float(ratio.max() if kind == "worst" else np.exp(np.mean(np.log(ratio))))
@@ -65,7 +60,7 @@ def search(
     ----------
     settings : SelfcalSettings
     progress : callable
-        Told how many of the random starts are done.
+        Told (done, total) of the random starts.
 
     Raises
     ------
@@ -74,20 +69,20 @@ def search(
     """
     ground = _ground(settings)
     rng = np.random.default_rng(settings.search.seed)
-    found: dict[Sequence, float] = {}
+    criteria: dict[Sequence, float] = {}
     progress(0, STARTS)
     for start in range(STARTS):
-        _improve(ground, _random(ground, rng), found, rng)
+        _improve(ground, _random(ground, rng), criteria, rng)
         progress(start + 1, STARTS)
-    return ground.plan(min(found, key=lambda turns: found[turns]))
+    return ground.plan(min(criteria, key=lambda turns: criteria[turns]))
 
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """What a search moves on.
+    """The ground of a search.
 
     ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the start; ``number`` of
-    angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of such steps.
+    angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these steps.
     """
 
     asked: Search
@@ -112,7 +107,7 @@ class _Ground:
         return replace(self.model, moves=moves)
 
     def fits(self, turns: Sequence) -> bool:
-        """Whether a sequence keeps to number, limits and time, of which each turn takes whole rows."""
+        """True for a sequence that keeps to number, limits and time; each turn takes whole rows."""
         if not 0 < len(turns) <= self.asked.turns:
             return False
         if self._turning(turns).duration > self.time + _EVEN * self.model.step:
@@ -137,13 +132,13 @@ def _ground(settings: SelfcalSettings) -> _Ground:
         raise StudyError("design.time", "missing, expected a time or a plan that is as long")
     time = settings.plan.duration if asked.time is None and settings.plan else float(asked.time or 0.0)
     if time / model.step > MOST_ROWS:
-        found = f"found {time / model.step:.6g} steps of {model.step:g} s"
-        raise StudyError("design.time", f"{found}, expected at most {MOST_ROWS:,}")
+        text = f"found {time / model.step:.6g} steps of {model.step:g} s"
+        raise StudyError("design.time", f"{text}, expected at most {MOST_ROWS:,}")
     unit = asked.angle / model.rate
     number = math.floor(time / unit + 1e-9)
     if number > MOST:
-        found = f"found {number} turns of {math.degrees(asked.angle):g} deg within {time:g} s"
-        raise StudyError("design.angle", f"{found}, expected at most {MOST}: a larger angle, or less time")
+        text = f"found {number} turns of {math.degrees(asked.angle):g} deg within {time:g} s"
+        raise StudyError("design.angle", f"{text}, expected at most {MOST}: a larger angle, or less time")
     low, high = _limits(settings, model)
     made = _Ground(asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal)
     if not any(made.fits(((joint, sign),)) for joint in range(3) for sign in (1, -1)):
@@ -199,14 +194,14 @@ def _random(ground: _Ground, rng: np.random.Generator) -> Sequence:
 
 
 def _improve(
-    ground: _Ground, turns: Sequence, found: dict[Sequence, float], rng: np.random.Generator
+    ground: _Ground, turns: Sequence, criteria: dict[Sequence, float], rng: np.random.Generator
 ) -> None:
-    """Change a sequence as long as that makes it better; all that were judged are kept in ``found``."""
+    """Change a sequence as long as that makes it better; ``criteria`` keeps those of all sequences tried."""
 
     def value(candidate: Sequence) -> float:
-        if candidate not in found:
-            found[candidate] = ground.value(candidate)
-        return found[candidate]
+        if candidate not in criteria:
+            criteria[candidate] = ground.value(candidate)
+        return criteria[candidate]
 
     best, improved = value(turns), True
     while improved:

@@ -1,4 +1,4 @@
-"""A simulated recording of a platform that turns through a plan, with what real rigs add."""
+"""A simulated recording of a platform that turns through a plan, with the errors that real rigs add."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from inercal.units import parse_unit
 class Experiment:
     """A plan on a rig, ready to be simulated many times.
 
-    ``motion`` what is commanded; ``fine`` (n - 1, m, 3) [rad/s] the rates on which the platform acts in each finer
-    step; ``truth`` (p,) coefficients in the linear form.
+    ``motion`` as commanded; ``fine`` (n - 1, m, 3) [rad/s] the rates on which the platform acts in each finer step;
+    ``truth`` (p,) coefficients in the linear form.
     """
 
     world: World

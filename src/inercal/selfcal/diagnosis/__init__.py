@@ -1,1 +1,1 @@
-"""What is wrong with a recording or its study, named."""
+"""Errors of a recording or its study, named."""

@@ -1,9 +1,9 @@
-"""What is wrong with a recording that contradicts the model: all hypotheses asked in order, each named with its place.
+"""Errors of a recording that contradicts the model: all hypotheses asked in order, each named with its place.
 
 Units, signs and order were seen roughly when the recording was read (`inercal.selfcal.diagnosis.gross`). Then come
 gross faults of the accelerometers and of rows (`inercal.selfcal.diagnosis.rows`), each judged by what the error-state
-filter makes of the recording without it; single rows far off come last of these. Of what then is left, constant errors
-that the model leaves out (`inercal.selfcal.diagnosis.small`), and last the size and the whiteness of the innovations
+filter makes of the recording without it; single rows far off come last of these. Constant errors that the model leaves
+out follow (`inercal.selfcal.diagnosis.small`), and last the size and the whiteness of the innovations
 (`inercal.selfcal.diagnosis.noise_check`). Every limit keeps a risk of a false finding of about 1e-3.
 """
 
@@ -33,11 +33,11 @@ from inercal.selfcal.platform.coefficients import names, units
 from inercal.selfcal.platform.recording import Recording
 
 _BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
-"""Findings of the reading of a recording beyond which nothing else can be told of it."""
+"""Findings of the reading of a recording that end its diagnosis."""
 
 
 def diagnose(
-    recording: Recording, problem: FilterProblem, found: FilterResult, stated: Stated = None
+    recording: Recording, problem: FilterProblem, result: FilterResult, systematic: Stated = None
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
@@ -45,48 +45,47 @@ def diagnose(
     ----------
     recording : Recording
     problem : FilterProblem
-    found : FilterResult
-        What the estimator of the study made of it; the error-state filter judges the recording itself.
-    stated : Hypothesis, optional
-        What the study states with an uncertainty: no error within that is named.
+    result : FilterResult
+        Of the study's estimator; the error-state filter judges the recording itself.
+    systematic : Hypothesis, optional
+        Systematic inputs of the study: no error within their uncertainties is named.
     """
-    if any(finding.code in _BEYOND for finding in recording.findings) or not found.dims.any():
+    if any(finding.code in _BEYOND for finding in recording.findings) or not result.dims.any():
         return []
-    repaired, fair, findings = _without_faults(recording, problem, stated)
+    repaired, fair, findings = _without_faults(recording, problem, systematic)
     if not findings or not sound(filtered((repaired, fair))):
-        findings += _remaining((repaired, problem), fair, stated)
-    if findings or sound(found):
+        findings += _remaining((repaired, problem), fair, systematic)
+    if findings or sound(result):
         return findings
-    # where what is stated is wrong within its uncertainty all estimators have large innovations
-    if not found.converged or sound(filtered((recording, problem))):
+    # systematic inputs that are wrong within their uncertainty give all estimators large innovations
+    if not result.converged or sound(filtered((recording, problem))):
         text = (
-            f"the error-state filter finds no contradiction in this recording: the {found.kind} fails on it"
+            f"the error-state filter finds no contradiction in this recording: the {result.kind} fails on it"
         )
         findings.append(Finding("filter_fails", text, harm=EVERYTHING))
     return findings
 
 
-def _fair(problem: FilterProblem, moved: FilterProblem, found: FilterResult) -> FilterProblem:
-    """The problem as it may be meant: what is stated ``moved`` to where the recording fits best, and no prior that is
-    in the way of what the filter then ``found``."""
-    if not found.converged:
+def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) -> FilterProblem:
+    """The problem as it may be meant: systematic inputs ``moved`` to where the recording fits best, and priors widened
+    that the coefficients of the filter then contradict."""
+    if not result.converged:
         return problem
-    u, prior = np.sqrt(np.diag(found.covariance)), problem.prior
+    u, prior = np.sqrt(np.diag(result.covariance)), problem.prior
     # values are distributed about 0 with this variance where the prior holds
     spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
-    far = (u < UNSEEN * prior) & ~(np.abs(found.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread)
+    far = (u < UNSEEN * prior) & ~(np.abs(result.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread)
     return replace(
         moved,
-        prior=np.where(far, LIMITS.widened_prior * np.maximum(np.abs(found.coefficients), prior), prior),
+        prior=np.where(far, LIMITS.widened_prior * np.maximum(np.abs(result.coefficients), prior), prior),
     )
 
 
-def _remaining(case: Case, meant: FilterProblem, stated: Stated) -> list[Finding]:
-    """What the model leaves out, a prior that is too narrow, and noise that is not what is stated; ``meant`` as of
-    `_fair`."""
+def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Finding]:
+    """Errors that the model leaves out, priors that are too narrow, and misstated noise; ``meant`` as of `_fair`."""
     recording, problem = case
     fair = (recording, meant)
-    errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), stated)
+    errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), systematic)
     now = filtered(corrected)
     # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
     if errors and not white(corrected, now) and (walk := restless_gyros(fair)) is not None:
@@ -97,11 +96,11 @@ def _remaining(case: Case, meant: FilterProblem, stated: Stated) -> list[Finding
     return [*(each.finding for each in errors), *_beyond_prior(now, problem.prior), *rest]
 
 
-def _beyond_prior(found: FilterResult, prior: Array) -> list[Finding]:
+def _beyond_prior(result: FilterResult, prior: Array) -> list[Finding]:
     """Coefficients further from 0 than their prior [SI] allows, found with a wider one."""
-    if not found.converged:
+    if not result.converged:
         return []
-    values, variance, p = found.coefficients, np.diag(found.covariance), len(prior)
+    values, variance, p = result.coefficients, np.diag(result.covariance), len(prior)
     findings = []
     far = ~(np.abs(values) <= sigmas(LIMITS.risk, p) * np.sqrt(prior**2 + variance))
     for i in np.flatnonzero(far):
@@ -119,11 +118,11 @@ def _gross_faults(case: Case) -> Iterator[Hypothesis[Case]]:
 
 
 def _without_faults(
-    recording: Recording, problem: FilterProblem, stated: Stated
+    recording: Recording, problem: FilterProblem, systematic: Stated
 ) -> tuple[Recording, FilterProblem, list[Finding]]:
     """The recording without its gross faults, the problem as it may then be meant (`_fair`), and these faults."""
     findings = list[Finding]()
-    of = likely(recording, problem, stated)
+    of = likely(recording, problem, systematic)
     now = filtered((recording, of))
     while len(findings) < LIMITS.gross_faults and not sound(now):
         case, before = (recording, of), sum_of_squares(now)
@@ -136,13 +135,15 @@ def _without_faults(
             single = likeliest(case, single_readings(case, now), JUDGE, LIMITS.risk)
             if single is not None and sound(after := filtered(single.case)):
                 best, then = single, after
-            elif sound(filtered(small_errors((recording, replace(problem, prior=fair.prior)), stated)[1])):
+            elif sound(
+                filtered(small_errors((recording, replace(problem, prior=fair.prior)), systematic)[1])
+            ):
                 break
         # what explains less than half is not what happened
         if best is None or not sum_of_squares(then) < LIMITS.explained_ratio * before:
             break
         recording = best.case[0]
-        of = likely(recording, problem, stated)
+        of = likely(recording, problem, systematic)
         now = filtered((recording, of))
         findings.append(best.finding)
     return recording, _fair(problem, of, now), findings

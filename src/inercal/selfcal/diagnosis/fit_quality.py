@@ -1,4 +1,4 @@
-"""How well a recording of a platform fits its study: the innovations of the error-state filter, and their judge."""
+"""Fit of a recording to its study: the innovations of the error-state filter, and their judge."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
 
 Case = tuple[Recording, FilterProblem]
-"""A recording and its study, of which hypotheses speak."""
+"""A recording and its study."""
 
 
 class ErrorState:
@@ -34,32 +34,32 @@ JUDGE = ErrorState()
 
 
 def filtered(case: Case) -> FilterResult:
-    """What the error-state filter makes of a case."""
+    """Result of the error-state filter for a case."""
     return estimate(*case, "error-state")
 
 
-def regular(recording: Recording, found: FilterResult) -> Array:
+def regular(recording: Recording, result: FilterResult) -> Array:
     """Normalised innovations (n - 1, 6), NaN near gimbal lock."""
     near = ~(np.abs(np.cos(recording.th[1:, 1])) >= LIMITS.lock_cosine)
-    innovations = found.innovations.copy()
+    innovations = result.innovations.copy()
     innovations[near & np.isfinite(recording.th[1:, 1])] = np.nan
     return innovations
 
 
-def sum_of_squares(found: FilterResult) -> float:
+def sum_of_squares(result: FilterResult) -> float:
     """Sum of NIS; infinite where the filter diverged or nothing is measured."""
-    total = float(found.nis[found.dims > 0].sum())
-    return total if found.converged and found.dims.any() and math.isfinite(total) else math.inf
+    total = float(result.nis[result.dims > 0].sum())
+    return total if result.converged and result.dims.any() and math.isfinite(total) else math.inf
 
 
-def sound(found: FilterResult) -> bool:
+def sound(result: FilterResult) -> bool:
     """True where a filter agrees with its recording, as a whole and in each row; not where nothing is measured."""
-    if not found.converged or not found.dims.any():
+    if not result.converged or not result.dims.any():
         return False
-    excess = nis(found.nis, found.dims).excess
-    return excess <= LIMITS.nis_sigmas and not len(surprising(found.nis, found.dims, LIMITS.risk))
+    excess = nis(result.nis, result.dims).excess
+    return excess <= LIMITS.nis_sigmas and not len(surprising(result.nis, result.dims, LIMITS.risk))
 
 
-def white(case: Case, found: FilterResult) -> bool:
-    """True where innovations are of the size that is stated and uncorrelated."""
-    return sound(found) and whiteness(regular(case[0], found)) > LIMITS.risk
+def white(case: Case, result: FilterResult) -> bool:
+    """True where innovations are of the stated size and uncorrelated."""
+    return sound(result) and whiteness(regular(case[0], result)) > LIMITS.risk

@@ -1,10 +1,10 @@
 """Gross faults of a recording or its study: signs, units and order of rates, angles and accelerometers; another path.
 
 Before anything is filtered they are seen roughly, to some per cent: enough to tell wrong units, exchanged or reversed
-axes and another path from the coefficients that are to be found, which are a hundred times smaller. What the whole
-recording is about is compared, so that single bad stretches stay with the tests of the filters' innovations. Each other
-sign or order is a hypothesis, and the first with which two sensors agree is named. Accelerometers are also held to the
-innovations (`reordered_accelerometers`).
+axes and another path from the coefficients to be estimated, which are a hundred times smaller. Whole recordings are
+compared, so that single bad stretches stay with the tests of the filters' innovations. Each other sign or order is a
+hypothesis, and the first with which two sensors agree is named. Accelerometers are also held to the innovations
+(`reordered_accelerometers`).
 """
 
 from __future__ import annotations
@@ -47,29 +47,29 @@ class _Motion:
     """Motion in each of m steps between rows whose angles are known.
 
     ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
-    space, in p, that the rates tell of; ``stretch`` (m,) the stretch that each step belongs to; ``told`` (m,) whether
-    all rates in it were recorded.
+    space, in p, by the rates; ``stretch`` (m,) the stretch of each step; ``recorded`` (m,) true where all rates in it
+    were recorded.
     """
 
     th: Array
     dt: Array
     rate: Array
     stretch: NDArray[np.int64]
-    told: NDArray[np.bool_]
+    recorded: NDArray[np.bool_]
 
     def turned(self, world: World) -> Array:
-        """(s, 3) rad: turns of the stretches against inertial space, in p, that the angles tell of such a rig."""
+        """Turns (s, 3) [rad] of the stretches against inertial space, in p, by the angles of a rig."""
         q, _ = gimbals(self.th, world)
         of_earth = rotate(conjugate(q[:-1]), world.earth) * self.dt[:, None]
         return self.summed(log(multiply(conjugate(q[:-1]), q[1:])) + of_earth)
 
     def summed(self, steps: Array) -> Array:
-        """(s, 3) of each stretch, without steps whose rates are a guess."""
-        return np.stack([np.bincount(self.stretch, steps[:, k] * self.told) for k in range(3)], axis=-1)
+        """Sums (s, 3) over each stretch, without steps whose rates are a guess."""
+        return np.stack([np.bincount(self.stretch, steps[:, k] * self.recorded) for k in range(3)], axis=-1)
 
 
 def implausible(recording: Recording, settings: SelfcalSettings, where: object) -> list[Finding]:
-    """What does not fit together: rates, angles, accelerometers.
+    """Contradictions between rates, angles and accelerometers.
 
     Codes are ``sign_suspect`` and ``channel_swap`` of gimbals, rates and accelerometers, ``contradiction``,
     ``unit_suspect``, and ``at_prior`` without any motion. ``where`` is named in the error.
@@ -80,10 +80,10 @@ def implausible(recording: Recording, settings: SelfcalSettings, where: object) 
         Rates many times as fast as the angles, or the reverse: a unit is wrong, and nothing can be computed.
     """
     findings: list[Finding] = []
-    known = np.flatnonzero(np.isfinite(recording.th).all(axis=1))
-    if known.size < 2:
+    complete = np.flatnonzero(np.isfinite(recording.th).all(axis=1))
+    if complete.size < 2:
         raise RecordError(where, "found one row with all angles th_x, th_y, th_z, expected more")
-    motion = _motion(recording, known)
+    motion = _motion(recording, complete)
     moved = np.linalg.norm(motion.summed(np.diff(motion.th, axis=0)), axis=1)
     commanded = motion.summed(motion.rate)
     noise = LIMITS.noise_sigmas * settings.noise.encoder
@@ -96,20 +96,22 @@ def implausible(recording: Recording, settings: SelfcalSettings, where: object) 
         _units(commanded, moved, noise, where)
         findings += _rig(motion, commanded, settings, "gyro" if recording.measured else "wc")
     if all(finding.code not in ("channel_swap", "sign_suspect", "contradiction") for finding in findings):
-        findings += _accelerometers(recording, settings, known)
+        findings += _accelerometers(recording, settings, complete)
     return findings
 
 
-def _motion(recording: Recording, known: NDArray[np.int64]) -> _Motion:
-    """Motion between the rows whose angles are ``known``."""
+def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
+    """Motion between the rows with ``complete`` angles."""
     t = recording.t
     gained = np.vstack([np.zeros(3), np.cumsum(recording.rate * recording.dt[:, None], axis=0)])
-    part = (t[known[:-1]] - t[known[0]]) / (t[known[-1]] - t[known[0]])
+    part = (t[complete[:-1]] - t[complete[0]]) / (t[complete[-1]] - t[complete[0]])
     _, numbered = np.unique((LIMITS.compared_stretches * part).astype(np.int64), return_inverse=True)
     held = np.zeros(len(t), dtype=np.int64)
     held[np.array(recording.held, dtype=np.int64) + 1] = 1
-    told = np.diff(np.cumsum(held)[known]) == 0
-    return _Motion(recording.th[known], np.diff(t[known]), np.diff(gained[known], axis=0), numbered, told)
+    recorded = np.diff(np.cumsum(held)[complete]) == 0
+    return _Motion(
+        recording.th[complete], np.diff(t[complete]), np.diff(gained[complete], axis=0), numbered, recorded
+    )
 
 
 def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
@@ -137,11 +139,11 @@ def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: s
     by_angles = _Pair(turned, commanded, noise)
     if by_angles.misfit < LIMITS.rough_misfit:
         return []
-    found = _fitting(by_angles, _other_angles(motion, settings)) or _fitting(
+    suspect = _fitting(by_angles, _other_angles(motion, settings)) or _fitting(
         _Pair(commanded, turned, noise), _other_axes(sensor)
     )
-    if found is not None:
-        return [found]
+    if suspect is not None:
+        return [suspect]
     off = f"off by {100.0 * by_angles.misfit:.3g} % of the motion"
     return [
         Finding(
@@ -160,7 +162,7 @@ class _Pair:
 
     @property
     def misfit(self) -> float:
-        """Root mean square of the difference, less that of the noise, over that of what is expected; inf of nothing."""
+        """Root mean square difference, less that of the noise, over that expected; infinite where that is 0."""
         squares = float(np.sum((self.seen - self.expected) ** 2))
         left = max(squares - 3.0 * len(self.seen) * self.noise**2, 0.0)
         whole = float(np.sum(self.expected**2))
@@ -175,8 +177,8 @@ def _fitting(pair: _Pair, hypotheses: Iterable[Hypothesis[_Pair]]) -> Finding | 
 
 def _other_angles(motion: _Motion, settings: SelfcalSettings) -> Iterator[Hypothesis[_Pair]]:
     """Gimbals of another order or with other signs, the fewest changes first; exchanged angles."""
-    stated, world = settings.gimbals, settings.world
-    now = (*stated.axes, *stated.signs)
+    of_study, world = settings.gimbals, settings.world
+    now = (*of_study.axes, *of_study.signs)
 
     def hypothesis(code: str, text: str, moved: _Motion, rig: World) -> Hypothesis[_Pair]:
         text = f"th: {text}"
@@ -193,7 +195,7 @@ def _other_angles(motion: _Motion, settings: SelfcalSettings) -> Iterator[Hypoth
         for outer, inner, platform in itertools.product((1, -1), repeat=3)
     ]
     for other in sorted(others, key=changes)[1:]:
-        code = "sign_suspect" if other.axes == stated.axes else "channel_swap"
+        code = "sign_suspect" if other.axes == of_study.axes else "channel_swap"
         text = f"the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
         rig = world._replace(axes=other.index, signs=other.sign)
         yield hypothesis(code, f"{text} of the rig, not with those of the study", motion, rig)
@@ -232,11 +234,11 @@ def _signed_orders() -> list[tuple[tuple[int, ...], tuple[float, ...]]]:
 
 
 def _accelerometers(
-    recording: Recording, settings: SelfcalSettings, known: NDArray[np.int64]
+    recording: Recording, settings: SelfcalSettings, complete: NDArray[np.int64]
 ) -> list[Finding]:
     """Accelerometers against the specific force at the angles: wrong units, exchanged or reversed axes."""
     world = settings.world
-    whole = known[np.isfinite(recording.acc[known]).all(axis=1)]
+    whole = complete[np.isfinite(recording.acc[complete]).all(axis=1)]
     if not whole.size:
         return []
     acc, g0 = recording.acc[whole], float(np.linalg.norm(world.up))
@@ -253,9 +255,9 @@ def _accelerometers(
     pair = _Pair(acc, force, 2.0 * settings.noise.accelerometer)
     if pair.misfit < LIMITS.rough_misfit:
         return []
-    found = _fitting(pair, _other_axes("acc"))
-    if found is not None:
-        return [found]
+    suspect = _fitting(pair, _other_axes("acc"))
+    if suspect is not None:
+        return [suspect]
     off = f"off by {100.0 * pair.misfit:.3g} % of gravity"
     return [
         Finding("contradiction", f"acc: specific force does not follow the angles, {off}", harm=EVERYTHING)
@@ -263,7 +265,7 @@ def _accelerometers(
 
 
 def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
-    """Accelerometers exchanged or reversed: the signed permutation nearest to what they say against the encoders."""
+    """Accelerometers exchanged or reversed: the signed permutation that agrees best with the encoders."""
     recording, problem = case
     q, _ = gimbals(recording.th, problem.world)
     acc, up = recording.acc[1:], rotate(conjugate(q), problem.world.up)[1:]
@@ -276,13 +278,13 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
 
     ways = _signed_orders()
     order, signs = max(ways, key=lambda way: fit(*way))
-    said = []
+    words = []
     for i in sensors:
         if order[i] != i:
-            said.append(f"acc_{'xyz'[i]} looks like {'-' if signs[i] < 0.0 else ''}acc_{'xyz'[order[i]]}")
+            words.append(f"acc_{'xyz'[i]} looks like {'-' if signs[i] < 0.0 else ''}acc_{'xyz'[order[i]]}")
         elif signs[i] < 0.0:
-            said.append(f"acc_{'xyz'[i]} looks reversed")
-    if not said:
+            words.append(f"acc_{'xyz'[i]} looks reversed")
+    if not words:
         return
 
     def without(case: Case, _: Array) -> Case:
@@ -292,7 +294,7 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
             right[:, order[i]] = signs[i] * recording.acc[:, i]
         return replace(recording, acc=right), problem
 
-    code, text = "sign_suspect" if order == sensors else "channel_swap", ", ".join(said)
+    code, text = "sign_suspect" if order == sensors else "channel_swap", ", ".join(words)
     yield Hypothesis(text, code, text, without, alternatives=len(ways) - 1, harm=EVERYTHING)
 
 

@@ -1,4 +1,4 @@
-"""The noise that sensors show in the innovations of the error-state filter, beside what the study states of it."""
+"""The noise that sensors show in the innovations of the error-state filter, beside the stated one."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
     z = regular(case[0], now)
     findings, wide = [], False
     for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
-        known = columns[np.isfinite(columns)]
-        if len(known) < LIMITS.scatter_scalars:
+        finite = columns[np.isfinite(columns)]
+        if len(finite) < LIMITS.scatter_scalars:
             continue
-        mean, error = float(np.mean(np.square(known))), math.sqrt(2.0 / len(known))
+        mean, error = float(np.mean(np.square(finite))), math.sqrt(2.0 / len(finite))
         factor = math.sqrt(mean)
         if mean > 1.0 + LIMITS.nis_sigmas * error:
             wide = True
@@ -51,14 +51,16 @@ def _even(columns: Array, mean: float) -> bool:
     """True where the mean square is the same over all parts of the recording."""
     limit = sigmas(LIMITS.risk, LIMITS.even_parts)
     for part in np.array_split(columns, LIMITS.even_parts):
-        known = part[np.isfinite(part)]
-        if len(known) and abs(np.mean(np.square(known)) / mean - 1.0) > limit * math.sqrt(2.0 / len(known)):
+        finite = part[np.isfinite(part)]
+        if len(finite) and abs(np.mean(np.square(finite)) / mean - 1.0) > limit * math.sqrt(
+            2.0 / len(finite)
+        ):
             return False
     return True
 
 
 def restless_gyros(case: Case) -> Finding | None:
-    """Gyro noise other than stated, where that explains the innovations."""
+    """Gyro noise other than stated that explains the innovations, if any."""
     for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
         fitting = list[float]()
         for factor in 2.0**octaves:

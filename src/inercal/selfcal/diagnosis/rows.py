@@ -1,9 +1,9 @@
-"""Gross faults of rows: hypotheses of what was logged late, once too often, not at all, or far off.
+"""Gross faults of rows: readings logged late, once too often, not at all, or far off.
 
 Each is judged by the error-state filter, not here: without it the sum of normalised innovations squared must fall by
 more than chance explains (`inercal.estimate.hypotheses.Hypothesis.chance`), of all hypotheses of a kind.
 
-Angles and commands are compared from row to row: `Turning` holds what each says of the rotation in between.
+Angles and commands are compared from row to row: `Turning` holds the rotation in between by each.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _fault(
     times: int = 1,
     where: str = "",
 ) -> Hypothesis[Case]:
-    """A fault, and the recording as it would be without."""
+    """A fault, and the recording without it."""
 
     def without(case: Case, _: Array) -> Case:
         return repaired, case[1]
@@ -64,12 +64,12 @@ def _fault(
 @dataclass(frozen=True, eq=False)
 class Turning:
     """Rotation from row to row, rad about the axes of p at the start of each: ``seen`` (n - 1, 3) by the encoders (NaN
-    where a reading is missing), ``told`` (n - 1, 3) by the commands; the same about the joints in ``moved`` and
-    ``sent`` (n - 1, 3); ``of_earth`` (n - 1, 3) the part of earth rate; ``up`` (n, 3) m/s^2 in p at the encoders'
+    where a reading is missing), ``commanded`` (n - 1, 3); the same about the joints in ``moved`` and ``sent``
+    (n - 1, 3); ``of_earth`` (n - 1, 3) the part of earth rate; ``up`` (n, 3) m/s^2 in p at the encoders'
     attitude; ``noise`` [rad] standard deviation of a difference of two encoder readings."""
 
     seen: Array
-    told: Array
+    commanded: Array
     moved: Array
     sent: Array
     of_earth: Array
@@ -78,10 +78,11 @@ class Turning:
 
     @property
     def jumps(self) -> NDArray[np.bool_]:
-        """(n - 1,) where the encoders turn otherwise than told by more than noise and half of what was told."""
-        off = np.linalg.norm(self.seen - self.told, axis=1)
+        """(n - 1,) true where the encoders differ from the command by more than noise and half of the command."""
+        off = np.linalg.norm(self.seen - self.commanded, axis=1)
         return np.asarray(
-            off > LIMITS.noise_sigmas * self.noise + LIMITS.jump_share * np.linalg.norm(self.told, axis=1)
+            off
+            > LIMITS.noise_sigmas * self.noise + LIMITS.jump_share * np.linalg.norm(self.commanded, axis=1)
         )
 
 
@@ -90,15 +91,15 @@ def turning(recording: Recording, problem: FilterProblem) -> Turning:
     q, joints = gimbals(recording.th, problem.world)
     dt = recording.dt[:, None]
     # where a reading is missing the last known attitude does for the small part of earth rate
-    known = np.isfinite(recording.th).all(axis=1)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(q)), 0))
+    complete = np.isfinite(recording.th).all(axis=1)
+    last = np.maximum.accumulate(np.where(complete, np.arange(len(q)), 0))
     of_earth = rotate(conjugate(q[last]), problem.world.earth)[:-1] * dt
-    told = recording.rate * dt - of_earth
+    commanded = recording.rate * dt - of_earth
     # at gimbal lock the joints of a rotation are not unique, and the shortest motion is taken
-    sent = np.einsum("kij,kj->ki", np.linalg.pinv(joints[last][:-1], rcond=1e-3), told)
+    sent = np.einsum("kij,kj->ki", np.linalg.pinv(joints[last][:-1], rcond=1e-3), commanded)
     return Turning(
         boxminus(q[1:], q[:-1]),
-        told,
+        commanded,
         np.diff(recording.th, axis=0),
         sent,
         of_earth,
@@ -108,7 +109,7 @@ def turning(recording: Recording, problem: FilterProblem) -> Turning:
 
 
 def faults_of_rows(case: Case) -> Iterator[Hypothesis[Case]]:
-    """All that may be wrong with stretches of rows."""
+    """Faults of stretches of rows."""
     recording, problem = case
     turn = turning(recording, problem)
     yield from _shifts(recording, turn)
@@ -124,8 +125,8 @@ def _shifts(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
     rows = np.arange(n)
 
     def off(shift: int) -> Array:
-        told = recording.rate[np.clip(rows + shift, 0, n - 1)] * recording.dt[:, None] - turn.of_earth
-        return np.asarray(np.nan_to_num(np.square(turn.seen - told).sum(axis=1)))
+        commanded = recording.rate[np.clip(rows + shift, 0, n - 1)] * recording.dt[:, None] - turn.of_earth
+        return np.asarray(np.nan_to_num(np.square(turn.seen - commanded).sum(axis=1)))
 
     plain = off(0)
     by_shift = {shift: off(shift) for shift in SHIFTS}
@@ -153,7 +154,7 @@ def _shifted(recording: Recording, shift: int, first: int, alternatives: float) 
 
 
 def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
-    """Accelerometers logged some rows late or early: the shift nearest to what the encoders say."""
+    """Accelerometers logged some rows late or early: the shift that agrees best with the encoders."""
     moved = {shift: _by_rows(recording.acc, shift) for shift in SHIFTS}
 
     def off(shift: int) -> float:
@@ -188,21 +189,21 @@ def _frozen(recording: Recording) -> Iterator[Hypothesis[Case]]:
         start, end = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
         if end > start:
             rows = np.arange(start + 1, end + 1)
-            known = read.copy()
-            known[rows[:, None], columns] = np.nan
+            rest = read.copy()
+            rest[rows[:, None], columns] = np.nan
             which = (
                 "accelerometers and angles"
                 if len(columns) == 6
                 else ", ".join(f"acc_{'xyz'[i]}" for i in columns)
             )
             text = f"{which} repeat{'' if len(columns) > 1 else 's'} one reading in {counted(len(rows) + 1, 'row')}"
-            without = replace(recording, acc=known[:, :3], th=known[:, 3:])
+            without = replace(recording, acc=rest[:, :3], th=rest[:, 3:])
             left_out, where = len(rows) * len(columns), places("row", rows + 1)
             yield _fault("dead_channel", text, without, 2.5 * n * n, left_out, where=where)
 
 
 def _stuck(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
-    """An encoder that stands still while its joint is told to turn."""
+    """An encoder that stands still while its joint is commanded to turn."""
     n = len(recording.th)
     for joint, name in enumerate(JOINTS):
         sent, moved = np.abs(turn.sent[:, joint]), np.abs(turn.moved[:, joint])
@@ -242,12 +243,12 @@ def _stuck_encoder(
 
 
 def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
-    """Rows that are missing though time goes on evenly: a step of the angles that is a multiple of that told."""
-    size = np.square(turn.told).sum(axis=1)
+    """Rows that are missing though time goes on evenly: a step of the angles that is a multiple of the command."""
+    size = np.square(turn.commanded).sum(axis=1)
     fast = turn.jumps & (size > (LIMITS.noise_sigmas * turn.noise) ** 2)
-    along = np.divide((turn.seen * turn.told).sum(axis=1), size, out=np.ones_like(size), where=fast)
+    along = np.divide((turn.seen * turn.commanded).sum(axis=1), size, out=np.ones_like(size), where=fast)
     more = np.rint(along - 1.0)
-    miss = np.linalg.norm(turn.seen - (1.0 + more[:, None]) * turn.told, axis=1)
+    miss = np.linalg.norm(turn.seen - (1.0 + more[:, None]) * turn.commanded, axis=1)
     lost = fast & (more >= 1.0) & (miss < LIMITS.leap_share * np.sqrt(size) * (1.0 + more))
     if not lost.any():
         return
@@ -267,8 +268,8 @@ def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Ca
 
 
 def single_readings(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
-    """Single readings far from what the filter expects, left out one row after the other: an early one spoils what
-    follows."""
+    """Single readings far from what the filter expects, left out one row after the other: an early one spoils
+    those after it."""
     recording, problem = case
     rows = np.zeros(0, dtype=np.int64)
     left_out = 0

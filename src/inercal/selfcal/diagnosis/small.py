@@ -1,8 +1,8 @@
 """Constant errors that the model leaves out, found in the innovations of the error-state filter.
 
 Each is a hypothesis with some parameters, tested by the score test (`inercal.estimate.hypotheses`): the filter with
-them as further states, without a prior, would find the same. What a study states with an uncertainty may be wrong by
-about that: it is fitted along with all, its uncertainty for a prior.
+them as further states, without a prior, would find the same. Systematic inputs are fitted along with all, each with its
+stated uncertainty for a prior.
 """
 
 from __future__ import annotations
@@ -30,32 +30,31 @@ from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
 
 Stated = Hypothesis[Case] | None
-"""Errors of what a study states with an uncertainty."""
+"""Errors of the systematic inputs of a study, None where all are exact."""
 
 
-def likely(recording: Recording, problem: FilterProblem, stated: Stated) -> FilterProblem:
-    """The problem with what is ``stated`` moved, within its uncertainty, to where the recording fits best.
+def likely(recording: Recording, problem: FilterProblem, systematic: Stated) -> FilterProblem:
+    """The problem with its systematic inputs moved, within their uncertainties, to where the recording fits best.
 
-    Where one of it would have to move further than chance takes it, the recording contradicts what is stated, and
-    nothing is moved.
+    Where one would have to move further than chance takes it, the recording contradicts the study, and none is moved.
     """
-    if stated is None:
+    if systematic is None:
         return problem
     case = recording, problem
-    (fit,) = refitted(case, [tried(stated, case)], JUDGE)
+    (fit,) = refitted(case, [tried(systematic, case)], JUDGE)
     limit = sigmas(LIMITS.risk, len(fit.values))
-    if not np.abs(fit.values).max() <= limit * stated.prior:
+    if not np.abs(fit.values).max() <= limit * systematic.prior:
         return problem
     return fit.case[1]
 
 
-def small_errors(case: Case, stated: Stated = None) -> tuple[Fits[Case], Case]:
-    """What the model leaves out, beside what is ``stated``; and the case without all of it."""
-    return search(case, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, stated)
+def small_errors(case: Case, systematic: Stated = None) -> tuple[Fits[Case], Case]:
+    """Constant errors beside those of the systematic inputs, and the case without any of them."""
+    return search(case, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, systematic)
 
 
 def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
-    """What may be wrong of the site, the base, the gyros, the encoders and the clock of the commands."""
+    """Errors of the site, the base, the gyros, the encoders and the clock of the commands."""
     now = filtered(case)
     if not now.converged:
         return
@@ -128,16 +127,16 @@ def _latitude(fit: Fitted[Case]) -> str:
     north, up = directions(world)
     seen = math.atan2(float(world.earth @ up), float(world.earth @ north))
     stated_earth = world.earth - fit.values[0] * north - fit.values[1] * up
-    stated = math.atan2(float(stated_earth @ up), float(stated_earth @ north))
+    stated_latitude = math.atan2(float(stated_earth @ up), float(stated_earth @ north))
     u = float(np.hypot(fit.u[0] * math.sin(seen), fit.u[1] * math.cos(seen))) / EARTH_RATE
     return (
         f"the earth rate seen is that of latitude {math.degrees(seen):.2f} +- {math.degrees(u):.1g} deg, stated is "
-        f"{math.degrees(stated):.2f} deg: check latitude and heading"
+        f"{math.degrees(stated_latitude):.2f} deg: check latitude and heading"
     )
 
 
 def _other_mounting(case: Case, values: Array) -> Case:
-    """Sensors turned by gamma [rad] against the axes that the encoders tell of: ``q_bp = q_encoders qexp(gamma)``."""
+    """Sensors turned by gamma [rad] against the axes of the encoders: ``q_bp = q_encoders qexp(gamma)``."""
     recording, problem = case
     turn = exp(values)
     return replace(recording, acc=rotate(turn, recording.acc), rate=rotate(turn, recording.rate)), problem
@@ -186,7 +185,7 @@ def _other_scale(case: Case, values: Array) -> Case:
 
 
 def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
-    """Errors periodic in the angle of a joint: of each joint the order that its innovations show most."""
+    """Errors periodic in the angle of a joint: for each joint the order that its innovations show most."""
     angles, joints = _found_angles(case, now)
     orders_tried, z = np.arange(1, LIMITS.harmonic_orders + 1), regular(case[0], now)
     th = angles[1:]
@@ -203,8 +202,8 @@ def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
 
 
 def _found_angles(case: Case, now: FilterResult) -> tuple[Array, Array]:
-    """Gimbal angles (n, 3) [rad] that the filter found, and the axes (n, 3, 3) of the joints: at rest the angles read
-    change with their noise alone, which they would explain."""
+    """Gimbal angles (n, 3) [rad] that the filter found, and the axes (n, 3, 3) of the joints. At rest angles as read
+    change with their noise alone, and would explain it."""
     recording, problem = case
     assert now.history is not None
     read, joints = gimbals(np.nan_to_num(recording.th), problem.world)

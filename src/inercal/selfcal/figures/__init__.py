@@ -13,12 +13,24 @@ from inercal.report.coefficients import budget, correlation
 from inercal.report.courses import Course, Line, converging, falling, lines_by_group, path
 from inercal.report.html import Picture, render
 from inercal.report.innovations import innovations, nis
-from inercal.selfcal.display import of_field
-from inercal.selfcal.figures.filters import attitude_correction, attitude_errors, bounds_beside, filters_apart
-from inercal.selfcal.figures.gimbals import rig
+from inercal.selfcal.figures.filters import (
+    attitude_correction,
+    attitude_errors,
+    bounds_beside,
+    filters_apart,
+    gimbals_on_base,
+)
 from inercal.selfcal.filters.filter_result import product_form
 from inercal.selfcal.filters.residuals import gimbals
-from inercal.selfcal.platform.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
+from inercal.selfcal.platform.coefficients import (
+    ETA,
+    KA0,
+    names,
+    product_slope,
+    shown_units,
+    to_linear,
+    to_product,
+)
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.tables import weak_combinations
 from inercal.selfcal.task import compared
@@ -35,7 +47,7 @@ _CHANNELS = ("acc x", "acc y", "acc z")
 
 
 def main(calibration: Calibration) -> Picture:
-    """The picture that answers the question: uncertainties beside bounds and goals, or the path where none came out."""
+    """The main picture: uncertainties beside bounds and goals, or the path where there are no coefficients."""
     return _bounds(calibration) if calibration.estimate.names else _path(calibration)
 
 
@@ -63,22 +75,22 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
         calibration.estimate.shown(),
     )
     t, history = recording.t, filtered.history
-    drawn = [_bounds(calibration)] if estimate.names else []
+    drawings = [_bounds(calibration)] if estimate.names else []
     if history is not None and filtered.kind not in _AT_ONCE:
-        drawn += convergence(calibration)
-    drawn += [_path(calibration), rig(calibration.settings.base, calibration.settings.gimbals)]
+        drawings += convergence(calibration)
+    drawings += [_path(calibration), gimbals_on_base(calibration.settings.base, calibration.settings.gimbals)]
     if history is not None:
-        drawn.append(_attitude(calibration, history, attitude))
+        drawings.append(_attitude(calibration, history, attitude))
         if filtered.kind not in _AT_ONCE:
-            drawn.append(relative_errors(t, history, calibration.truth))
-    drawn.append(nis(t[1:], filtered.nis, filtered.dims))
+            drawings.append(relative_errors(t, history, calibration.truth))
+    drawings.append(nis(t[1:], filtered.nis, filtered.dims))
     if len(filtered.innovations):
         last = JOINTS if filtered.kind == "gimbal-ukf" else tuple(f"attitude {axis}" for axis in "XYZ")
-        drawn.append(innovations(t[1:], filtered.innovations, (*_CHANNELS, *last)))
+        drawings.append(innovations(t[1:], filtered.innovations, (*_CHANNELS, *last)))
     if estimate.names:
-        drawn.append(correlation(estimate))
-        drawn += [budget(estimate)] if estimate.budget else []
-    return drawn + compare_pictures(calibration)
+        drawings.append(correlation(estimate))
+        drawings += [budget(estimate)] if estimate.budget else []
+    return drawings + compare_pictures(calibration)
 
 
 def _path(calibration: Calibration) -> Picture:
@@ -94,7 +106,7 @@ def _path(calibration: Calibration) -> Picture:
 
 
 def compare_pictures(calibration: Calibration) -> list[Picture]:
-    """How far the other filters are from the one that counts; nothing where there are none."""
+    """Distance of the other filters from the one that counts; no picture without others."""
     filters = _all(calibration)
     if len(filters) < 2:
         return []
@@ -116,7 +128,7 @@ def convergence(calibration: Calibration) -> list[Picture]:
     truth = None if calibration.truth is None else to_linear(calibration.truth[:p])
     to_filter = np.linalg.inv(product_slope(calibration.filtered.coefficients))
     bound = np.sqrt(np.diag(to_filter @ bounds.covariance @ to_filter.T))
-    units, size = of_field(p)
+    units, size = shown_units(p)
     courses = [
         Course(
             name,
@@ -199,11 +211,11 @@ def _attitude(calibration: Calibration, history: History, truth: Array | None) -
 def _bounds(calibration: Calibration) -> Picture:
     """Uncertainties beside bounds, priors and goals."""
     estimate, bounds = calibration.estimate, calibration.bounds
-    units, size = of_field(len(bounds.names))
+    units, size = shown_units(len(bounds.names))
     goal = np.array([calibration.settings.goal.get(name, np.nan) for name in bounds.names])
-    stated = [estimate[name].u if name in estimate.parameters else np.nan for name in bounds.names]
+    u = [estimate[name].u if name in estimate.parameters else np.nan for name in bounds.names]
     return bounds_beside(
-        bounds.names, units, np.array(stated) / size, bounds.u / size, bounds.prior / size, goal / size
+        bounds.names, units, np.array(u) / size, bounds.u / size, bounds.prior / size, goal / size
     )
 
 

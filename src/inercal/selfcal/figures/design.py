@@ -10,8 +10,8 @@ from inercal.report.coefficients import dots
 from inercal.report.courses import path
 from inercal.report.html import Picture
 from inercal.report.html import page as framed
-from inercal.selfcal.display import of_field
 from inercal.selfcal.figures.facts import facts
+from inercal.selfcal.platform.coefficients import shown_units
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.tables import bounds_by_path, paths, turns, weak_combinations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def main(designed: Designed) -> Picture:
-    """The picture that answers the question: the path found."""
+    """The main picture: the path found."""
     plan = designed.plan
     return path(
         plan.step * np.arange(len(plan.angles()), dtype=float),
@@ -37,8 +37,8 @@ def main(designed: Designed) -> Picture:
 def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of a search for a path as one self-contained HTML page."""
     bounds, plan = designed.bounds, designed.plan
-    units, size = of_field(len(bounds.names))
-    drawn = [
+    units, size = shown_units(len(bounds.names))
+    pictures = [
         main(designed),
         dots(
             "Bounds by path",
@@ -58,6 +58,6 @@ def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> s
         "A path for self-calibration",
         facts(settings),
         tables=[paths(designed), turns(plan), weak_combinations(bounds)],
-        pictures=drawn,
+        pictures=pictures,
         details=[bounds_by_path(designed)],
     )

@@ -1,4 +1,4 @@
-"""What a page of self-calibration says of its study: site, noise and path."""
+"""Facts of a study on a page of self-calibration: site, noise and path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a self-calibration: attitude, bounds beside the estimates, filters beside each other."""
+"""Pictures of a self-calibration: gimbals, attitude, bounds beside the estimates, filters beside each other."""
 
 from __future__ import annotations
 
@@ -12,9 +12,28 @@ from inercal.report.courses import Line, panels_of_lines
 from inercal.report.html import Picture
 from inercal.report.marks import Axis, Dots, Level, Mark, Panel, Strips
 from inercal.report.panels import draw
+from inercal.report.rig import Triad, Turn, rig
 from inercal.report.style import ALARM, COLOURS, QUIET, plain_unit, power_of_ten
+from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals
 
 _MARKS = "osD^vP"
+
+
+def gimbals_on_base(base: Base, gimbals: Gimbals) -> Picture:
+    """Three gimbals on their base at zero angles: outer, inner and platform axis, and the axes of the platform."""
+    to_geographic = base.from_geographic().T
+    joints = [
+        Turn(name, sign * to_geographic[:, "xyz".index(axis)])
+        for name, axis, sign in zip(JOINTS, gimbals.axes, gimbals.signs, strict=True)
+    ]
+    return rig(
+        "Axes and signs of the gimbals",
+        "The gimbals at zero angles as the study states them: th_x turns the outer gimbal, th_y the inner one, th_z "
+        "the platform, each plus along its arrow; X_p, Y_p, Z_p the axes of the platform. Compare with the rig: an "
+        "axis in another place or an angle that counts the other way shows here first.",
+        joints,
+        Triad(("X_p", "Y_p", "Z_p"), np.asarray(to_geographic)),
+    )
 
 
 def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> Picture:
@@ -80,7 +99,7 @@ def bounds_beside(
 ) -> Picture:
     """Standard uncertainties (p,) beside bounds and goals (p,), over the priors (p,); all in ``units``.
 
-    What is NaN, as a goal that is not stated, has no mark.
+    NaN, as of a goal that is not stated, has no mark.
     """
     rows = np.arange(len(names))
     marks: list[Mark] = [Strips((0.5, 1.0), ALARM, 0.08), Level(1.0, "", QUIET, 0.9, upright=True)]

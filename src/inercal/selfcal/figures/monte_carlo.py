@@ -1,4 +1,4 @@
-"""The page of many simulated calibrations: do the stated uncertainties hold."""
+"""The page of many simulated calibrations, which tests their stated uncertainties."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> s
         np.linalg.solve(campaign.joint_covariance, campaign.joint_error[..., None])[..., 0],
     )
     what = "attitude and coefficients" if m > p else "coefficients"
-    drawn = [
+    pictures = [
         covered(coverage, campaign.names, campaign.rms_over_bound),
         chi_square(
             "Normalised estimation error squared",
@@ -63,7 +63,7 @@ def page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> s
         "Self-calibration simulated many times",
         [*facts(settings), ("filter", "", f"{FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind})")],
         tables=[campaign_table(campaign)],
-        pictures=drawn,
+        pictures=pictures,
         details=[],
     )
 
@@ -90,17 +90,17 @@ def chi_square(title: str, caption: str, values: Array, dof: float, divisor: flo
     return draw(title, caption + more, [[Panel(marks, *axes)]], 2.4)
 
 
-def covered(found: Coverage, names: Sequence[str], over_bound: Array) -> Picture:
-    """How often the stated intervals held the truth, and root mean square errors over stated uncertainties and over
+def covered(coverage: Coverage, names: Sequence[str], over_bound: Array) -> Picture:
+    """Share of stated intervals that held the truth, and root mean square errors over stated uncertainties and over
     bounds (p,)."""
-    rows, (low, high) = np.arange(len(names)), found.limits
+    rows, (low, high) = np.arange(len(names)), coverage.limits
     # the root mean square of n normal numbers is 1 with a standard deviation of about 1/sqrt(2 n)
-    spread = 3.0 / np.sqrt(2.0 * found.runs)
+    spread = 3.0 / np.sqrt(2.0 * coverage.runs)
     panels = []
     for values, band, at, label in zip(
-        (100.0 * found.fraction, found.rms, over_bound),
+        (100.0 * coverage.fraction, coverage.rms, over_bound),
         ((100.0 * low, 100.0 * high), *2 * ((1.0 - spread, 1.0 + spread),)),
-        (100.0 * found.level, 1.0, 1.0),
+        (100.0 * coverage.level, 1.0, 1.0),
         ("intervals that hold the truth [%]", "rms of error / u", "rms of error / bound"),
         strict=True,
     ):
@@ -111,11 +111,11 @@ def covered(found: Coverage, names: Sequence[str], over_bound: Array) -> Picture
         panels.append(Panel(marks, Axis(label), Axis(names=names), grid="y"))
     return draw(
         "Coverage, and errors beside uncertainties and bounds",
-        f"Left: share of {found.runs} runs in which the interval stated for {100.0 * found.level:g} % held the truth; "
-        "band: where all of them lie by chance. Middle and right: root mean square of the errors over the stated "
-        "standard uncertainty, and over the Cramér-Rao bound, 1 for a filter that uses all that the path tells; band: "
-        "1 ± three standard deviations of such a ratio. Red: outside; right of the band on the left, and left of it "
-        "elsewhere, that is harmless, for uncertainties are then rather too large.",
+        f"Left: share of {coverage.runs} runs in which the interval stated for {100.0 * coverage.level:g} % held the "
+        "truth; band: where all of them lie by chance. Middle and right: root mean square of the errors over the "
+        "stated standard uncertainty, and over the Cramér-Rao bound, 1 for a filter that uses all that the path tells; "
+        "band: 1 ± three standard deviations of such a ratio. Red: outside; right of the band on the left, and left of "
+        "it elsewhere, that is harmless, for uncertainties are then rather too large.",
         [panels],
         0.7 + 0.16 * len(names),
         share_y=True,

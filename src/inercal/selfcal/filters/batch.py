@@ -73,7 +73,7 @@ def estimate_map(
         Of the first attitude; its encoder reading if absent. The iteration begins at the encoders all the same; where
         these never read it begins at the estimate of ``lm``.
     history : bool
-        Whether to return attitudes and their standard deviations, given all measurements, and innovations.
+        Return attitudes with standard deviations, given all measurements, and innovations.
 
     Returns
     -------
@@ -137,12 +137,12 @@ def _first_guess(
     if start is not None and not seen.any():
         return rough_path(recording, problem, start)
     first = first_reading(recording, problem).attitude if start is None else start.attitude
-    known = np.vstack([first, measured.attitude])
+    attitudes = np.vstack([first, measured.attitude])
     path = followed(first, recording.rate * recording.dt[:, None])
     # the reading before each row, or the first one before there is any
     last = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), int(np.argmax(seen))))
     since = recording.t - recording.t[last]
-    turned = multiply(exp(-since[:, None] * problem.world.earth), known[last])
+    turned = multiply(exp(-since[:, None] * problem.world.earth), attitudes[last])
     carried = multiply(turned, multiply(conjugate(path[last]), path))
     return normalize(carried), np.zeros(len(problem.prior))
 
@@ -174,9 +174,9 @@ def _terms(
     start: Start,
     loose: Sequence[int] = (),
 ) -> _Terms:
-    """All terms at attitudes (n, 4) and coefficients (p,); of the ``loose`` steps nothing is known."""
+    """All terms at attitudes (n, 4) and coefficients (p,); ``loose`` steps weigh next to nothing."""
     world, prior, dt = problem.world, problem.prior, recording.dt
-    found = sensed(q[1:], c, measured, world)
+    of_rows = sensed(q[1:], c, measured, world)
     base = on_base(c, world)
     turn, slope = turns(recording.rate, dt, c)
     ahead, of_earth = exp(turn), -dt[:, None] * base.earth
@@ -193,7 +193,7 @@ def _terms(
     return _Terms(
         miss / start.sigma,
         inverse_left_jacobian(miss) / start.sigma,
-        found._replace(by_coefficients=found.by_coefficients * prior),
+        of_rows._replace(by_coefficients=of_rows.by_coefficients * prior),
         residual * weight[:, None],
         left @ np.swapaxes(to_matrix(ahead), 1, 2),
         -np.swapaxes(left, 1, 2),

@@ -10,12 +10,11 @@ are left once the encoders of the row are known.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.estimate.kalman import empty_row, innovation_variance, scalar_update
 from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
@@ -37,8 +36,6 @@ from inercal.selfcal.platform.model import (
     specific_force,
 )
 from inercal.selfcal.platform.recording import Steps
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> State:

@@ -34,7 +34,7 @@ class State(NamedTuple):
 class Estimates(NamedTuple):
     """Estimates after each of m steps, a row for each: as in `History` and `FilterResult`.
 
-    ``nis`` and ``dims`` are always there; the arrays before them have no rows where no history was asked for.
+    Without a history all arrays but ``nis`` and ``dims`` have no rows.
     """
 
     attitude: Array

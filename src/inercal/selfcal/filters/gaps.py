@@ -5,7 +5,7 @@ commanded to follow besides, turns in p meanwhile. Holding the rate against iner
 rate times half of the angle turned, 2 seconds of arc after 4 s at 1 deg/s.
 
 That is a guess. So nothing measured after such a step counts before the encoders read again, and where these contradict
-it, as where a turn began or ended meanwhile, the attitude is theirs from then on and owes nothing to what was before:
+it, as where a turn began or ended meanwhile, the attitude is theirs from then on and owes nothing to the past:
 coefficients and their covariance stay, correlations with the attitude are dropped. Measured rates are dealt with in
 the same way: a servo that did not hold its rate through a gap is found out like a turn that ended.
 """
@@ -68,9 +68,9 @@ def held_rate(w: Array, th: Array, world: World, middle: float, since: float, dt
         The last known gimbal angles; times are counted from then.
     world : World
     middle : float
-        When ``w`` was that of the platform [s].
+        Time [s] at which the platform turned at ``w``.
     since, dt : float
-        When the step begins and how long it takes [s].
+        Begin and length of the step [s].
     """
     q = np.array(attitude(th, world.axes, world.signs))
     turn = w
@@ -98,7 +98,7 @@ def with_held(t: Array, rate: Array, th: Array, world: World, gained: bool) -> t
         NaN where not measured; the first row is complete.
     world : World
     gained : bool
-        Whether rates are those just before the next row, instead of just after theirs.
+        True for rates just before the next row, false for those just after theirs.
     """
     dt = np.diff(t)
     before = np.append(np.full(RECENT - 1, np.nan), dt)
@@ -164,7 +164,7 @@ def advance(
 
 
 def doubtful(held: Sequence[int], th: Array) -> list[int]:
-    """Steps after which nothing counts until the encoders (m, 3) have agreed: held ones, and on until they read."""
+    """Steps whose measurements wait for the encoders (m, 3): held ones, and all up to the next reading."""
     seen, doubt = np.all(np.isfinite(th), axis=1), np.zeros(len(th), dtype=np.bool_)
     for k in held:
         until = k + int(np.argmax(seen[k:])) if seen[k:].any() else len(th) - 1
@@ -186,7 +186,7 @@ def broken(recording: Recording, problem: FilterProblem, start: Start | None = N
 
 
 def taken_anew(recording: Recording, result: FilterResult) -> list[Finding]:
-    """``gap``: over which the platform did something else."""
+    """``gap``: steps in which the platform did not turn on as before."""
     rows = np.array(result.restarts, dtype=np.int64)
     if not rows.size:
         return []
@@ -200,7 +200,7 @@ def taken_anew(recording: Recording, result: FilterResult) -> list[Finding]:
 
 
 def _contradicted(state: State, problem: FilterProblem, th: Array) -> bool:
-    """Whether encoder readings (3,) [rad] are not where a state that has not seen them expects the platform."""
+    """True where encoder readings (3,) [rad] are far from the attitude of a state that has not seen them."""
     expected, read = estimate_of(state, problem), anew(problem, th)
     limit = CONTRADICTION * np.hypot(expected.attitude_u[0], read.sigma)
     return bool((np.abs(boxminus(read.attitude, expected.attitude[0])) > limit).any())

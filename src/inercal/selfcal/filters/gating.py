@@ -1,4 +1,4 @@
-"""Compiled near-level gating: which accelerometers take part in an update.
+"""Compiled near-level gating: the accelerometers that take part in an update.
 
 Off unless asked for: it only loses information, as the comparison of bounds shows. An accelerometer near level
 reads close to zero; it stops within a first angle of that and resumes beyond a second, larger one.

@@ -6,7 +6,7 @@ State: the angles th (3), then the coefficients (p,), all noise added to covaria
 
 integrated by Runge and Kutta's fourth order or by Euler, whose steps bias the coefficients. T is singular where the
 inner angle is 90 deg: outer and platform angle are not unique there, and near it the numbers of this filter are wrong
-or not even finite. Nothing is done against that; the least |cos thy| is told.
+or not even finite. Nothing is done against that; the least |cos thy| is returned.
 
 In the coordinates of the joints, along the axes (i, j, k) on which they lie at zero angles, C_bp = R1(a) R2(b) R3(c)
 whatever the rig: angles a, b, c are those of the gimbals times their signs and the parity of (i, j, k)
@@ -19,9 +19,9 @@ import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Vector
@@ -34,7 +34,6 @@ from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.settings import FACTOR_OF
 
-Array: TypeAlias = NDArray[np.float64]
 Cosines: TypeAlias = tuple[float, float, float, float, float, float]
 
 
@@ -117,7 +116,7 @@ def _further(d: Vector, h: float, r: Vector) -> Vector:
 
 @kernel
 def step(at: Cosines, d: Vector, w: Vector, earth: Vector, dt: float, euler: bool) -> Vector:
-    """Where angles that differ by ``d`` (3,) [rad] from those of ``at`` are after ``dt`` [s], against the same.
+    """Angles after ``dt`` [s] against those of ``at``, which they differ from by ``d`` (3,) [rad] before.
 
     ``w`` and ``earth`` as of `rates`, held.
     """
@@ -187,7 +186,7 @@ def _add_walk(P: Array, thy: float, variance: float, world: World) -> None:
 
 @kernel
 def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: Array, z: Array) -> None:
-    """Put into ``z`` (2 n + 1, 6) what accelerometers [m/s^2] and encoders [rad, against ``th``] read at all points.
+    """Put into ``z`` (2 n + 1, 6) readings of accelerometers [m/s^2] and encoders [rad, against ``th``] at all points.
 
     ``columns`` (n, n) of the points; ``shifted`` (p,) and ``f`` (3,) used up.
     """

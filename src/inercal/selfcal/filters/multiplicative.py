@@ -13,12 +13,11 @@ more than three dimensions (Crassidis and Markley 2003, with a rotation vector i
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.kalman import Row, scalar_update
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
@@ -39,8 +38,6 @@ from inercal.selfcal.platform.model import (
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.settings import FACTOR_OF
-
-Array: TypeAlias = NDArray[np.float64]
 
 WIDE = 3.0
 """Length [rad] beyond which a deviation may be more than half a turn, where a logarithm is not what it came from."""
@@ -106,7 +103,7 @@ def _by_earth(earth: Array, c: Array, dt: float) -> Quaternion:
 
 @kernel
 def _read(q: Quaternion, c: Array, up: Array, columns: Array, shifted: Array, z: Array) -> None:
-    """Put into ``z`` (2 n + 1, 3) [m/s^2] what the accelerometers read at all points; arguments as of `_predict`."""
+    """Put into ``z`` (2 n + 1, 3) [m/s^2] the accelerometers' readings at all points; arguments as of `_predict`."""
     n = len(columns)
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)

@@ -19,9 +19,9 @@ import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import covariance, cross, draw, empty_points, mean, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
@@ -34,7 +34,6 @@ from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.settings import FACTOR_OF
 
-Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = tuple[Quaternion, Quaternion, Quaternion]
 
 

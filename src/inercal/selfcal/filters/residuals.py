@@ -1,7 +1,7 @@
-"""What a recording says against attitudes and coefficients: all rows at once, with derivatives, for batch estimators.
+"""Residuals of a recording at attitudes and coefficients: all rows at once, with derivatives, for batch estimators.
 
 Attitudes change to the right, ``q qexp(dtheta)`` with dtheta (3,) [rad] about the axes of p; coefficients are in the
-linear form. Derivatives are those of what the model says, so that a residual changes by minus them.
+linear form. Derivatives are those of the model, so that a residual changes by minus them.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def gimbals(th: Array, world: World) -> tuple[Array, Array]:
 
 
 def _gate(attitude: Array, seen: NDArray[np.bool_], problem: FilterProblem) -> NDArray[np.bool_]:
-    """(m, 6) what the near-level gate lets pass; where the encoders are silent it stays as it was."""
+    """Measurements (m, 6) that the near-level gate lets pass; it stays as it was where the encoders are silent."""
     gate, near = problem.model.gate, np.zeros(3, dtype=np.int64)
     force = rotate(conjugate(attitude), problem.world.up)
     passed = np.ones((len(attitude), 6), dtype=np.bool_)

@@ -5,7 +5,7 @@ wrong minimum of the heading if started 100 degrees off. Hence the first guess t
 first row by the commanded rates and solves Wahba's problem, in closed form and whatever the start. The heading comes
 from earth rate, which turns the vertical against inertial space by 15 degrees an hour.
 
-What gyro noise does to the estimates is in their covariance: with G the gain of the fit, R the noise of the
+The covariance of the estimates includes gyro noise: with G the gain of the fit, R the noise of the
 measurements, H their derivative by attitude and W = ARW^2 min(t_i, t_j) the covariance of the accumulated wander,
 
     cov = G R G^T + G H W H^T G^T  (and the prior's share).
@@ -68,7 +68,7 @@ def estimate_lm(
     start : Start, optional
         Of the first attitude; its encoder reading if absent.
     history : bool
-        Whether to return attitudes, their standard deviations, and innovations.
+        Return attitudes, their standard deviations, and innovations.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def wahba(recording: Recording, problem: FilterProblem, measured: Readings, star
 
 
 class _Along(NamedTuple):
-    """A path without gyro noise: attitudes ``q`` (n, 4), coefficients ``c`` (p,) and what was ``sensed`` at all rows
+    """A path without gyro noise: attitudes ``q`` (n, 4), coefficients ``c`` (p,) and residuals ``sensed`` at all rows
     but the first.
 
     ``inertial`` (n, 4) attitudes against an inertial frame that is b at the first row; ``slope`` (n, 3, 3 + p)
@@ -198,9 +198,9 @@ def _along(
         by_earth = -since[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
         slope[:, :, -3:] += np.swapaxes(to_matrix(q), 1, 2) @ by_earth
     slope[:, :, 3:] *= problem.prior
-    found = sensed(q[1:], c, measured, problem.world)
-    found = found._replace(by_coefficients=found.by_coefficients * problem.prior)
-    return _Along(q, c, found, inertial, slope)
+    of_rows = sensed(q[1:], c, measured, problem.world)
+    of_rows = of_rows._replace(by_coefficients=of_rows.by_coefficients * problem.prior)
+    return _Along(q, c, of_rows, inertial, slope)
 
 
 def _fit(

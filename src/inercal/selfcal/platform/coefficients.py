@@ -1,4 +1,4 @@
-"""The coefficients that a platform finds out about itself: names, units, order, and two forms of misalignment.
+"""The coefficients of a platform: names, units, order, and two forms of misalignment.
 
 Everywhere coefficients are one array (p,) in the order of `NAMES`, in SI. p is 18, or 24 with the extended model:
 
@@ -33,6 +33,7 @@ from typing import Final
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.instruments.terms import shown_unit
 
 GROUPS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "kg0": (("x", "y", "z"), "rad/s"),
@@ -55,7 +56,7 @@ NAMES: Final[tuple[str, ...]] = EXTENDED[:18]
 """Names of the 18 coefficients of the paper, in order."""
 
 KG0, ETA, DS, DO, KA0, KA1, KG1, BETA = (slice(3 * k, 3 * k + 3) for k in range(8))
-"""Where each group is in the array."""
+"""Slice of each group in the array."""
 
 
 def names(p: int) -> tuple[str, ...]:
@@ -68,13 +69,19 @@ def units(p: int) -> tuple[str, ...]:
     return tuple(unit for ends, unit in GROUPS.values() for _ in ends)[:p]
 
 
+def shown_units(p: int) -> tuple[tuple[str, ...], Array]:
+    """Units of the first ``p`` coefficients for people, and how many SI units (p,) each is."""
+    shown = [shown_unit(unit) for unit in units(p)]
+    return tuple(unit for unit, _ in shown), np.array([size for _, size in shown])
+
+
 _ETA = np.arange(ETA.start, ETA.stop)
 #: scale errors that belong to eta pz, oy, oz: those of accelerometers z, y, z
 _SCALE = KA1.start + np.array([2, 1, 2])
 
 
 def scale(c: Array) -> Array:
-    """What coefficients (*batch, p) of the product form are multiplied by to give the linear form: 1 + ka1, or 1."""
+    """Factors (*batch, p) from the product form to the linear form: 1 + ka1, or 1."""
     by = np.ones_like(c)
     by[..., _ETA] += c[..., _SCALE]
     return by
@@ -88,14 +95,13 @@ def to_linear(product: Array) -> Array:
 def to_product(linear: Array) -> Array:
     """Coefficients (*batch, p) from the linear form to the product form; the inverse of `to_linear`.
 
-    Those eta are NaN, here and in what follows, whose accelerometer has no scale, ka1 = -1: it shows no force, as may
-    come out of a fit that diverges, and eta can have any value.
+    Eta of an accelerometer without scale, ka1 = -1, is NaN, here and below: it may come out of a fit that diverges.
     """
     return linear / divisor(linear)
 
 
 def divisor(c: Array) -> Array:
-    """What coefficients (*batch, p) of the linear form are divided by to give the product form: `scale`, NaN for 0."""
+    """Divisors (*batch, p) from the linear form to the product form: `scale`, NaN for 0."""
     by = scale(c)
     by[by == 0.0] = np.nan
     return by

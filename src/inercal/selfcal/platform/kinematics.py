@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, multiply, rotate
 
-Array: TypeAlias = NDArray[np.float64]
 Axes: TypeAlias = NDArray[np.int64]
 
 TWO_PI = 2.0 * math.pi

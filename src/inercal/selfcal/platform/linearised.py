@@ -1,4 +1,4 @@
-"""Compiled Jacobians of the platform: what small errors of attitude and coefficients do.
+"""Compiled Jacobians of the platform, by small errors of attitude and coefficients.
 
 The error state is dtheta (3) [rad], right-handed about the axes of p, then the coefficients (p,) in the linear form:
 ``q_true = q qexp(dtheta)``. Both the error-state filter and the bounds rest on these.
@@ -14,15 +14,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.estimate.kalman import Row
 from inercal.geometry.kernels import Quaternion, Vector, exp, right_jacobian, rotate
 from inercal.selfcal.platform.kinematics import Axes, joint_axes
 
-Array: TypeAlias = NDArray[np.float64]
 Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
 FLOOR = 0.05

@@ -1,4 +1,4 @@
-"""Compiled model of the platform: its rate, its attitude from step to step, what its accelerometers read.
+"""Compiled model of the platform: its rate, its attitude from step to step, its accelerometers.
 
 Coefficients ``c`` (p,), p 18 or 24, are in the linear form, in the order of `inercal.selfcal.platform.coefficients`.
 Attitudes are ``q_bp`` against the frame b of the encoders; earth rate and gravity in b turn with beta.
@@ -6,16 +6,12 @@ Attitudes are ``q_bp`` against the frame b of the encoders; earth rate and gravi
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from inercal._jit import kernel
+from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.selfcal.platform.rig import World
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 @kernel

@@ -16,7 +16,7 @@ from inercal.selfcal.platform.rig import JOINTS, World
 JointName = Literal["x", "y", "z"]
 
 MOST_ROWS = 5_000_000
-"""Rows of a plan that fit into memory with all that is computed from them."""
+"""Most rows of a plan that fit into memory with all that is computed from them."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _words(move: Move) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What a plan commands: ``t`` (n,) [s], nominal ``angles`` (n, 3) [rad], ``rate`` (n - 1, 3) [rad/s].
+    """Motion that a plan commands: ``t`` (n,) [s], nominal ``angles`` (n, 3) [rad], ``rate`` (n - 1, 3) [rad/s].
 
     ``rate`` is that of the platform against inertial space, in p, held from each row to the next.
     """

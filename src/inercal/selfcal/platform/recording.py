@@ -29,7 +29,7 @@ class Steps(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What a platform recorded; what is missing is NaN.
+    """A recording of a platform; NaN where a number is missing.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Recording:
         Steps whose rate was not recorded, and is that of a platform that turns on as before
         (`inercal.selfcal.filters.gaps`).
     temperature : Quantity or None
-        That was recorded: its mean and standard deviation.
+        Mean and standard deviation of the recorded one.
     """
 
     t: Array

@@ -1,4 +1,4 @@
-"""Three-axis gimbals on a base: how angles make an attitude, and what earth and gravity are on the base.
+"""Three-axis gimbals on a base: attitude from angles, earth rate and gravity on the base.
 
 Frame b belongs to the encoders: it is the frame of the platform p at zero angles, ``C_bp(0) = 1``; the base as it is
 stated here may be turned against it, which is beta of the extended model. Joints are turned in the order x, y, z
@@ -70,7 +70,7 @@ class Gimbals:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """How frame b stands on the earth.
+    """Attitude of frame b on the earth.
 
     Attributes
     ----------

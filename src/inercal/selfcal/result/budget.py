@@ -1,7 +1,7 @@
-"""What coefficients are uncertain by: noise, prior, and what is stated of site and base.
+"""Uncertainty budget of the coefficients: noise, prior, and the systematic inputs of site and base.
 
-The covariance of a filter is split as that of the bounds along its path is; what is stated (type B) acts through the
-error-state filter, run again with it changed by one standard uncertainty either way.
+The covariance of a filter is split as that of the bounds along its path is; systematic inputs (type B) act through the
+error-state filter, run again with each changed by one standard uncertainty either way.
 """
 
 from __future__ import annotations
@@ -34,26 +34,26 @@ def within(covariance: Array, bounds: Bounds, noise: Noise, dof: float) -> list[
         "accelerometer": (noise.accelerometer, "m/s^2"),
         "encoder": (noise.encoder, "rad"),
     }
-    found: list[TypeA | TypeB] = []
+    sources: list[TypeA | TypeB] = []
     for source, part in bounds.contributions.items():
         P = to_filter @ part @ to_filter.T
         P = 0.5 * (P + P.T)  # where hardly anything is known, rounding is not the same on both sides
         if source in levels:
-            found.append(
+            sources.append(
                 TypeA(f"{source} noise" if source != "angle random walk" else source, *levels[source], P, dof)
             )
         else:
             # u in units of the prior standard deviations
             values, vectors = np.linalg.eigh(P / np.outer(prior, prior))
             root = prior[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-            found.append(TypeB(source, 1.0, "1", root))
-    return found
+            sources.append(TypeB(source, 1.0, "1", root))
+    return sources
 
 
-def stated(
+def systematic(
     recording: Recording, settings: SelfcalSettings, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
-    """What is stated of site and base.
+    """Systematic inputs of site and base.
 
     Parameters
     ----------
@@ -65,12 +65,11 @@ def stated(
     Returns
     -------
     sources : list of `TypeB`
-        What is stated with an uncertainty.
+        Inputs stated with an uncertainty.
     exact : mapping
-        What is stated without -> the error of it, in words, that does as much as one u of a coefficient.
+        Input stated without one -> the error of it, in words, that does as much as one u of a coefficient.
     """
     sources, exact = list[TypeB](), dict[str, str]()
-    known = names(len(u))
     for statement in statements(settings):
         by = statement.u or statement.step
         ends = [
@@ -95,5 +94,7 @@ def stated(
             exact[statement.name] = f"an unknown error of {statement.name}, as the filter does not follow it"
         elif slope[worst] != 0.0:
             error = u[worst] / abs(slope[worst]) / statement.size
-            exact[statement.name] = f"{error:.2g} {statement.unit} of {statement.name} ({known[worst]})"
+            exact[statement.name] = (
+                f"{error:.2g} {statement.unit} of {statement.name} ({names(len(u))[worst]})"
+            )
     return sources, exact

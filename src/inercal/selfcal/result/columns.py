@@ -1,4 +1,4 @@
-"""What an estimator knew from row to row, as columns: the same in a file and on a stream.
+"""Estimates from row to row as columns, the same in a file and on a stream.
 
     th_x, th_y, th_z [rad]            gimbal angles of the estimated attitude, continuous
     q_0 to q_3                        that attitude, q_bp, scalar first
@@ -6,7 +6,7 @@
     kg0_x [rad/s], u_kg0_x [rad/s]    each coefficient, product form, and its standard uncertainty
     nis, nis_mean                     normalised innovation squared of the row, and its mean up to there
 
-u of eta is that at the present scale error of its accelerometer; what the uncertainty of this adds, a thousandth of u,
+u of eta is that at the present scale error of its accelerometer; the uncertainty of this, which adds a thousandth of u,
 is left out here.
 """
 
@@ -46,18 +46,18 @@ def columns(p: int) -> list[tuple[str, str]]:
 def rows(
     attitude: Array, attitude_u: Array, coefficients: Array, u: Array, near: Array, world: World
 ) -> Array:
-    """All columns but the last two, (n, 10 + 2 p), of what is in a `History` or a `Trace`, with n rows.
+    """All columns but the last two, (n, 10 + 2 p), of a `History` or `Estimates` of n rows.
 
     ``near`` (3,) [rad] are gimbal angles shortly before the first row.
     """
     n, p = u.shape
-    found = np.empty((n, 10 + 2 * p))
+    values = np.empty((n, 10 + 2 * p))
     angles = np.empty((n, 3))
     all_angles(attitude, near, world.axes, world.signs, angles)
-    found[:, :3], found[:, 3:7], found[:, 7:10] = angles, attitude, attitude_u
+    values[:, :3], values[:, 3:7], values[:, 7:10] = angles, attitude, attitude_u
     by = divisor(coefficients)
-    found[:, 10::2], found[:, 11::2] = coefficients / by, u / by
-    return found
+    values[:, 10::2], values[:, 11::2] = coefficients / by, u / by
+    return values
 
 
 def history_record(filtered: FilterResult, recording: Recording, world: World) -> Record:
@@ -74,9 +74,9 @@ def history_record(filtered: FilterResult, recording: Recording, world: World) -
     first = rows(
         history.attitude, history.attitude_u, history.coefficients, history.u, recording.th[0], world
     )
-    known = np.isfinite(filtered.nis)
-    total = np.cumsum(np.where(known, filtered.nis, 0.0))
-    count = np.cumsum(known)
+    measured = np.isfinite(filtered.nis)
+    total = np.cumsum(np.where(measured, filtered.nis, 0.0))
+    count = np.cumsum(measured)
     with np.errstate(invalid="ignore"):
         mean = np.where(count > 0, total / count, np.nan)
     last = np.vstack([np.full(2, np.nan), np.column_stack([filtered.nis, mean])])

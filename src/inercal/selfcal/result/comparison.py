@@ -1,4 +1,4 @@
-"""Estimators side by side: what each found in one recording, how far it is off, and what it costs."""
+"""Estimators of one recording side by side: estimates, differences and time of each."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded, short
 from inercal.estimate.table import Table
-from inercal.selfcal.display import of_field
 from inercal.selfcal.filters.filter_result import FilterResult, product_form
-from inercal.selfcal.platform.coefficients import names
+from inercal.selfcal.platform.coefficients import names, shown_units
 
 FILTERS: Final[Mapping[str, str]] = {
     "error-state": "error-state filter",
@@ -28,7 +27,7 @@ FILTERS: Final[Mapping[str, str]] = {
 def side_by_side(
     filters: Mapping[str, FilterResult], truth: Array | None, interval: float, status: Mapping[str, str]
 ) -> list[Table]:
-    """All estimators of one recording: what they found, how far it is off, and what they cost.
+    """Tables of estimates, of differences or errors, and of verdict and time.
 
     Parameters
     ----------
@@ -43,15 +42,15 @@ def side_by_side(
     """
     (_, first), *_ = filters.items()
     p = len(first.coefficients)
-    unit, size = of_field(p)
+    unit, size = shown_units(p)
     by_filter = {kind: product_form(each) for kind, each in filters.items()}
     values, u = product_form(first)
     true = None if truth is None else truth[:p]
     rows = []
     for k, name in enumerate(names(p)):
-        stated = () if true is None else (f"{true[k] / size[k]:.6g}",)
+        true_value = () if true is None else (f"{true[k] / size[k]:.6g}",)
         own = (rounded(c[k] / size[k], u[k] / size[k])[0] for c, _ in by_filter.values())
-        rows.append((name, unit[k], *stated, *own, rounded(values[k] / size[k], u[k] / size[k])[1]))
+        rows.append((name, unit[k], *true_value, *own, rounded(values[k] / size[k], u[k] / size[k])[1]))
     heads = [(kind, "") for kind in filters]
     result = [
         Table(

@@ -28,7 +28,7 @@ from inercal.selfcal.filters.run import LOCK
 from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.result.budget import stated, within
+from inercal.selfcal.result.budget import systematic, within
 from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import FACTOR_OF, SelfcalSettings
 
@@ -112,11 +112,11 @@ def assemble(
         _conditions(recording, settings),
     )
     read = {each.code for each in recording.findings} - {"gap", "outlier"}
-    said = [*recording.findings, *(each for each in findings if each.code not in read)]
+    all_findings = [*recording.findings, *(each for each in findings if each.code not in read)]
     if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LOCK:
         angle = math.degrees(math.acos(filtered.gimbal_cosine))
         text = f"the inner gimbal comes to {angle:.2f} deg, where the gimbal-angle model does not hold"
-        said.append(Finding("gimbal_lock", text, harm=EVERYTHING))
+        all_findings.append(Finding("gimbal_lock", text, harm=EVERYTHING))
     interval = float(np.median(recording.dt))
     result: dict[str, Any] = {
         "filter": filtered.kind,
@@ -131,24 +131,24 @@ def assemble(
     slope, values = product_slope(filtered.coefficients), to_product(filtered.coefficients)
     by_filter = slope @ filtered.covariance @ slope.T
     if (unusable := useless(filtered, bounds, by_filter)) is not None:
-        return Estimate.without(basis, *unusable, findings=said, result=result)
+        return Estimate.without(basis, *unusable, findings=all_findings, result=result)
 
     result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
     used = _scalars(filtered)
     dof = float(used - p - 3)
-    of_site, exact = stated(recording, settings, np.sqrt(np.diag(by_filter)))
+    of_site, exact = systematic(recording, settings, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
-    known = combine(names(p), sources)
-    covariance, budget = known.covariance, known.budget
+    uncertainty = combine(names(p), sources)
+    covariance, budget = uncertainty.covariance, uncertainty.budget
     if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
-        return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=said, result=result)
+        return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
     if (unusable := singular(bounds.prior, covariance)) is not None:
-        return Estimate.without(basis, *unusable, findings=said, result=result)
+        return Estimate.without(basis, *unusable, findings=all_findings, result=result)
     # all noises are judged by one set of innovations; their parts add up to them but for rounding
     more = np.square(np.diag(covariance) / np.diag(by_filter))
     effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
-    u = known.u
+    u = uncertainty.u
 
     judged = seen(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
@@ -156,14 +156,14 @@ def assemble(
     result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
     result["goal"] = _goal(settings.goal, names(p), u)
     hints = _hardly_turned(recording, settings)
-    said += _left_at_prior(judged, hints)
+    all_findings += _left_at_prior(judged, hints)
     limit = _limit(agreement, recording, settings)
     status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
-    # of numbers that are not to be used, more would be noise
+    # numbers that must not be used need no more findings
     if status is not Status.INCONSISTENT:
-        said += _missed(result["goal"], units(p), hints)
-        said += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
-        said += _taken_as_exact(exact)
+        all_findings += _missed(result["goal"], units(p), hints)
+        all_findings += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
+        all_findings += _taken_as_exact(exact)
     lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNSEEN and name in NAMES}
     if status is Status.OK and lost:
         status, message = (
@@ -175,9 +175,9 @@ def assemble(
         names(p),
         units(p),
         values,
-        known._replace(dof=effective),
+        uncertainty._replace(dof=effective),
         (status, message),
-        findings=said,
+        findings=all_findings,
         statistics={
             "dof": dof,
             "condition": judged.learned.condition**2,
@@ -195,19 +195,19 @@ def assemble(
 def verdict(
     filtered: FilterResult, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
 ) -> tuple[Status, str]:
-    """Status of what an estimator found, and its sentence, without all that an estimate holds: for comparisons."""
+    """Status and sentence of an estimator, for comparisons."""
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
-    known = Bounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
-    if (unusable := useless(filtered, known, known.covariance)) is not None:
+    bounds = Bounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
+    if (unusable := useless(filtered, bounds, bounds.covariance)) is not None:
         return unusable
     agreement = nis(filtered.nis, filtered.dims)
     cause = _cause(findings, recording.findings)
     limit = _limit(agreement, recording, settings)
-    return _verdict(seen(known, {}), agreement, limit, cause, _hardly_turned(recording, settings))
+    return _verdict(seen(bounds, {}), agreement, limit, cause, _hardly_turned(recording, settings))
 
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
-    """What explains innovations that are too large: the diagnosis, else the reading of the recording."""
+    """Explanation of innovations that are too large: by the diagnosis, else by the reading of the recording."""
     # saturated samples are not used, and explain nothing
     read = [each for each in causes(recorded) if each.code != "saturation"]
     explaining = [*(each for each in diagnosed if CODES[each.code].rank), *read]
@@ -217,8 +217,8 @@ def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
 def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> float:
     """Largest mean NIS of a recording that does not contradict the model.
 
-    Beyond that of an exact study there is room for as much as disappears where what is stated of site and base is
-    moved, within its uncertainty, to where the recording fits best.
+    It is that of an exact study, plus the part that disappears with the systematic inputs of site and base moved,
+    within their uncertainties, to where the recording fits best.
     """
     errors, of = stated_errors(settings), problem(settings)
     if errors is None:
@@ -231,7 +231,7 @@ def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> f
 def _verdict(
     judged: Seen, agreement: Nis, limit: float, cause: str, hints: Mapping[str, str]
 ) -> tuple[Status, str]:
-    """Status and its sentence, of numbers that can be used."""
+    """Status and sentence of numbers that can be used."""
     if agreement.mean > limit:
         return Status.INCONSISTENT, (
             f"the recording contradicts the model: mean NIS {agreement.mean:.4g}, expected {agreement.expected:.4g} "
@@ -259,7 +259,7 @@ def _verdict(
 
 
 def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str, str]:
-    """Coefficients that only a turn about one axis of p shows well, of axes without one -> what would help."""
+    """Coefficients that only a turn about one axis of p shows well, where there is none -> advice."""
     earth = float(np.linalg.norm(settings.world.earth))
     moving = np.abs(recording.rate).max(axis=1) > 2.0 * earth
     turned = np.degrees((np.abs(recording.rate) * recording.dt[:, None])[moving].sum(axis=0))
@@ -286,26 +286,26 @@ def _left_at_prior(judged: Seen, hints: Mapping[str, str]) -> list[Finding]:
 
 
 def _hidden(judged: Seen, ratio: Array, budget: Sequence[BudgetItem]) -> dict[str, tuple[float, str]]:
-    """Coefficients that the path shows, but what is stated of site or base hides: u over prior, and why."""
-    found = {}
+    """Coefficients that the path shows, but a systematic input hides: u over prior, and why."""
+    hidden = {}
     for name, left in zip(judged.learned.names, ratio, strict=True):
         if left > HALF_SEEN and name not in judged.at_prior:
             source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
             why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
-            found[name] = (float(left), why)
-    return found
+            hidden[name] = (float(left), why)
+    return hidden
 
 
 def _with(text: str, hint: str | None) -> str:
-    """A sentence with what would help, if that is known."""
+    """A sentence with its hint, if any."""
     return text if hint is None else f"{text}; {hint}"
 
 
-def _goal(goal: Mapping[str, float], known: tuple[str, ...], u: Array) -> dict[str, dict[str, Any]]:
-    """What was wanted of each coefficient, and what came of it."""
+def _goal(goal: Mapping[str, float], coefficients: tuple[str, ...], u: Array) -> dict[str, dict[str, Any]]:
+    """Wanted and reached u of each coefficient with a goal."""
     return {
         name: {"wanted": goal[name], "u": float(each), "met": bool(each <= goal[name])}
-        for name, each in zip(known, u, strict=True)
+        for name, each in zip(coefficients, u, strict=True)
         if name in goal
     }
 
@@ -314,18 +314,18 @@ def _missed(
     goal: Mapping[str, Mapping[str, Any]], si: tuple[str, ...], hints: Mapping[str, str]
 ) -> list[Finding]:
     """Goals that were not met."""
-    found = []
+    findings = []
     for name, unit in zip(names(len(si)), si, strict=True):
         if name in goal and not goal[name]["met"]:
             shown, size = shown_unit(unit)
             u, wanted = goal[name]["u"] / size, goal[name]["wanted"] / size
             text = f"{name}: u = {u:.2g} {shown}, wanted {wanted:.2g} {shown}"
-            found.append(Finding("goal_missed", _with(text, hints.get(name))))
-    return found
+            findings.append(Finding("goal_missed", _with(text, hints.get(name))))
+    return findings
 
 
 def _taken_as_exact(words: Mapping[str, str]) -> list[Finding]:
-    """What was stated without an uncertainty, and what that hides."""
+    """``stated_exact``: inputs stated without an uncertainty, with the errors that would matter."""
     if not words:
         return []
     text = (
@@ -337,8 +337,8 @@ def _taken_as_exact(words: Mapping[str, str]) -> list[Finding]:
 
 def _scalars(filtered: FilterResult) -> int:
     """Number of scalar measurements used."""
-    known = np.isfinite(filtered.innovations)
-    return int(known.sum() if len(known) else filtered.dims.sum())
+    measured = np.isfinite(filtered.innovations)
+    return int(measured.sum() if len(measured) else filtered.dims.sum())
 
 
 def _rms(filtered: FilterResult) -> float:

@@ -1,5 +1,4 @@
-"""What a study states of site and base: latitude, gravity, heading, tilt, each with its uncertainty, and what changes
-where one is wrong."""
+"""Systematic inputs of site and base: latitude, gravity, heading, tilt, each with its uncertainty and its effect."""
 
 from __future__ import annotations
 
@@ -19,8 +18,8 @@ _SECOND = ("arcsec", _DEG / 3600.0)
 
 @dataclass(frozen=True)
 class Statement:
-    """One thing that is stated: its ``u`` (0 where it is taken as exact), a step for the derivative, the study with it
-    changed, and how errors of it are said."""
+    """One systematic input: its ``u`` (0 if exact), a ``step`` for the derivative, the study with it ``changed``, and
+    the ``unit`` in which its errors are shown, of ``size`` SI units."""
 
     name: str
     u: float
@@ -31,7 +30,7 @@ class Statement:
 
 
 def statements(settings: SelfcalSettings) -> list[Statement]:
-    """What is stated; heading and tilt not where beta, with its prior, takes their place."""
+    """The systematic inputs; beta, with its prior, takes the place of heading and tilt."""
     site, base = settings.site, settings.base
 
     def with_base(**change: Any) -> SelfcalSettings:
@@ -82,7 +81,7 @@ def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
 
 
 def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
-    """Errors of what is stated with an uncertainty, in units of it; None where nothing is.
+    """Errors of the inputs stated with an uncertainty, in units of that; None where all are exact.
 
     They are small enough for changes of earth rate and gravity to add up.
     """

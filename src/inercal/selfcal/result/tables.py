@@ -1,4 +1,4 @@
-"""Tables of paths and campaigns for people: what a path cannot see, its turns, its bounds, errors over many runs."""
+"""Tables of paths and campaigns: weak combinations, turns, bounds, errors over many runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, learned
 from inercal.estimate.rounding import short
 from inercal.estimate.table import Table
 from inercal.records.places import counted
-from inercal.selfcal.display import of_field
+from inercal.selfcal.platform.coefficients import shown_units
 from inercal.selfcal.platform.plan import Plan, Turn
 
 if TYPE_CHECKING:
@@ -25,20 +25,20 @@ _JOINTS = {"x": "outer", "y": "inner", "z": "platform"}
 
 
 def weak_combinations(bounds: Bounds) -> Table:
-    """What a path tells least of, in words: combinations of coefficients, each in units of its prior."""
-    told = learned(bounds.covariance, bounds.prior, bounds.names)
-    unseen = int((told.left > HALF_SEEN).sum())
-    count = max(unseen, min(_WEAKEST, len(told.left)))
+    """Combinations of coefficients that a path shows least, in words, each in units of its prior."""
+    weak = learned(bounds.covariance, bounds.prior, bounds.names)
+    unseen = int((weak.left > HALF_SEEN).sum())
+    count = max(unseen, min(_WEAKEST, len(weak.left)))
     rows = tuple(
         (
             words,
             "not seen" if left > UNSEEN else "left at its prior" if left > HALF_SEEN else "",
             short(100.0 * float(left)),
         )
-        for words, left in zip(told.weakest(count), told.left, strict=False)
+        for words, left in zip(weak.weakest(count), weak.left, strict=False)
     )
     what = (
-        f"{counted(unseen, 'independent combination')} of {len(told.left)} {'keep' if unseen > 1 else 'keeps'} more "
+        f"{counted(unseen, 'independent combination')} of {len(weak.left)} {'keep' if unseen > 1 else 'keeps'} more "
         "than half of the prior."
         if unseen
         else "No combination is left at its prior; these are the least known."
@@ -98,8 +98,8 @@ def paths(designed: Designed) -> Table:
     """The path found beside others of the same time."""
     rows = []
     for each in designed.compare:
-        told = each.seen.learned
-        worst = int(np.argmax(told.ratio))
+        learned = each.seen.learned
+        worst = int(np.argmax(learned.ratio))
         rows.append(
             (
                 each.name,
@@ -107,8 +107,8 @@ def paths(designed: Designed) -> Table:
                 ", ".join(each.seen.at_prior) or "none",
                 ", ".join(each.beyond) or "none",
                 f"{each.plan.duration:.6g}",
-                f"{each.seen.rank} of {len(told.left)}",
-                f"{short(100.0 * float(told.ratio[worst]))} ({told.names[worst]})",
+                f"{each.seen.rank} of {len(learned.left)}",
+                f"{short(100.0 * float(learned.ratio[worst]))} ({learned.names[worst]})",
                 short(each.criterion),
             )
         )
@@ -135,7 +135,7 @@ def paths(designed: Designed) -> Table:
 def bounds_by_path(designed: Designed) -> Table:
     """Bounds of every path, in units of the field."""
     bounds = [each.seen.bounds for each in designed.compare]
-    units, size = of_field(len(bounds[0].names))
+    units, size = shown_units(len(bounds[0].names))
     first = designed.compare[0]
     to_goal = first.seen.to_goal
 
@@ -170,8 +170,8 @@ def bounds_by_path(designed: Designed) -> Table:
 
 
 def campaign_table(campaign: Campaign) -> Table:
-    """What many simulated runs say of each coefficient."""
-    units, size = of_field(len(campaign.names))
+    """Errors of each coefficient over many simulated runs."""
+    units, size = shown_units(len(campaign.names))
     coverage, rms = campaign.coverage, np.sqrt(np.mean(np.square(campaign.error), axis=0))
     rows = tuple(
         (
