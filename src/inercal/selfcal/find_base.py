@@ -95,7 +95,7 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
         return near
     u = np.sqrt(np.diag(bound))
     if settings.heading_unknown:
-        _told(float(vertical @ u), settings)
+        _refuse_weak_heading(float(vertical @ u), settings)
     scatter = math.sqrt(max(1.0, np.nansum(batch.nis) / max(batch.dims.sum(), 1)))
     last = prior.copy()
     last[BETA] = np.minimum(prior[BETA], LAST * scatter * u)
@@ -141,7 +141,7 @@ def _vertical(base: Base) -> Array:
     return np.abs(Base(base.frame).from_geographic()[:, 2])
 
 
-def _told(u: float, settings: SelfcalSettings) -> None:
+def _refuse_weak_heading(u: float, settings: SelfcalSettings) -> None:
     """Refuse a heading that stays unknown."""
     if u > TELLING:
         at = math.degrees(settings.site.latitude or 0.0)

@@ -74,8 +74,8 @@ class Designed:
     def table(self) -> str:
         """The moves, the bounds of the path found, and the comparison, as aligned text."""
         first = self.compare[0]
-        stated = stated_moves(first.plan.moves)
-        moves = [f"{k:4d}  {what:<4}  {by:>10}" for k, (what, by, *_) in enumerate(stated, start=1)]
+        numbered = enumerate(stated_moves(first.plan.moves), start=1)
+        moves = [f"{k:4d}  {what:<4}  {by:>10}" for k, (what, by, *_) in numbered]
         wide = max(len(each.name) for each in self.compare)
         lines = [f"{'path':<{wide}}  {'time [s]':>8}  {'criterion':>9}  {'worst u of prior':>23}  at prior"]
         for each in self.compare:
