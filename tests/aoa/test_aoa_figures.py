@@ -13,7 +13,7 @@ from sting_study import BASE, DEG, G, scenario
 
 from inercal.aoa.figures import page as page_of
 from inercal.aoa.figures import pictures, sensors
-from inercal.aoa.figures.innovations import innovations
+from inercal.aoa.figures.innovations import of_innovations
 from inercal.aoa.settings import Attitude, Disturbances, Methods, Oscillation
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
@@ -321,11 +321,11 @@ def test_extreme_numbers_can_be_drawn():
 def test_squared_innovations_are_those_of_each_sensor():
     rng = np.random.default_rng(3)
     values = rng.standard_normal((4000, 2)) * [1.0, 3.0]
-    nis, white = innovations(np.arange(4000.0), values, ("a1", "gyro"), 5.0, Marks())
+    nis, white = of_innovations(np.arange(4000.0), values, ("a1", "gyro"), 5.0, Marks())
     assert "once settled, 5." in nis.caption
     assert {"a1", "gyro", "1, as stated", "2, inconsistent"} <= set(texts(nis))
     texts(white)
-    assert innovations(np.arange(3.0), np.full((3, 2), np.nan), ("a1", "gyro"), math.nan, Marks()) == []
+    assert of_innovations(np.arange(3.0), np.full((3, 2), np.nan), ("a1", "gyro"), math.nan, Marks()) == []
 
 
 def test_spectral_density_of_known_signals():

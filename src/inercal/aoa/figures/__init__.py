@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.figures import sensors
-from inercal.aoa.figures.innovations import innovations
-from inercal.aoa.figures.learned import flexure, learned, lever_arms
+from inercal.aoa.figures.innovations import of_innovations
+from inercal.aoa.figures.learned import flexure, lever_arms, sensor_terms
+from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
 from inercal.aoa.flow import alpha_beta, stated
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.result.display import delays, displayed
@@ -72,8 +72,8 @@ def pictures(measurement: Measurement) -> list[Picture]:
     drawn += _against_reference(seen, marks) + _fitted(seen) + _points(measurement) + _compared(seen, marks)
     drawn += lever_arms(seen, settings, marks)
     if found is not None:
-        drawn += flexure(seen, found, settings, marks) + learned(seen, found)
-        drawn += innovations(t, found.innovations, names, found.nis_mean, marks)
+        drawn += flexure(seen, found, settings, marks) + sensor_terms(seen, found)
+        drawn += of_innovations(t, found.innovations, names, found.nis_mean, marks)
     reference = recording.reference
     drawn += of_angle(
         t,
@@ -87,7 +87,7 @@ def pictures(measurement: Measurement) -> list[Picture]:
 def _sensors(measurement: Measurement) -> Picture:
     """Where the sensors are on the model."""
     layout, gyro = measurement.settings.layout, measurement.recording.gyro
-    return sensors.side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
+    return side_view(layout.names, layout.angle, layout.r, layout.z, bool(np.isfinite(gyro).any()))
 
 
 def _lost(recording: Recording) -> tuple[Flags, Flags]:
@@ -240,7 +240,7 @@ def _fitted(seen: Measurement) -> list[Picture]:
     values[0] -= 1.0
     u = np.array([[each.u for each in row] for row in rows])
     told = np.array([[each.name not in fit.unseen for each in row] for row in rows])
-    return [sensors.fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
+    return [fitted(names, [words for _, words, _ in kinds], values / sizes, u / sizes, told)]
 
 
 def _points(measurement: Measurement) -> list[Picture]:
@@ -256,7 +256,7 @@ def _points(measurement: Measurement) -> list[Picture]:
         true = [known(reference[each.start : each.stop]) for each in found]
         means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
         error = np.degrees(_apart(np.radians(theta), means))
-    return [sensors.points(theta, u, left, scatter, error)]
+    return [points(theta, u, left, scatter, error)]
 
 
 def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
@@ -274,7 +274,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
     panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
     return [
-        sensors.side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
+        side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
         over_time(
             "Methods over time",
             f"The {what}, a panel for each method, each on a scale of its own: that which it spans after the first "

@@ -16,7 +16,7 @@ _BLOCKS = 400
 """Pieces of a record whose mean squared innovations are drawn."""
 
 
-def innovations(
+def of_innovations(
     t: Array, values: Array, names: Sequence[str], nis_mean: float, marks: Marks
 ) -> list[Picture]:
     """Innovations, ``values`` (n, k) of ``names`` over their standard deviations, NaN where not measured, over ``t``

@@ -94,7 +94,7 @@ def flexure(seen: Measurement, found: FilterResult, settings: AoaSettings, marks
     ]
 
 
-def learned(seen: Measurement, found: FilterResult) -> list[Picture]:
+def sensor_terms(seen: Measurement, found: FilterResult) -> list[Picture]:
     """Biases, lever arms, heights and scale: at the end against their priors, and over time."""
     problem, t = seen.problem, found.kept_t
     if len(t) < 2:

@@ -16,8 +16,8 @@ from inercal.report.innovations import innovations, nis
 from inercal.selfcal.display import of_field
 from inercal.selfcal.figures.filters import attitude_correction, attitude_errors, bounds_beside, filters_apart
 from inercal.selfcal.figures.gimbals import rig
+from inercal.selfcal.filters import residuals
 from inercal.selfcal.filters.filter_result import product_form
-from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.coefficients import ETA, KA0, names, product_slope, to_linear, to_product
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.tables import weak_combinations
@@ -189,7 +189,7 @@ def _attitude(calibration: Calibration, history: History, truth: Array | None) -
         }
         return attitude_errors(t, truth, courses)
     th = calibration.recording.th
-    read, _ = gimbals(np.nan_to_num(th), calibration.problem.world)
+    read, _ = residuals.gimbals(np.nan_to_num(th), calibration.problem.world)
     correction = boxminus(history.attitude, read)
     correction[np.isnan(th).any(axis=1)] = np.nan
     about_axes = calibration.filtered.kind != "gimbal-ukf"
