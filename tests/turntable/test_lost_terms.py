@@ -55,13 +55,13 @@ def test_weights_that_sink_with_the_terms_do_not_settle():
     """Errors of the table are multiplied by the terms. A term that only the rounding of sin 180 deg excites, by 1e-32,
     comes out as 1e32 times the readings; with it their weights sink, and each round finds a larger one."""
     angles = np.radians([[a, b] for a in (0.0, 180.0) for b in (0.0, 120.0, 240.0)])
-    posed = study(listed(angles), table(3000.0 * ARCMIN), terms=("DX_F", "DX_ZZ", "DY_XX"))
-    wanted = {"y_x": ("DX_F", "DX_ZZ"), "y_y": ("DY_XX",)}
+    posed = study(listed(angles), table(3000.0 * ARCMIN), terms=("DX_F", "DY_XX"))
+    wanted = {"y_x": ("DX_F",), "y_y": ("DY_XX",)}
     left_out = [
         s for name, kept in wanted.items() for s in channel_model("gyrowheel", name).symbols if s not in kept
     ]
     model = table_model(posed, ("y_x", "y_y"), left_out)
-    assert 0.0 < np.abs(model.rows(angles)[:, 1, 2]).max() < 1e-30
+    assert 0.0 < np.abs(model.rows(angles)[:, 1, 1]).max() < 1e-30
     y = np.random.default_rng(4).normal(size=(6, 2))
     with pytest.raises(np.linalg.LinAlgError, match="do not settle"):
         fit(model, angles, y, [NOISE, NOISE])

@@ -30,9 +30,9 @@ def empty_row(size: int) -> Row:
 
 
 @kernel
-def innovation_variance(P: Array, row: Row, noise: float) -> float:
+def innovation_variance(P: Array, row: Row, size: int, noise: float) -> float:
     """Variance ``h P h^T + r`` of one measurement; arguments as in `scalar_update`."""
-    places, values, size = row.places, row.values, row.size[0]
+    places, values = row.places, row.values
     total = noise
     for a in range(size):
         for b in range(size):
@@ -41,7 +41,7 @@ def innovation_variance(P: Array, row: Row, noise: float) -> float:
 
 
 @kernel
-def scalar_update(P: Array, x: Array, row: Row, z: float, noise: float, work: Array) -> float:
+def scalar_update(P: Array, x: Array, row: Row, size: int, z: float, noise: float, work: Array) -> float:
     """Update an error state ``x`` (n,) and its covariance ``P`` (n, n), both in place, by one measurement.
 
     ``z = h x + v``, v of variance ``noise``. Measurements of one time are put in one after the other, with rows of one
@@ -50,7 +50,7 @@ def scalar_update(P: Array, x: Array, row: Row, z: float, noise: float, work: Ar
     Returns the square of the innovation over its variance; summed over the measurements of one time it is their
     normalised innovation squared. ``work`` (n,) is used up.
     """
-    places, values, size = row.places, row.values, row.size[0]
+    places, values = row.places, row.values
     n = len(x)
     for i in range(n):
         total = 0.0

@@ -96,7 +96,7 @@ def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) ->
             if course.truth is not None:
                 line(axes, cell, t[[0, -1]], np.full(2, course.truth), color=ALARM, lw=0.9, ls=":")
         image = svg(page)
-    return Picture(title, caption, image)
+    return Picture(title, caption, image, page)
 
 
 def _span(course: Course, values: Array, u: Array) -> tuple[float, float]:
@@ -146,7 +146,7 @@ def falling(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Pi
                         mew=1.6,
                     )
         image = svg(page)
-    return Picture(title, caption, image)
+    return Picture(title, caption, image, page)
 
 
 @contextmanager
@@ -206,7 +206,7 @@ def panels_of_lines(title: str, caption: str, t: Array, panels: Mapping[str, Seq
         if len(labels) > 1:
             axes.legend(handles, labels, loc="upper right", ncols=6, borderaxespad=0.1)
         image = svg(page)
-    return Picture(title, caption, image)
+    return Picture(title, caption, image, page)
 
 
 def _limits(lines: Sequence[tuple[Array, Array]]) -> tuple[float, float]:

@@ -109,6 +109,7 @@ def innovations(t: Array, values: Array, channels: Sequence[str]) -> Picture:
         f"deviations of white noise, red beyond. Of {_LAGS} lags one or two lie beyond by chance; many, or a slow "
         f"fall, show what the model lacks. Beyond: {', '.join(beyond)}.",
         image,
+        page,
     )
 
 

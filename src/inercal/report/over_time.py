@@ -119,7 +119,7 @@ def over_time(
             _draw(axes, cell, panel, t, cuts, pieces)
             head(axes, cell, panel.title, [*panel.lines] if len(panel.lines) > 1 else [])
         image = svg(page)
-    return Picture(title, caption, image)
+    return Picture(title, caption, image, page)
 
 
 def head(axes: Axes, cell: Cell, title: str, names: Sequence[str]) -> None:
@@ -247,6 +247,7 @@ def measured(t: Array, names: Sequence[str], missing: Flags, saturated: Flags, m
         "Blue: samples that count; red: saturated, left out; grey: missing; white: no rows. A strip is wide enough to "
         f"be seen, however short. {'; '.join(lost) + '.' if lost else ''}".rstrip(),
         image,
+        page,
     )
 
 

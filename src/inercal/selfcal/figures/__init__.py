@@ -20,8 +20,8 @@ from inercal.selfcal.figures.filters import (
     filters_apart,
     gimbals_on_base,
 )
+from inercal.selfcal.filters import residuals
 from inercal.selfcal.filters.filter_result import product_form
-from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.platform.coefficients import (
     ETA,
     KA0,
@@ -201,7 +201,7 @@ def _attitude(calibration: Calibration, history: History, truth: Array | None) -
         }
         return attitude_errors(t, truth, courses)
     th = calibration.recording.th
-    read, _ = gimbals(np.nan_to_num(th), calibration.problem.world)
+    read, _ = residuals.gimbals(np.nan_to_num(th), calibration.problem.world)
     correction = boxminus(history.attitude, read)
     correction[np.isnan(th).any(axis=1)] = np.nan
     about_axes = calibration.filtered.kind != "gimbal-ukf"

@@ -112,8 +112,7 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
                 for j in range(i + 1):
                     row.places[j], row.values[j] = j, root[j]
                 z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-                row.size[0] = i + 1
-                total += scalar_update(P, x, row, z, 1.0, work)
+                total += scalar_update(P, x, row, i + 1, z, 1.0, work)
                 count += 1
             q = _corrected(q, c, x)
         if take:
@@ -122,14 +121,14 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
             read = accelerometers(f, c)
             for i in range(3):
                 if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    accelerometer_row(i, f, c, up_e, q, row)
+                    size = accelerometer_row(i, f, c, up_e, q, row)
                     if history:
-                        own = innovation_variance(P, row, variance)
+                        own = innovation_variance(P, row, size, variance)
                         out.innovations[k, i] = (acc[k, i] - read[i]) / math.sqrt(own)
             for i in range(3):
                 if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    accelerometer_row(i, f, c, up_e, q, row)
-                    total += scalar_update(P, x, row, acc[k, i] - read[i], variance, work)
+                    size = accelerometer_row(i, f, c, up_e, q, row)
+                    total += scalar_update(P, x, row, size, acc[k, i] - read[i], variance, work)
                     count += 1
             q = _corrected(q, c, x)
         out.nis[k] = total if count > 0 else math.nan

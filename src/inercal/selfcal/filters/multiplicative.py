@@ -175,7 +175,7 @@ def _advance(
                 root = roots[i]
                 row.values[0], row.values[1], row.values[2] = root
                 along = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-                total += scalar_update(P, x, row, along, 1.0, spare)
+                total += scalar_update(P, x, row, 3, along, 1.0, spare)
                 count += 1
             # The covariance is not turned with the corrected attitude. Small corrections turn it by nothing; after a
             # large one it is that of the encoders, which is stated about the measured attitude as it is.

@@ -115,10 +115,10 @@ def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Arra
 
 
 @kernel
-def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, row: Row) -> None:
-    """Derivative of accelerometer ``i`` by the error state, put into a ``row`` with room for `WIDEST` entries.
+def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, row: Row) -> int:
+    """Put the derivative of accelerometer ``i`` by the error state into a ``row`` with room for `WIDEST` entries.
 
-    ``f`` (3,) [m/s^2] in p, ``up`` (3,) [m/s^2] in the frame of the encoders.
+    ``f`` (3,) [m/s^2] in p, ``up`` (3,) [m/s^2] in the frame of the encoders. Returns the number of entries.
     """
     # weights of the specific force in this output
     gx = 1.0 + c[15] if i == 0 else -c[4] if i == 1 else c[3]
@@ -146,6 +146,7 @@ def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, ro
             values[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
             count += 1
     row.size[0] = count
+    return count
 
 
 @kernel
