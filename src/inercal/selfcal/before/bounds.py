@@ -194,13 +194,13 @@ def _along(
 
 
 @kernel
-def observe(P: Array, row: Row, r: float, source: int, work: Array) -> None:
+def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -> None:
     """Covariance ``P[0]`` and its parts ``P[1:]`` (m, m) after a scalar measurement, in place.
 
     ``row`` is its derivative by the state, ``r`` its variance, which belongs to the part ``source``; ``work`` (2, m) is
     used up.
     """
-    places, values, size = row.places, row.values, row.size[0]
+    places, values = row.places, row.values
     m = P.shape[1]
     gain, own = work[0], work[1]
     for s in range(len(P)):
@@ -266,13 +266,12 @@ def riccati(P: Array, path: Path, c: Array, model: Model, u: Array) -> None:
                     for i in range(3):
                         for j in range(i + 1):
                             row.places[j], row.values[j] = j, roots[i][j]
-                        row.size[0] = i + 1
-                        observe(P, row, 1.0, _PARTS[1], work)
+                        observe(P, row, i + 1, 1.0, _PARTS[1], work)
                 f = specific_force(at, up_e)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
-                        accelerometer_row(i, f, c, up_e, at, row)
-                        observe(P, row, variance, _PARTS[0], work)
+                        size = accelerometer_row(i, f, c, up_e, at, row)
+                        observe(P, row, size, variance, _PARTS[0], work)
         if len(u) > 0:
             for i in range(p):
                 u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

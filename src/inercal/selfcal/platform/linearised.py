@@ -145,7 +145,6 @@ def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, ro
             places[count] = 24 + k
             values[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
             count += 1
-    row.size[0] = count
     return count
 
 
