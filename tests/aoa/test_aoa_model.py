@@ -46,10 +46,9 @@ def read(of, x, i, p=0.0, y=0.0):
     row = empty_row(model.WIDEST)
     if i < of.count:
         at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), p, y)
-        value, noise = model.accelerometer(i, at, of.model, row)
+        value, noise, size = model.accelerometer(i, at, of.model, row)
     else:
-        value, noise = model.gyro(x, of.model, row)
-    size = row.size[0]
+        value, noise, size = model.gyro(x, of.model, row)
     assert size <= model.WIDEST
     places = row.places[:size]
     assert len(set(places)) == size

@@ -41,11 +41,11 @@ def hard_gated(of, recording):
             loop.go_on(belief, model.Step(step, 0.0, 0.0, 0.0), of.model, F, Q, work)
         at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), 0.0, 0.0)
         for i in range(of.count + 1):
-            expected, noise = loop.reading(i, at, math.nan, of.model, row)
+            expected, noise, size = loop.reading(i, at, math.nan, of.model, row)
             v, h = z[i] - expected, np.zeros(n)
-            h[row.places[: row.size[0]]] = row.values[: row.size[0]]
+            h[row.places[:size]] = row.values[:size]
             if v * v <= 25.0 * (h @ P @ h + noise):
-                loop.update(P, x, row, v, noise, math.inf, line)
+                loop.update(P, x, row, size, v, noise, math.inf, line)
         theta.append(x[0])
     return np.array(theta)
 

@@ -15,18 +15,17 @@ Indices: TypeAlias = NDArray[np.int64]
 
 
 class Row(NamedTuple):
-    """The derivative h of a scalar measurement by the state, zero but for ``values`` at ``places``, the first
-    ``size`` (1,) of each."""
+    """Room for the derivative h of a scalar measurement by the state: zero but for ``values`` at ``places``, of which
+    the first so many are used."""
 
     places: Indices
     values: Array
-    size: Indices
 
 
 @kernel
 def empty_row(size: int) -> Row:
-    """Room for a row of at most ``size`` entries, none yet."""
-    return Row(np.empty(size, dtype=np.int64), np.empty(size), np.zeros(1, dtype=np.int64))
+    """Room for a row of at most ``size`` entries."""
+    return Row(np.empty(size, dtype=np.int64), np.empty(size))
 
 
 @kernel

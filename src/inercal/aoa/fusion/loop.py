@@ -170,14 +170,14 @@ def go_on(belief: Belief, step: Step, model: Model, F: Array, Q: Array, work: Ar
 
 @kernel
 def update(
-    P: Array, x: Array, row: Row, v: float, noise: float, gate: float, work: Array
+    P: Array, x: Array, row: Row, size: int, v: float, noise: float, gate: float, work: Array
 ) -> tuple[float, float]:
     """Update by one scalar, in place: innovation ``v``, of variance h P h^T + ``noise`` = S, with h the ``row``.
 
     ``work`` (n,) receives P h^T. Returns v over the root of S, and the S
     that was used, enlarged to v^2 / ``gate`` where v^2 is larger than ``gate`` S; 0 where S is not above zero.
     """
-    places, values, size = row.places, row.values, row.size[0]
+    places, values = row.places, row.values
     n = len(x)
     for i in range(n):
         work[i] = 0.0
@@ -205,8 +205,8 @@ def update(
 
 
 @kernel
-def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> tuple[float, float]:
-    """Reading of scalar ``i`` of a row of measurements at a prediction, and its variance.
+def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> tuple[float, float, int]:
+    """Reading of scalar ``i`` of a row of measurements at a prediction, its variance, and its entries in ``out``.
 
     ``angle_u`` [rad] is the standard uncertainty of a stated angle; ``out`` receives the derivatives by the state.
     """
@@ -215,8 +215,8 @@ def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> t
         return accelerometer(i, at, model, out)
     if i == n:
         return gyro(at.x, model, out)
-    out.places[0], out.values[0], out.size[0] = 0, 1.0, 1
-    return at.x[0], angle_u * angle_u
+    out.places[0], out.values[0] = 0, 1.0
+    return at.x[0], angle_u * angle_u, 1
 
 
 @kernel
@@ -233,12 +233,12 @@ def significant(value: float, variance: float) -> float:
 
 
 @kernel
-def believed(row: Row, places: Places, of_rate: float, of_acceleration: float) -> None:
+def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleration: float) -> None:
     """Remove from a row the derivatives by positions and by the gyro's scale where the motion is only noise.
 
     They multiply rate and acceleration. At rest the filter would learn them from noise, and be sure of wrong values.
     """
-    at, values, size = row.places, row.values, row.size[0]
+    at, values = row.places, row.values
     count, moved = places.accelerometers, max(of_rate, of_acceleration)
     for a in range(size):
         for b in (places.levers, places.heights):
@@ -314,13 +314,12 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:
-                expected, noise = reading(i, at, z[k, count + 2], model, row)
-                believed(row, places, of_rate, of_acceleration)
-                entries = row.size[0]
+                expected, noise, entries = reading(i, at, z[k, count + 2], model, row)
+                believed(row, entries, places, of_rate, of_acceleration)
                 v = z[k, i] - expected
                 for a in range(entries):
                     v -= entry[a] * (x[of[a]] - ahead[of[a]])
-                surprise, variance = update(P, x, row, v, noise, constants.gate, line)
+                surprise, variance = update(P, x, row, entries, v, noise, constants.gate, line)
                 if i <= count:
                     turns[2 + i] = turns[2 + i] + 1.0 if surprise * surprise > 4.0 * constants.gate else 0.0
                     surprised = surprised or turns[2 + i] >= PATIENCE

@@ -135,8 +135,8 @@ _NEAR_VERTICAL = 1e-4
 
 
 @kernel
-def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float, float]:
-    """Reading of accelerometer ``i`` [m/s^2] and its variance; ``out`` receives its derivatives by the state.
+def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float, float, int]:
+    """Reading of accelerometer ``i`` [m/s^2], its variance, and how many entries of ``out`` are its derivative.
 
     The noise of the roll and yaw gyros adds to its variance.
     """
@@ -191,12 +191,11 @@ def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float
     if heights >= 0:
         places[count], row[count] = heights + i, ca * by_zx - sa * by_zz
         count += 1
-    out.size[0] = count
-    return ca * fx - sa * fz + x[BIASES + i], noise
+    return ca * fx - sa * fz + x[BIASES + i], noise, count
 
 
 @kernel
-def gyro(x: Array, model: Model, out: Row) -> tuple[float, float]:
+def gyro(x: Array, model: Model, out: Row) -> tuple[float, float, int]:
     """Reading of the gyro [rad/s] at a state, as of `accelerometer`."""
     _, of, constants = model
     places, row = out.places, out.values
@@ -214,8 +213,7 @@ def gyro(x: Array, model: Model, out: Row) -> tuple[float, float]:
     if delay >= 0:
         places[count], row[count] = delay, k * (tau * x[3] - x[2])
         count += 1
-    out.size[0] = count
-    return k * then + x[GYRO_BIAS], constants.gyro_noise
+    return k * then + x[GYRO_BIAS], constants.gyro_noise, count
 
 
 @kernel

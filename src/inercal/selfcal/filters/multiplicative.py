@@ -135,7 +135,7 @@ def _advance(
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted, of_points = empty_points(n), np.empty(p), empty_moments(n, 3)
     z, r, L, x, spare = np.zeros((2 * n + 1, 3)), np.empty(3), np.empty((3, 3)), np.empty(n), np.empty(n)
-    row = Row(np.arange(3), np.empty(3), np.array([3]))
+    row = Row(np.arange(3), np.empty(3))
     history = len(out.u) > 0
     cosine = 1.0
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
