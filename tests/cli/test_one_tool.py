@@ -210,11 +210,11 @@ def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_pa
     ]
     (tmp_path / "warm.csv").write_text("\n".join(warm) + "\n", "utf-8")
     words = [*command.split(), "warm.csv", "--study", f"{name}.toml", "--quiet"]
-    for more, expected in (([], "22.0 degC"), (["--set", "conditions.temperature=20 degC"], "20 degC")):
+    recorded, stated = (22.0, 0.5), (20.0, 0.0)
+    for more, expected in (([], recorded), (["--set", "conditions.temperature=20 degC"], stated)):
         assert run([*words, *more, "--out", "found.json"]) in (0, BAD_VERDICT)
-        assert (
-            json.loads((tmp_path / "found.json").read_text("utf-8"))["conditions"]["temperature"] == expected
-        )
+        found = json.loads((tmp_path / "found.json").read_text("utf-8"))["conditions"]["temperature"]
+        assert found == {"value": expected[0], "u": expected[1], "unit": "degC"}
 
 
 @pytest.mark.slow
