@@ -252,11 +252,12 @@ def test_every_report_has_the_sections_that_all_have(section, results):
 
 @pytest.mark.slow
 def test_every_report_has_one_frame(results):
-    """Title, verdict, findings first; how it was done last; one style sheet; no script."""
+    """Title, verdict, one picture, findings first; how it was done last; one style sheet; no script."""
     styles = set()
     for command, (data, page) in results.items():
         heads = re.findall(r"<h2>(.*?)</h2>", page)
-        assert heads[0] == "Findings", command
+        assert heads[1] == "Findings", command
+        assert page[: page.index("<h2>Findings</h2>")].count("<figure") == 1, command
         assert heads[-1] == "How it was done", command
         code = data["status"]["code"].replace("_", " ")
         assert page.index("<h1>") < page.index(f'<span class="code">{code}</span>') < page.index("<h2>")
