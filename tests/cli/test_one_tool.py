@@ -210,11 +210,11 @@ def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_pa
     ]
     (tmp_path / "warm.csv").write_text("\n".join(warm) + "\n", "utf-8")
     words = [*command.split(), "warm.csv", "--study", f"{name}.toml", "--quiet"]
-    for more, expected in (([], "22.0 degC"), (["--set", "conditions.temperature=20 degC"], "20 degC")):
+    recorded, stated = (22.0, 0.5), (20.0, 0.0)
+    for more, expected in (([], recorded), (["--set", "conditions.temperature=20 degC"], stated)):
         assert run([*words, *more, "--out", "found.json"]) in (0, BAD_VERDICT)
-        assert (
-            json.loads((tmp_path / "found.json").read_text("utf-8"))["conditions"]["temperature"] == expected
-        )
+        found = json.loads((tmp_path / "found.json").read_text("utf-8"))["conditions"]["temperature"]
+        assert found == {"value": expected[0], "u": expected[1], "unit": "degC"}
 
 
 @pytest.mark.slow
@@ -252,11 +252,12 @@ def test_every_report_has_the_sections_that_all_have(section, results):
 
 @pytest.mark.slow
 def test_every_report_has_one_frame(results):
-    """Title, verdict, findings first; how it was done last; one style sheet; no script."""
+    """Title, verdict, one picture, findings first; how it was done last; one style sheet; no script."""
     styles = set()
     for command, (data, page) in results.items():
         heads = re.findall(r"<h2>(.*?)</h2>", page)
-        assert heads[0] == "Findings", command
+        assert heads[1] == "Findings", command
+        assert page[: page.index("<h2>Findings</h2>")].count("<figure") == 1, command
         assert heads[-1] == "How it was done", command
         code = data["status"]["code"].replace("_", " ")
         assert page.index("<h1>") < page.index(f'<span class="code">{code}</span>') < page.index("<h2>")

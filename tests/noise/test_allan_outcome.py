@@ -1,11 +1,13 @@
 """Noise of a record: the right channels, in SI, with what is known of each coefficient, and only at rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from inercal.errors import InputError, RecordError
 from inercal.estimate.files import load, save
-from inercal.findings import Status
+from inercal.findings import Finding, Status
 from inercal.inputs import Source
 from inercal.instruments.noise import SYMBOLS, NoiseModel
 from inercal.noise.outcome import noise_of
@@ -204,6 +206,16 @@ def test_a_channel_that_never_changes_has_no_coefficients():
         f.message for f in found.findings if f.code == "resolution"
     )
     assert "resolved" not in found.result["channels"]["acc_x"]
+
+
+def test_a_dead_channel_harms_no_coefficient_of_another():
+    dead = replace(
+        record(column("acc_x", "g", np.ones(500)), column("acc_y", "g", white(500, 12))),
+        findings=(Finding("dead_channel", "acc_x: all 500 samples are 1", harm=("acc_x",)),),
+    )
+    found = noise_of(dead).estimate
+    assert found.status is Status.OK
+    assert "dead_channel" in codes(found)
 
 
 @pytest.mark.parametrize("suffix", ["json", "toml"])

@@ -15,7 +15,7 @@ from inercal.errors import RecordError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate
-from inercal.findings import Finding, Status
+from inercal.findings import EVERYTHING, Finding, Status
 from inercal.instruments.noise import SYMBOLS
 from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
@@ -193,7 +193,7 @@ def _assemble(
     """Put the estimate together: N, B, K, R, Q of each channel.
 
     A coefficient that a curve does not show has the value 0 and a u by which its upper limit is 1.645 u; it is
-    listed in ``result`` with that limit.
+    listed in ``result`` with that limit. What is found in a channel without coefficients harms those of no other.
     """
     from scipy.linalg import block_diag
 
@@ -219,6 +219,8 @@ def _assemble(
                 values.append(0.0)
                 dof.append(np.inf)
         blocks.append(block)
+    fitted = (*EVERYTHING, *(channel.name for channel in channels if channel.fit is not None))
+    own = [replace(each, harm=tuple(n for n in each.harm if n in fitted)) for each in record.findings]
     longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
     return Estimate.of(
         Basis(
@@ -229,7 +231,7 @@ def _assemble(
         np.array(values),
         Uncertainty(block_diag(np.zeros((0, 0)), *blocks), np.array(dof)),
         _verdict(channels, disturbed),
-        findings=(*record.findings, *findings),
+        findings=(*own, *findings),
         statistics={
             "samples": float(longest.samples),
             "rate_hz": 1.0 / longest.interval,
