@@ -52,6 +52,7 @@ def xsens():
 SETTINGS = ImuSettings(Site(9.81744, (GravityInput("gravity", 2e-5, "m/s^2", 1.0),)), 50.0, time_base_u=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("g_sensitivity", [False, True])
 def test_a_sound_calibration(xsens, g_sensitivity):
     """The gyro's output changes with the pose: without its g-sensitivity its values are suspect."""
@@ -64,6 +65,7 @@ def test_a_sound_calibration(xsens, g_sensitivity):
     assert len(render(calibration.estimate, drawn, "Xsens")) < 1_500_000
 
 
+@pytest.mark.slow
 def test_the_main_picture_comes_first_and_is_a_figure_too(xsens):
     calibration = calibrate(xsens, replace(SETTINGS, g_sensitivity=True))
     shown = main(calibration)
@@ -119,6 +121,7 @@ def test_the_pose_that_would_cure_an_ill_conditioned_fit_is_marked():
     assert f"Stars: the pose {words} and its opposite" in caption
 
 
+@pytest.mark.slow
 def test_a_million_rows_stay_small():
     rng = np.random.default_rng(5)
     t = np.arange(1_000_000) / 1000.0
