@@ -55,7 +55,8 @@ def process() -> None:
 
 def rows(quick: bool) -> list[Row]:
     record = read([FOLDER / name for name in XSENS.records], read_map(FOLDER / XSENS.map))
-    settings = load_imu_study(FOLDER / XSENS.study)
+    # as the peer, which knows no sensitivity of the gyro to specific force
+    settings = load_imu_study(FOLDER / XSENS.study, ["imu.g_sensitivity=false"])
     acc, gyro = record.triad("acc"), record.triad("gyro")
 
     def plain(product):

@@ -244,6 +244,7 @@ def heading_kept(rng, count):
     return kept
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("white", [2e-6, 8.7e-5])
 @pytest.mark.parametrize("latitude_known", [True, False])
 def test_earth_rate_is_in_the_uncertainty_also_at_one_heading(white, latitude_known):

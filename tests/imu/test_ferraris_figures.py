@@ -24,6 +24,7 @@ ALL = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
 def test_pictures_of_the_shipped_sessions(name):
     found = calibrate_ferraris(record_of(name), UNSURE, options_of(name))

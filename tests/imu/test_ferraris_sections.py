@@ -280,7 +280,7 @@ def test_a_motion_in_a_position_a_gap_and_saturation_in_a_turn_spoil_them(whole)
 def test_a_turn_that_is_cut_off_is_said_to_be(whole):
     labels = np.array(whole.labels, dtype=object)
     rows = np.flatnonzero(labels == "z_rot")
-    for part, status in ((20, Status.OK), (100, Status.INCONSISTENT)):
+    for part, status in ((20, Status.SUSPECT), (100, Status.INCONSISTENT)):
         short = labels.copy()
         short[rows[-part:]] = ""
         found = calibrate_ferraris(replace(whole, labels=tuple(short)), SETTINGS, OPTIONS)
@@ -358,6 +358,7 @@ def errors_of_scale(estimate, truth, factor=1.0):
     return found / scale - 1.0, u / scale
 
 
+@pytest.mark.slow
 def test_changes_of_heading_before_and_after_a_turn_are_not_taken_for_part_of_it():
     """48 sessions with seeds fixed before the first look: none is ok and wrong by 5 u, and nearly all are found.
 

@@ -17,6 +17,7 @@ SEED = 20261121
 RUNS = 250
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [20, pytest.param(RUNS, marks=pytest.mark.campaign)])
 def test_intervals_cover_the_truth_as_often_as_they_say(runs):
     sample = run(one_calibration, runs=runs, seed=SEED)
