@@ -253,16 +253,11 @@ def test_what_is_public_is_explained():
     assert [name for module in MODULES for name in undocumented(TREES[module], module)] == []
 
 
-#: rooms whose docstrings are still to be mended
-UNMENDED = {"aoa", "selfcal", "stream", "convert"}
-
-
 def test_docstrings_begin_with_their_subject():
     """A noun or a verb: no docstring, of a constant neither, opens with a question."""
     questions = [
         f"{module}, line {node.lineno}"
         for module, tree in TREES.items()
-        if room(module) not in UNMENDED
         for node in ast.walk(tree)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         if re.match(r"\s*(What|How|Whether|Where)\b", str(node.value.value))

@@ -21,6 +21,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 #: pages whose commands take more than two seconds
 SLOW = [
+    "README.md",
     "docs/how-to/calibrate-a-platform.md",
     "docs/how-to/calibrate-an-imu.md",
     "docs/how-to/calibrate-on-a-turntable.md",
@@ -33,6 +34,7 @@ SLOW = [
     "docs/how-to/validate.md",
     "docs/published/continuous-self-calibration.md",
     "docs/published/zhao-2023.md",
+    "docs/theory/angle-of-attack-fusion.md",
     "docs/theory/self-calibration-filters.md",
     "docs/tutorials/angle-of-attack.md",
     "docs/tutorials/self-calibration.md",

@@ -26,7 +26,8 @@ def test_a_value_is_rounded_to_two_digits_of_its_uncertainty(value, u):
         last = Decimal(1).scaleb(Decimal(f"{u:.1e}").adjusted() - 1)
         error = abs(Decimal(shown) - Decimal(value))
         assert error <= last / 2
-        assert Decimal(shown) % last == 0
+        if u > 1e-300:  # below, a float has no such digits itself
+            assert Decimal(shown) % last == 0
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,7 @@ def test_a_result_shows_itself(kind, found):
     assert repr(result.estimate).count("\n") < 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_result_goes_on(kind, found, tmp_path):
     result = found[kind]
@@ -316,6 +317,7 @@ def test_a_part_of_a_recording_is_cut_before_it_is_used(log, capsys, tmp_path):
     assert ic.calibrate(sting, FOLDER / "sting.toml").estimate.provenance["span"] == sting.span
 
 
+@pytest.mark.slow
 def test_verbs_survive_any_order_of_imports():
     program = (
         "import importlib, pkgutil, random, sys, warnings\n"

@@ -9,6 +9,7 @@ correlation between the coefficients of one run (design effect 1.2). `benchmarks
 import numpy as np
 import pytest
 from campaigns.imu import one_calibration
+from scipy.stats import binom
 
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import run
@@ -21,7 +22,8 @@ RUNS = 250
 @pytest.mark.parametrize("runs", [20, pytest.param(RUNS, marks=pytest.mark.campaign)])
 def test_intervals_cover_the_truth_as_often_as_they_say(runs):
     sample = run(one_calibration, runs=runs, seed=SEED)
-    assert np.all(sample["sound"] == 1.0)
+    # two findings that make a sound run suspect, at a risk of 1e-3 each
+    assert np.count_nonzero(sample["sound"] != 1.0) <= binom.isf(1e-6, runs, 2e-3)
     found = coverage(sample["error"], sample["u"], sample["dof"])
     if runs == RUNS:
         assert np.all((found.fraction >= 0.892) & (found.fraction <= 0.992)), found.table()

@@ -16,6 +16,7 @@ SEED, FEW, RUNS = 20261121, 20, 100
 ALL = pytest.mark.campaign
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["nominal", "low"])
 @pytest.mark.parametrize(
     ("kind", "runs"),
