@@ -240,6 +240,8 @@ def run(argv):
 
 
 def make(target):
+    from inercal.examples import FOLDER
+
     folder = Path("/tmp") / f"inercal-before-{os.getpid()}"
     folder.mkdir(parents=True, exist_ok=True)
     target.mkdir(parents=True, exist_ok=True)
@@ -248,7 +250,10 @@ def make(target):
             found = run(argv)
         except Exception:
             found = {"exit": -1, "error": traceback.format_exc()[-600:]}
-        text = json.dumps(found, indent=1).replace(str(folder), "FOLDER")
+        text = (
+            json.dumps(found, indent=1).replace(str(folder), "FOLDER").replace(str(FOLDER.parent), "PACKAGE")
+        )
+        text = text.replace(str(HERE), "HERE")
         with gzip.GzipFile(target / f"{name}.json.gz", "wb", mtime=0) as file:
             file.write(text.encode())
         print(
