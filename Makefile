@@ -26,7 +26,7 @@ test: .venv/dev/installed
 	$(DEV)/ruff format --check .
 	$(DEV)/ruff check .
 	$(DEV)/mypy
-	$(DEV)/python -m pytest -n 2 --dist worksteal -m "not campaign" --slow-rule
+	$(DEV)/python -m pytest -n 2 --dist worksteal -m "not campaign" --slow-rule list
 
 # The full numbers of runs, of which `make test` has short versions.
 campaign: .venv/dev/installed
