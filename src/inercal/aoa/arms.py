@@ -14,17 +14,12 @@ import math
 import numpy as np
 
 from inercal.aoa.layout import Layout
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.errors import StudyError
 
-_NO_ARM = 1e-3
-"""Lever arm [m] below which accelerometers do not show angular acceleration."""
-
 _ROUNDING = 1e-12
-
-_ACROSS = 0.1
-"""Cosine of the roll below which axes across the body do not show pitch."""
 
 
 def level_of(settings: AoaSettings) -> float:
@@ -37,7 +32,7 @@ def level_of(settings: AoaSettings) -> float:
     """
     roll = settings.attitude.roll
     level = 1.0 if roll is None else math.cos(roll.value)
-    if abs(level) < _ACROSS:
+    if abs(level) < LIMITS.level_cosine:
         degrees = 0.0 if roll is None else math.degrees(roll.value)
         raise StudyError(
             "model.roll",
@@ -78,7 +73,7 @@ def pair_weights(layout: Layout, level: float = 1.0) -> Array | None:
     pairs = [(p[i] + p[j], i, j, 1.0) for i, j in layout.opposed()]
     pairs += [(p[i] - p[j], i, j, -1.0) for i, j in layout.aligned()]
     arm, i, j, sign = max(pairs, key=lambda pair: abs(pair[0]), default=(0.0, 0, 0, 1.0))
-    if abs(arm) < _NO_ARM:
+    if abs(arm) < LIMITS.pair_arm:
         return None
     weights = np.zeros(len(p))
     weights[i], weights[j] = 1.0, sign
@@ -99,4 +94,4 @@ def all_weights(layout: Layout) -> Array | None:
     p, of_gravity = tangential_arms(layout), axes(layout)
     beside = p - of_gravity @ np.linalg.lstsq(of_gravity, p, rcond=None)[0]
     power = float(beside @ beside)
-    return beside / power if power > _NO_ARM**2 else None
+    return beside / power if power > LIMITS.pair_arm**2 else None

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.geometry.rotations import principal
 
 #: text of an axis -> lambda [rad], counted from +x (forward) towards -z (down)
 AXES = {"+x": 0.0, "-z": 0.5 * math.pi, "-x": math.pi, "+z": -0.5 * math.pi}
-
-_PARALLEL = 1e-3
-"""Sine of the angle between axes, or error of a right angle [rad], below which they count as parallel or square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +47,22 @@ class Layout:
     def square(self) -> list[tuple[int, int]]:
         """Pairs (i, j) whose axis j is a right angle ahead of axis i: lambda_j = lambda_i + 90 deg."""
         apart = self.turned
-        return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - 0.5 * math.pi) < _PARALLEL)]
+        return [
+            (int(i), int(j)) for i, j in np.argwhere(np.abs(apart - 0.5 * math.pi) < LIMITS.parallel_axes)
+        ]
 
     def opposed(self) -> list[tuple[int, int]]:
         """Pairs i < j whose axes are antiparallel."""
         apart = np.abs(self.turned)
-        return [(int(i), int(j)) for i, j in np.argwhere(np.abs(apart - math.pi) < _PARALLEL) if i < j]
+        return [
+            (int(i), int(j)) for i, j in np.argwhere(np.abs(apart - math.pi) < LIMITS.parallel_axes) if i < j
+        ]
 
     def aligned(self) -> list[tuple[int, int]]:
         """Pairs i < j whose axes are parallel and look the same way."""
-        return [(int(i), int(j)) for i, j in np.argwhere(np.abs(self.turned) < _PARALLEL) if i < j]
+        return [(int(i), int(j)) for i, j in np.argwhere(np.abs(self.turned) < LIMITS.parallel_axes) if i < j]
 
     @property
     def spans(self) -> bool:
         """True where two axes are not parallel, so that one sample tells the angle all around."""
-        return bool((np.abs(np.sin(self.turned)) > _PARALLEL).any())
+        return bool((np.abs(np.sin(self.turned)) > LIMITS.parallel_axes).any())

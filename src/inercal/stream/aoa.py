@@ -17,9 +17,9 @@ import numpy as np
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
-from inercal.aoa.fusion.filter_result import SETTLED
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
 from inercal.aoa.reading.from_record import of_sensors
 from inercal.aoa.reading.wind_off_zero import angle_at
@@ -33,18 +33,6 @@ from inercal.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.records.column import Column
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots
-
-_CONTRADICTED = 2.0
-"""Mean of the squared innovations in a window, each over its variance, from which rows contradict the model."""
-
-_WINDOW = 2.0
-"""Length [s] of a window of innovations."""
-
-_FEWEST = 50
-"""Smallest number of innovations in a window that is judged."""
-
-_SILENT = 1.0
-"""Time [s] without a number after which a gyro is said to be silent."""
 
 # bits of `AoaState.alarms`; from the last on one for each sensor
 _BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
@@ -245,8 +233,8 @@ class Aoa:
         """The state with the last row of the gyro, or an alarm where it is silent."""
         if math.isfinite(gyro) or math.isnan(state.heard):
             return state._replace(heard=t)
-        if self._has_gyro and t - state.heard > _SILENT:
-            text = f"gyro: no number for {_SILENT:g} s; angles go on from accelerometers alone, less well"
+        if self._has_gyro and t - state.heard > LIMITS.silent_time:
+            text = f"gyro: no number for {LIMITS.silent_time:g} s; angles go on from accelerometers alone, less well"
             return self._alarm(state, _SILENCE, "gyro_missing", text, t)
         return state
 
@@ -258,17 +246,17 @@ class Aoa:
         gate = self._problem.constants.gate
         for t, innovations in zip(answers.t.tolist(), answers.innovations, strict=True):
             squared = np.minimum(np.square(innovations[np.isfinite(innovations)]), gate)
-            if not squared.size or t - state.begun < SETTLED:
+            if not squared.size or t - state.begun < LIMITS.settling_time:
                 continue
             window = t if math.isnan(state.window) else state.window
             nis, scalars = state.nis + float(squared.sum()), state.scalars + squared.size
             state = state._replace(nis=nis, scalars=scalars, window=window)
-            if t - window < _WINDOW:
+            if t - window < LIMITS.watched_time:
                 continue
-            if scalars >= _FEWEST and nis > _CONTRADICTED * scalars:
+            if scalars >= LIMITS.watched_innovations and nis > LIMITS.mean_nis * scalars:
                 text = (
-                    f"NIS is {nis / scalars:.3g} on average over {_WINDOW:g} s, expected 1 or less: the rows "
-                    "contradict the model or the stated noise"
+                    f"NIS is {nis / scalars:.3g} on average over {LIMITS.watched_time:g} s, expected 1 or less: "
+                    "the rows contradict the model or the stated noise"
                 )
                 state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, t)
             state = state._replace(nis=0.0, scalars=0, window=math.nan)

@@ -13,10 +13,10 @@ from inercal.aoa.figures.innovations import consistency
 from inercal.aoa.figures.learned import coefficients, flexure, lever_arms
 from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
 from inercal.aoa.flow import alpha_beta, gives_alpha
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.result.display import delays, displayed
 from inercal.aoa.result.tables import answer, on_page
-from inercal.aoa.result.verification import REFERENCE_U
 from inercal.aoa.task import in_order
 from inercal.arrays import Array
 from inercal.report.coefficients import correlation
@@ -168,7 +168,9 @@ def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
         return []
     finite = np.isfinite(reference)
     moving = np.zeros(len(t), dtype=bool)
-    still, _ = at_rest(t[finite], np.unwrap(reference[finite]), np.full(int(finite.sum()), REFERENCE_U))
+    still, _ = at_rest(
+        t[finite], np.unwrap(reference[finite]), np.full(int(finite.sum()), LIMITS.reference_creep)
+    )
     moving[finite] = ~still
     error, half = np.degrees(_apart(angles.theta, reference)), 2.0 * np.degrees(angles.u)
     late = settled(t) & np.isfinite(error) & np.isfinite(half)

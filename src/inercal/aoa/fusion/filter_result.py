@@ -21,13 +21,11 @@ from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, State, Trace, advance, initial
 from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.geometry.rotations import principal
-
-SETTLED = 2.0
-"""Time [s] after the first row from which innovations are judged."""
 
 KEPT = 2000
 """Number of rows, about, at which all states are kept for pictures."""
@@ -118,7 +116,11 @@ def estimate(
     if rolls is not None:
         roll[taken] = rolls
     seconds = time.perf_counter() - clock
-    judged = innovations[taken][t - t[0] >= min(SETTLED, (t[-1] - t[0]) / 2.0)] if len(t) else innovations
+    judged = (
+        innovations[taken][t - t[0] >= min(LIMITS.settling_time, (t[-1] - t[0]) / 2.0)]
+        if len(t)
+        else innovations
+    )
     squared = np.square(judged[np.isfinite(judged)])
     m = problem.size
     return FilterResult(

@@ -1,6 +1,6 @@
 """The fusion while a model is measured: samples or blocks of them in, angles out, to the digits of the whole record.
 
-The first rows are held until the filter can start (`inercal.aoa.reading.clock.HELD`), and where theta is lost rows are
+The first rows are held until the filter can start (`Limits.starting_rows`), and where theta is lost rows are
 held again: their angles then come all at once. A row that is not later than those before it has no angle
 (`inercal.aoa.reading.clock`); every row is answered, in the order in which it came.
 """
@@ -19,7 +19,8 @@ from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import roll_of
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.problem import FilterProblem
-from inercal.aoa.reading.clock import PATIENCE, later
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.errors import RecordError
@@ -205,7 +206,7 @@ class Live:
             rest = len(waiting) - 1 - int(taken[-1])
         else:
             late = rest = self._late + len(waiting)
-        if late >= PATIENCE:
+        if late >= LIMITS.backward_rows:
             raise RecordError(
                 self._where,
                 f"t: {late} rows in a row are not later than {self._fusion.t:.10g} s, the last at "

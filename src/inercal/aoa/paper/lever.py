@@ -12,7 +12,8 @@ import numpy as np
 
 from inercal.aoa.arms import centrifugal_arms, pair_weights, tangential_arms
 from inercal.aoa.layout import Layout
-from inercal.aoa.paper.frequency import WINDOW, oscillation_frequency
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.paper.frequency import oscillation_frequency
 from inercal.aoa.paper.lowpass import zero_phase
 from inercal.aoa.paper.residuals import DECISION
 from inercal.aoa.settings import Centrifugal
@@ -78,8 +79,8 @@ def peak_rate(t: Array, gyro: Array, noise: float) -> Array:
     finite = np.isfinite(gyro)
     total = np.concatenate([[0.0], np.cumsum(np.where(finite, gyro, 0.0) ** 2)])
     count = np.concatenate([[0], np.cumsum(finite)])
-    begin = np.searchsorted(t, t - 0.5 * WINDOW)
-    end = np.searchsorted(t, t + 0.5 * WINDOW, side="right")
+    begin = np.searchsorted(t, t - 0.5 * LIMITS.oscillation_window)
+    end = np.searchsorted(t, t + 0.5 * LIMITS.oscillation_window, side="right")
     mean = (total[end] - total[begin]) / np.maximum(count[end] - count[begin], 1)
     return np.asarray(np.sqrt(2.0 * np.maximum(mean - noise**2, 0.0)))
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import usual_step
 from inercal.arrays import Array
-
-_UNEVEN = 0.05
-"""Deviation of an interval from the usual one, relative to it, from which samples are put on an even grid before."""
 
 _FORGOTTEN = 10.0
 """Periods of the cutoff after which the filter has forgotten a value: parts further apart are filtered apart."""
@@ -33,7 +31,7 @@ def zero_phase(t: Array, values: Array, cutoff: float, order: int) -> Array:
     step = usual_step(t)
     if 2.0 * cutoff * step >= 1.0:
         return values
-    even = bool((np.abs(np.diff(t) - step) < _UNEVEN * step).all())
+    even = bool((np.abs(np.diff(t) - step) < LIMITS.uneven_share * step).all())
     grid = t if even else np.arange(t[0], t[-1] + step, step)
     bridged = np.interp(grid, t[finite], values[finite])
     sections = butter(order, 2.0 * cutoff * step, output="sos")

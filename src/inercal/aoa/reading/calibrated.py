@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.layout import Layout
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.settings import GYROS, Calibration
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.records.column import Column
 from inercal.records.places import counted_names
-
-_ROUNDING = 1e-6
-"""Part of a range by which a saturated sample may fall short of it, written with a few digits."""
 
 _PER = {"voltage": "V", "count": "count"}
 
@@ -54,7 +52,7 @@ def at_range(indicated: Array, measured: Array, how: Calibration) -> NDArray[np.
     """
     if how.range is None:
         return np.zeros(np.shape(indicated), dtype=np.bool_)
-    limit = (1.0 - _ROUNDING) * how.range
+    limit = (1.0 - LIMITS.range_rounding) * how.range
     at: NDArray[np.bool_] = np.abs(measured) >= limit
     return at | (np.abs(indicated * how.scale) >= limit) if how.per == "1" else at
 

@@ -7,15 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.errors import RecordError
-
-PATIENCE = 1000
-"""Successive rows without a later stamp that are left out; more are no accident."""
-
-HELD = 20
-"""Rows from which the filter starts."""
-
 
 _FINEST = 1.0 / 16.0
 """Step of an even grid over the mean interval, at least."""
@@ -27,12 +21,12 @@ def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.
     Raises
     ------
     RecordError
-        `PATIENCE` successive rows are not later: the clock was set back.
+        `Limits.backward_rows` successive rows are not later: the clock was set back.
     """
     before = np.maximum.accumulate(np.append(last, np.where(np.isnan(t), -np.inf, t)))
     taken = np.flatnonzero(t > before[:-1])
     left = np.diff(np.concatenate([[-1], taken, [len(t)]])) - 1
-    if left.size and left.max() >= PATIENCE:
+    if left.size and left.max() >= LIMITS.backward_rows:
         row = int(np.concatenate([[-1], taken])[int(np.argmax(left))]) + 1
         raise RecordError(
             where,

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import continuous
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
-from inercal.aoa.reading.clock import HELD, later
+from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.arrays import Array
@@ -22,12 +23,6 @@ from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 
 Flags = NDArray[np.bool_]
-
-_STUCK = 50
-"""Successive equal samples, which noise of the size of the steps makes with a probability below 1e-7."""
-
-_APART = 2.5
-"""Intervals of another clock over which its samples are interpolated."""
 
 
 def recording_of(record: Record, settings: AoaSettings) -> Recording:
@@ -66,9 +61,10 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
                 f"{name} has another clock than {there[0]}, expected one row for all accelerometers at each time",
             )
     taken = later(t, where=where)
-    if len(taken) < HELD:
+    if len(taken) < LIMITS.starting_rows:
         raise RecordError(
-            where, f"found {counted(len(taken), 'row')} that go on in time, expected {HELD} or more"
+            where,
+            f"found {counted(len(taken), 'row')} that go on in time, expected {LIMITS.starting_rows} or more",
         )
     usable_interval(float(np.median(np.diff(t[taken]))), where)
     rows = _Rows(record, settings, t, where)
@@ -155,7 +151,9 @@ class _Rows:
         self.findings.append(Finding("other_clock", text))
         there = np.searchsorted(theirs, self.t).clip(1, len(theirs) - 1)
         out = np.interp(self.t, theirs, values, left=np.nan, right=np.nan)
-        out[(theirs[there] - theirs[there - 1] > _APART * interval) | np.isnan(self.t)] = np.nan
+        out[(theirs[there] - theirs[there - 1] > LIMITS.other_clock_gap * interval) | np.isnan(self.t)] = (
+            np.nan
+        )
         if 2 * len(taken) < len(self.t):
             mine = later(self.t, where=self.where)
             nearest = np.searchsorted(self.t[mine], theirs).clip(1, len(mine) - 1)
@@ -202,7 +200,7 @@ def _stuck(read: Array, noise: float, others: list[Array]) -> Flags:
     if not moving.any() or noise < step[moving].min():
         return stuck
     starts, ends = plateaus(step)
-    long = ends - starts + 1 >= _STUCK
+    long = ends - starts + 1 >= LIMITS.stuck_samples
     for start, end in zip(starts[long], ends[long], strict=True):
         if any(np.any(np.diff(other[start : end + 1]) != 0.0) for other in others):
             stuck[start : end + 1] = True

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Zero
@@ -24,8 +25,6 @@ Indices = NDArray[np.int64]
 
 _PARTS = 8
 """Parts of the stretch whose angles are compared."""
-
-_FEWEST = 10 * _PARTS
 
 
 def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
@@ -97,10 +96,11 @@ def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices
         span = f"from {t[0]:g} s to {t[-1]:g} s" if len(t) else "without rows"
         raise RecordError(where, f"found a record {span}, expected the stretch at rest within it")
     rows = inside[np.isfinite(recording.acc[inside]).all(axis=1)]
-    if len(rows) < _FEWEST:
+    if len(rows) < LIMITS.zero_rows:
         raise RecordError(
             where,
-            f"found {len(rows)} rows with all accelerometers in the stretch at rest, expected {_FEWEST} or more",
+            f"found {len(rows)} rows with all accelerometers in the stretch at rest, expected {LIMITS.zero_rows} "
+            "or more",
         )
     moved, allowed = _moved(recording, settings, rows, zero.u)
     if not moved <= allowed:
@@ -123,16 +123,16 @@ def _moved(recording: Recording, settings: AoaSettings, rows: Indices, u: float)
     angles = np.unwrap(np.arctan2(forward, up))
     noise = max(float((recording.acc[each].std(axis=0) / math.sqrt(len(each))).max()) for each in parts)
     g = settings.site.gravity * min(1.0, max(abs(_level(settings)), 0.1))
-    looks = [(float(np.ptp(angles)), 3.0 * u + 6.0 * noise / g)]
+    looks = [(float(np.ptp(angles)), LIMITS.zero_sigmas * (u + 2.0 * noise / g))]
     gyro, t = recording.gyro[rows], recording.t[rows]
     seen = np.isfinite(gyro)
-    if seen.sum() >= _FEWEST:
+    if seen.sum() >= LIMITS.zero_rows:
         gyro, dt = gyro[seen], np.diff(t[seen], prepend=t[seen][0])
         swing = np.cumsum((gyro - gyro.mean()) * dt)
         # a random walk tied at its ends has the mean variance n/6 of its steps
         noise = float(np.diff(gyro).std()) / math.sqrt(2.0)
         walk = noise * math.sqrt(float(dt @ dt) / 6.0)
-        looks.append((float(swing.std()), 3.0 * math.hypot(u, walk)))
+        looks.append((float(swing.std()), LIMITS.zero_sigmas * math.hypot(u, walk)))
     return max(looks, key=lambda look: look[0] / look[1] if look[1] > 0.0 else math.inf)
 
 

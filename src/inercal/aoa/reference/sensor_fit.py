@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reference.readings import OVERLAP, Reference, reference
 from inercal.aoa.settings import AoaSettings
@@ -31,14 +32,8 @@ from inercal.estimate.identifiability import Learned, learned
 from inercal.estimate.result import Parameter
 
 KINDS = ("S", "b", "dlambda", "dr", "zo")
-_WIDER = 10.0
-"""Factor by which the study's prior is widened."""
-
 _USUAL = 1e-3
 """Usual error of a scale, and of an axis [rad]."""
-
-_SPIKE = 6.0
-"""Standard deviations from which a row of a sensor is left out."""
 
 _NEAR = 6
 """Distance in rows from which on residuals are not correlated; the smoothing reaches over four."""
@@ -107,7 +102,7 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
     """
     truth = reference(recording)
     names, units, usual, start = _terms(settings)
-    wide = np.where([name == "tau" for name in names], usual, _WIDER * usual)
+    wide = np.where([name == "tau" for name in names], usual, LIMITS.widened_prior * usual)
     x, weights = start.copy(), np.full(len(settings.layout.names) + 1, np.nan)
     converged = False
     for _ in range(_ITERATIONS):
@@ -139,10 +134,8 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
             break
     more = learned(covariance, wide, names)
     noise = np.sqrt(power / OVERLAP[0] * truth.span) * np.where(count > 0, 1.0, np.nan)
-    return Verified(
-        names, units, x, covariance, more, more.at_prior(1.0 / _WIDER), noise, truth.noise, len(truth.rows),
-        converged,
-    )  # fmt: skip
+    unseen = more.at_prior(1.0 / LIMITS.widened_prior)
+    return Verified(names, units, x, covariance, more, unseen, noise, truth.noise, len(truth.rows), converged)
 
 
 def _terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
@@ -230,5 +223,5 @@ def _sound(residuals: Array) -> NDArray[np.bool_]:
         if sound[:, i].any():
             middle = np.median(column[sound[:, i]])
             scatter = np.median(np.abs(column[sound[:, i]] - middle)) / 0.6745
-            sound[:, i] &= ~(np.abs(column - middle) > _SPIKE * scatter)
+            sound[:, i] &= ~(np.abs(column - middle) > LIMITS.spike_sigmas * scatter)
     return sound

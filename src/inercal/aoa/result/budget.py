@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.fusion.filter_result import SETTLED
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as stated_problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.systematic import leaning, leans, uncertain_roll
@@ -40,9 +40,6 @@ _STEP = 1e-3
 
 MOST = 20_000
 """Rows that are examined, from the first with an angle on; half of them where they are smoothed."""
-
-_NOTHING = 1e-5
-"""Share of a variance below which a source is left out."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,7 @@ def parts(
     taken = later(recording.t)
     taken = taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.rows[taken]
-    settled = answered[taken] & (t - t[:1] >= SETTLED)
+    settled = answered[taken] & (t - t[:1] >= LIMITS.settling_time)
     judged = settled if settled.any() else answered[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
@@ -210,7 +207,7 @@ def _items(variances: list[tuple[Source, Array]], names: tuple[str, ...]) -> tup
             {
                 name: float(own / total)
                 for name, own, total in zip(names, part, whole, strict=True)
-                if own > _NOTHING * total
+                if own > LIMITS.budget_share * total
             },
         )
         for source, part in variances

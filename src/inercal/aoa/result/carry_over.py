@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reference.corrections import corrected as put_right
 from inercal.aoa.reference.corrections import is_verified, prior_of
 from inercal.aoa.result.outcome import COMMAND, geometry
@@ -22,9 +23,6 @@ from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
 
 WHERE = "estimator.prior"
-
-_SAME = 1e-6
-"""Change [m, rad, parts] below which a sensor counts as unchanged."""
 
 _USUAL = {"scale": 1.0, "bias_si": 0.0}
 """Calibration of a sensor without a stated one."""
@@ -130,8 +128,8 @@ def _same_sensors(earlier: Estimate, settings: AoaSettings, path: str | Path) ->
     for name in dict.fromkeys((*now, *then)):
         before, current = (_USUAL | dict(all.get(name, {})) for all in (then, now))
         for key, value in current.items():
-            tolerance = 0.0 if key == "scale" else _SAME
-            if not math.isclose(value, before[key], rel_tol=_SAME, abs_tol=tolerance):
+            tolerance = 0.0 if key == "scale" else LIMITS.same_sensor
+            if not math.isclose(value, before[key], rel_tol=LIMITS.same_sensor, abs_tol=tolerance):
                 words = _IN_WORDS[key]
                 raise StudyError(
                     WHERE,

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reference.corrections import as_stated, report_of
@@ -332,7 +333,7 @@ def _error(error: Error) -> dict[str, Any]:
 
 def _settled(recording: Recording) -> NDArray[np.bool_]:
     """Rows after the first 2 s; all of a recording that is shorter."""
-    later_rows = recording.t - recording.t[:1] >= SETTLED
+    later_rows = recording.t - recording.t[:1] >= LIMITS.settling_time
     return later_rows if later_rows.any() else np.ones(len(recording.t), dtype=np.bool_)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import tare
@@ -32,9 +33,6 @@ ROLL_STEP = 1e-4
 
 GRAVITY_STEP = 1e-5
 """Relative change of gravity."""
-
-_KNOWN = 1e-6
-"""Relative uncertainty of gravity, 0.00006 deg at most, from which it counts."""
 
 
 class Lean(NamedTuple):
@@ -51,7 +49,7 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     """A change of each input that is stated with an uncertainty; a roll that gyros track is a state instead."""
     g, roll = settings.site.gravity, settings.attitude.roll
     level, inputs = 0.0 if roll is None else roll.value, []
-    if gravity_u(settings) > _KNOWN * g:
+    if gravity_u(settings) > LIMITS.sure_gravity * g:
         inputs.append(Lean("gravity", g * GRAVITY_STEP, g * (1.0 + GRAVITY_STEP), level))
     if uncertain_roll(settings, tracked):
         inputs.append(Lean("roll", ROLL_STEP, g, level + ROLL_STEP))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.flow import gives_alpha
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.result.budget import ANGLE
 from inercal.aoa.result.display import (
     in_words,
@@ -25,9 +26,6 @@ from inercal.instruments.terms import shown_unit, sized
 
 _OF_AXIS = ("mrad", 1e-3)
 """Unit of the error of an axis."""
-
-_SMALL = 0.001
-"""Share of a variance below which a source is not listed."""
 
 
 def answer(estimate: Estimate, points: Iterable[Point], settings: AoaSettings) -> list[Table]:
@@ -158,7 +156,7 @@ def uncertainty(estimate: Estimate) -> Table:
     rows = []
     for each in largest_first:
         share = each.share.get(ANGLE, 0.0)
-        if share >= _SMALL and variance is not None:
+        if share >= LIMITS.listed_share and variance is not None:
             stated_u, unit = sized(each.u, each.unit)
             size = "" if unit == "1" else f"{short(stated_u)} {unit}"
             part = math.degrees(variance) * math.sqrt(share)

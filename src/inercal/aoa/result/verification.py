@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.errors import RecordError
-
-REFERENCE_U = 1e-5
-"""Angle [rad], some seconds of arc, by which a reference may creep in half a second and stand still."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +40,7 @@ class Errors:
     moving: Error
 
 
-def errors(recording: Recording, angles: Angles, after: float = SETTLED) -> Errors:
+def errors(recording: Recording, angles: Angles, after: float = LIMITS.settling_time) -> Errors:
     """Errors of angles against the recording's reference from ``after`` [s] on, while a filter settles before.
 
     The reference stands still in the windows of `inercal.aoa.reading.pauses.at_rest`.
@@ -59,7 +56,7 @@ def errors(recording: Recording, angles: Angles, after: float = SETTLED) -> Erro
     t, reference = recording.t[rows], np.unwrap(recording.reference[rows])
     off = np.remainder(angles.theta[rows] - reference + math.pi, 2.0 * math.pi) - math.pi
     u = angles.u[rows]
-    still, _ = at_rest(t, reference, np.full(len(t), REFERENCE_U))
+    still, _ = at_rest(t, reference, np.full(len(t), LIMITS.reference_creep))
     taken = np.isfinite(off) & (t >= t[0] + after)
     return Errors(
         angles.method,
