@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inercal.aoa.flow import theta_u
+from inercal.aoa.flow import InStream, alpha_beta, theta_u
 from inercal.aoa.settings import Attitude
 from inercal.arrays import Array
 
@@ -35,6 +35,10 @@ class Angles:
     def known_u(self) -> Array:
         """(n,) rad, standard uncertainty of theta, were the stated roll exact."""
         return self.u if self.own_u is None else self.own_u
+
+    def in_stream(self, attitude: Attitude) -> InStream:
+        """Angle of attack and sideslip of the model as the study states that it lies in the stream."""
+        return alpha_beta(self.theta, self.known_u, attitude, self.roll, self.roll_u, self.by_roll)
 
 
 def continuous(theta: Array) -> Array:

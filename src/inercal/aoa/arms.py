@@ -15,30 +15,20 @@ import numpy as np
 
 from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.settings import AoaSettings
+from inercal.aoa.settings import Attitude
 from inercal.arrays import Array
 from inercal.errors import StudyError
 
 _ROUNDING = 1e-12
 
 
-def level_of(settings: AoaSettings) -> float:
-    """Cosine of the roll that a study states, 1 without one.
-
-    Raises
-    ------
-    StudyError
-        The model lies on its side: sensors for pitch alone have nothing to go by.
-    """
-    roll = settings.attitude.roll
-    level = 1.0 if roll is None else math.cos(roll.value)
-    if abs(level) < LIMITS.level_cosine:
-        degrees = 0.0 if roll is None else math.degrees(roll.value)
-        raise StudyError(
-            "model.roll",
-            f"found {degrees:.6g} deg, expected one further from +-90 deg, at which pitch shows",
-        )
-    return level
+def level_of(attitude: Attitude) -> float:
+    """Cosine of the stated roll; raises `StudyError` for a model on its side, whose pitch no sensor shows."""
+    if attitude.roll is not None and abs(attitude.level) < LIMITS.level_cosine:
+        degrees = math.degrees(attitude.roll.value)
+        text = f"found {degrees:.6g} deg, expected one further from +-90 deg, at which pitch shows"
+        raise StudyError("model.roll", text)
+    return attitude.level
 
 
 def axes(layout: Layout, level: float = 1.0) -> Array:

@@ -39,7 +39,7 @@ _SIDEWAYS = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class InStream:
     """``alpha``, ``beta`` and their standard uncertainties [rad], (n,) each."""
 
     alpha: Array
@@ -60,7 +60,7 @@ def alpha_beta(
     roll: Array | None = None,
     u_roll: Array | None = None,
     by_roll: Array | None = None,
-) -> Flow:
+) -> InStream:
     """Angle of attack and sideslip at pitch angles ``theta`` (n,) [rad] of standard uncertainty ``u_theta``.
 
     ``roll`` and ``u_roll`` (n,) [rad] are those that the fusion tracks with gyros for roll and yaw; they replace the
@@ -92,7 +92,7 @@ def alpha_beta(
         of_beta += np.where(sideways, dx**2 + dz**2, (dy / safe) ** 2) * u**2
     u_alpha = np.where(sideways, _UNKNOWN, np.minimum(np.sqrt(of_alpha), _UNKNOWN))
     finite = np.isfinite(theta)
-    return Flow(alpha, np.where(finite, u_alpha, np.nan), beta, np.sqrt(of_beta))
+    return InStream(alpha, np.where(finite, u_alpha, np.nan), beta, np.sqrt(of_beta))
 
 
 def theta_u(theta: Array, u: Array, attitude: Attitude, by_roll: Array | None = None) -> Array:

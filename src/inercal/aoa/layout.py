@@ -46,21 +46,19 @@ class Layout:
 
     def square(self) -> list[tuple[int, int]]:
         """Pairs (i, j) whose axis j is a right angle ahead of axis i: lambda_j = lambda_i + 90 deg."""
-        apart = self.turned
-        return [
-            (int(i), int(j)) for i, j in np.argwhere(np.abs(apart - 0.5 * math.pi) < LIMITS.parallel_axes)
-        ]
+        return self._pairs(np.abs(self.turned - 0.5 * math.pi))
 
     def opposed(self) -> list[tuple[int, int]]:
         """Pairs i < j whose axes are antiparallel."""
-        apart = np.abs(self.turned)
-        return [
-            (int(i), int(j)) for i, j in np.argwhere(np.abs(apart - math.pi) < LIMITS.parallel_axes) if i < j
-        ]
+        return [(i, j) for i, j in self._pairs(np.abs(self.turned) - math.pi) if i < j]
 
     def aligned(self) -> list[tuple[int, int]]:
         """Pairs i < j whose axes are parallel and look the same way."""
-        return [(int(i), int(j)) for i, j in np.argwhere(np.abs(self.turned) < LIMITS.parallel_axes) if i < j]
+        return [(i, j) for i, j in self._pairs(self.turned) if i < j]
+
+    def _pairs(self, off: Array) -> list[tuple[int, int]]:
+        """Pairs (i, j) at which ``off`` (N, N) [rad] is 0."""
+        return [(int(i), int(j)) for i, j in np.argwhere(np.abs(off) < LIMITS.parallel_axes)]
 
     @property
     def spans(self) -> bool:

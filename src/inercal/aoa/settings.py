@@ -212,6 +212,11 @@ class Flow:
 class Attitude(Flow, ModelAttitude):
     """Attitude of the model in the stream beside its pitch; values [rad] with standard uncertainties."""
 
+    @property
+    def level(self) -> float:
+        """Cosine of the stated roll; 1 without one."""
+        return 1.0 if self.roll is None else math.cos(self.roll.value)
+
 
 @dataclass(frozen=True)
 class Zero:

@@ -65,9 +65,8 @@ def in_order(measurement: Measurement) -> Measurement:
 
     def rows(of: Any, *names: str) -> Any:
         """A part of the measurement with only the later rows of some fields."""
-        return replace(
-            of, **{name: getattr(of, name)[taken] for name in names if getattr(of, name) is not None}
-        )
+        there = [name for name in names if getattr(of, name) is not None]
+        return replace(of, **{name: getattr(of, name)[taken] for name in there})
 
     motion = ("theta", "u", "rate", "rate_u")
     angles = (*motion, "roll", "roll_u", "own_u", "by_roll")
@@ -103,31 +102,15 @@ def measure(
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Measurement:
-    """Measure the angle of attack of a model from what its sensors recorded.
+    """Measure the angle of attack of a model from a record of ``t``, ``a1`` .. and ``gyro``.
 
-    Parameters
-    ----------
-    record : Record
-        ``t``, ``a1`` .., ``gyro``; ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` where there are
-        any.
-    settings : AoaSettings
-        Site, sensors, noise, prior, timing, estimator.
-    methods : Methods or None
-        The paper's way with these choices; None for the fusion.
-    compare : bool
-        Also by the fusion of 8 and 19 states, causal and smoothed, and by the paper's methods.
-    progress : callable
-        Called with each step, in words.
+    ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger`` and ``theta_ref`` are used where the record has them.
+    ``methods`` are those of the paper, None for the fusion; with ``compare`` the angles are also found by the fusion of
+    8 and 19 states, causal and smoothed, and by the paper's methods. ``progress`` is called with each step, in words.
 
-    Returns
-    -------
-    Measurement
-        Its estimate's status says whether the angles can be used; nothing is raised for poor ones.
-
-    Raises
-    ------
-    InputError
-        The record has not the channels of a model, the study does not fit it, or an earlier result cannot be used.
+    The status of the estimate says whether the angles can be used: nothing is raised for poor ones. `InputError` is
+    raised where the record has not the channels of a model, the study does not fit it, or an earlier result cannot be
+    used.
     """
     clock = time.perf_counter()
     prior = settings.estimator.prior
@@ -136,7 +119,7 @@ def measure(
         posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
     recording = recording_of(record, settings)
     if not recording.spatial:
-        level_of(settings)
+        level_of(settings.attitude)
     findings = implausible(recording, settings)
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)
@@ -192,9 +175,8 @@ def _compared(
             if name != done.method:
                 progress(name)
                 of = problem(chosen, recording.spatial)
-                others[name] = by_fusion(
-                    recording, chosen, of, filter_result.estimate(recording, of, smoothed)
-                )
+                filtered = filter_result.estimate(recording, of, smoothed)
+                others[name] = by_fusion(recording, chosen, of, filtered)
     for methods in MEASURED:
         if label(methods) == done.method:
             continue

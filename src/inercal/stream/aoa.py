@@ -2,7 +2,7 @@
 
 The causal fusion of `inercal.aoa` goes on by one row at a time, to the digits that it gives on the whole file, and
 answers each row with one line: the first ones, and those after the angle was lost, are held until the filter can start
-(`inercal.aoa.fusion.live`). `inercal.aoa.reading.calibrated` calibrates the sensors, and samples at a range are left
+(`inercal.aoa.fusion.live`). `inercal.aoa.reading.from_record` calibrates the sensors, and samples at a range are left
 out. A stream does not see faults that only a whole recording shows: sensors that are flat at an extreme below their
 range, or stuck, and a model that moves in the stretch of the study's zero.
 """
@@ -15,13 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.aoa.angles import Angles
 from inercal.aoa.arms import level_of
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
-from inercal.aoa.reading.from_record import of_sensors
+from inercal.aoa.reading.from_record import at_range, check_axes, check_unit, indication, of_sensors
 from inercal.aoa.reading.wind_off_zero import angle_at
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
@@ -38,7 +36,7 @@ from inercal.stream.run import Output, Slots
 _BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
 
 
-class Beside(NamedTuple):
+class Leaning(NamedTuple):
     """The fusion under a change of a stated input: its state, and theta [rad] of rows not yet answered without it."""
 
     live: LiveState
@@ -55,7 +53,7 @@ class AoaState(NamedTuple):
     """
 
     live: LiveState
-    beside: Mapping[str, Beside]
+    beside: Mapping[str, Leaning]
     t: float
     begun: float
     temperature: float
@@ -109,7 +107,7 @@ class Aoa:
         gyros = [name for name in GYROS if name in record]
         spatial = all(name in gyros for name in GYROS[1:])
         if not spatial:
-            level_of(settings)
+            level_of(settings.attitude)
         self._remarks = of_sensors(there, gyros, record, settings)
         places = list(record.columns)
         used = [*there, *(GYROS if spatial else GYROS[:1])]
@@ -153,7 +151,7 @@ class Aoa:
         return AoaState(
             live=Live(self._problem).state,
             beside={
-                each.name: Beside(Live(of).state, np.empty(0))
+                each.name: Leaning(Live(of).state, np.empty(0))
                 for each, of in zip(self._changes, self._leaning, strict=True)
             },
             t=-math.inf, begun=math.nan, temperature=math.nan,
@@ -174,10 +172,9 @@ class Aoa:
         if later:
             zero_angle = self._zero(state, sample.t, values[:n])
             state = self._heard(state, sample.t, gyro)
-        answers = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *zero_angle)
-        turned = [
-            each.feed(sample.t, values[:n], gyro, roll, yaw, *zero_angle).theta for each in self._others
-        ]
+        read = (sample.t, values[:n], gyro, roll, yaw, *zero_angle)
+        answers = self._live.feed(*read)
+        turned = [each.feed(*read).angles.theta for each in self._others]
         if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
@@ -189,7 +186,7 @@ class Aoa:
     def finish(self, state: AoaState) -> Sequence[Output]:
         """The lines of rows that were still held."""
         live, others = self._from(state)
-        return self._lines(state, live.finish(), others, [each.finish().theta for each in others])[1]
+        return self._lines(state, live.finish(), others, [each.finish().angles.theta for each in others])[1]
 
     def _from(self, state: AoaState) -> tuple[Live, list[Live]]:
         """The fusion, and those under changes, as a state left them."""
@@ -280,23 +277,10 @@ class Aoa:
             theta = np.append(before.theta, theta)
             # a filter that has lost theta, or has it anew, alone is out of step until both have it
             changed.append(np.append(theta[:rest], np.full(max(rest - len(theta), 0), np.nan)))
-            beside[name] = Beside(live.state, theta[rest:])
-        angles = widened(
-            Angles("", answers.theta, answers.u, answers.rate, answers.rate_u, answers.roll, answers.roll_u),
-            self._settings,
-            self._changes,
-            changed,
-        )
+            beside[name] = Leaning(live.state, theta[rest:])
+        angles = widened(answers.angles, self._settings, self._changes, changed)
         state = state._replace(beside=beside)
-        values = rows(
-            answers.theta,
-            angles.known_u,
-            answers.rate,
-            self._settings.attitude,
-            answers.roll,
-            answers.roll_u,
-            angles.by_roll,
-        )
+        values = rows(angles, self._settings.attitude)
         for t, row in zip(answers.t.tolist(), values.tolist(), strict=True):
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None

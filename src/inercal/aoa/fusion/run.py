@@ -2,8 +2,7 @@
 
 The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
 as over a long gap, rows are held again, and the filter starts anew with the errors of the sensors that it has learned;
-with the prior where it was lost because sensors kept contradicting it. Rows must be later than those before them:
-`inercal.aoa.reading.clock` leaves out those that are not.
+with the prior where sensors kept contradicting it. Each row must be later than that before it.
 
 Fading: a row is linearised at a motion that is itself estimated, so it says a little too much about the constants,
 always in the same sense. Within a minute that is small beside u. But a combination that a motion hardly shows (under
@@ -78,15 +77,8 @@ class Trace(NamedTuple):
 def initial(problem: FilterProblem) -> State:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
-    return State(
-        problem.mean.copy(),
-        problem.covariance.copy(),
-        np.zeros(problem.count + 3),
-        -math.inf,
-        False,
-        none,
-        math.nan,
-    )
+    x, P = problem.mean.copy(), problem.covariance.copy()
+    return State(x, P, np.zeros(problem.count + 3), -math.inf, False, none, math.nan)
 
 
 def advance(
@@ -168,9 +160,8 @@ def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, ro
         return False
     cosine, sine, r, z = problem.geometry[seen].T
     axes = np.stack([cosine, -sine], axis=-1)
-    fit = np.linalg.solve(
-        axes.T @ axes, axes.T
-    )  # forward and upward specific force (2,) that fit readings along axes best
+    # forward and upward specific force (2,) that fit readings along axes best
+    fit = np.linalg.solve(axes.T @ axes, axes.T)
     if math.isfinite(middle[n]) and abs(level) > LIMITS.level_cosine:
         rate = (middle[n] - x[GYRO_BIAS]) / level
     else:

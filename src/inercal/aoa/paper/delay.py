@@ -66,12 +66,7 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
         u^2 = k / sum of 2 n gamma^2 / (1 - gamma^2) (2 pi f)^2
 
     with k = 2.11 for windows that overlap. What else differs between both signals with a phase of its own, such as a
-    filter in one of them, counts as delay.
-
-    Raises
-    ------
-    RecordError
-        Time does not go on.
+    filter in one of them, counts as delay. Raises `RecordError` where time does not go on.
     """
     weights = all_weights(layout)
     taken = later(recording.t)
@@ -84,14 +79,13 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     if min(np.isfinite(shown).sum(), np.isfinite(gyro).sum()) < 2:
         return None
     # within a gap nothing counts, and beside it nothing of its other side
-    t = shortened(t, LIMITS.longest_delay + 2 * (LIMITS.bridged_samples + 1) * float(np.median(np.diff(t))))
+    bridged = LIMITS.bridged_samples
+    t = shortened(t, LIMITS.longest_delay + 2 * (bridged + 1) * float(np.median(np.diff(t))))
     step = usual_step(t)
     grid = np.arange(t[0], t[-1] + 0.5 * step, step)
     missing = np.interp(grid, t, (np.isnan(shown) | np.isnan(gyro)).astype(float)) > 0.5
-    missing |= (
-        np.diff(t, append=np.inf)[np.searchsorted(t, grid, side="right") - 1] > LIMITS.bridged_samples * step
-    )
-    missing = np.convolve(missing, np.ones(LIMITS.bridged_samples + 1), "same") > LIMITS.bridged_samples + 0.5
+    missing |= np.diff(t, append=np.inf)[np.searchsorted(t, grid, side="right") - 1] > bridged * step
+    missing = np.convolve(missing, np.ones(bridged + 1), "same") > bridged + 0.5
     shown, gyro = (np.interp(grid, t[k], x[k]) for x, k in ((x, np.isfinite(x)) for x in (shown, gyro)))
     size = round(min(max((t[-1] - t[0]) / _SEGMENTS, _SHORTEST), _LONGEST) / step)
     if not 2 <= size <= len(grid):
@@ -153,10 +147,8 @@ def _most_likely(coherence: Array, phase: Array, count: int, spacing: float) -> 
     for _ in range(_ROUNDS):
         apart = phase - omega * tau
         tau += float((weight * omega) @ np.sin(apart) / ((weight * omega**2) @ np.cos(apart)))
-    if (
-        abs(tau) > LIMITS.longest_delay
-        or weight @ np.cos(phase - omega * tau) < LIMITS.delay_share * weight.sum()
-    ):
+    share = weight @ np.cos(phase - omega * tau) / weight.sum()
+    if abs(tau) > LIMITS.longest_delay or share < LIMITS.delay_share:
         return None
     u = math.sqrt(_OVERLAP / float(2.0 * count * weight @ omega**2))
     return Delay(tau, u, float(np.sqrt(coherence[k].max())), float(k[0] * spacing), float(k[-1] * spacing))
@@ -193,9 +185,8 @@ def _interpolated(t: Array, values: Array, at: Array) -> Array:
     x = [(t[k] - before) / gap for k in (a, j, j + 1, d)]
     cubic = np.zeros(len(at))
     inside = (a < j) & (d > j + 1)
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # at the ends two samples coincide, and the line is taken
+    # at the ends two samples coincide, and the line is taken
+    with np.errstate(divide="ignore", invalid="ignore"):
         for m, k in enumerate((a, j, j + 1, d)):
             others = [y for i, y in enumerate(x) if i != m]
             cubic += values[k] * math.prod((s - y) / (x[m] - y) for y in others)

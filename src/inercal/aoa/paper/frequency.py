@@ -34,16 +34,9 @@ _FIRST = 1000
 def oscillation_frequency(t: Array, acc: Array, gyro: Array, layout: Layout) -> Array:
     """(n,) Hz: frequency of the oscillation at each row, from rows up to it alone; NaN where there is none.
 
-    Parameters
-    ----------
-    t : (n,) s
-        Increasing.
-    acc : (n, N) m/s^2
-    gyro : (n,) rad/s
-        A peak must show in it too, by the same amplitude within a factor of 2, where it is high enough to be seen;
-        without a gyro the accelerometers are believed.
-    layout : Layout
-        Without axes that show angular acceleration there is no frequency.
+    ``t`` (n,) [s] increases; ``acc`` (n, N) [m/s^2]; ``gyro`` (n,) [rad/s]. A peak must show in the gyro too, by the
+    same amplitude within a factor of 2, where it is high enough to be seen; without a gyro the accelerometers are
+    believed. A ``layout`` without axes that show angular acceleration gives no frequency.
     """
     nowhere = np.full(len(t), np.nan)
     weights = all_weights(layout)
@@ -88,21 +81,17 @@ def _peak(shaking: Array, turning: Array, begin: int, end: int, width: float) ->
     if high - low < 3 or not power.any():
         return math.nan
     k = low + int(np.argmax(power[low:high]))
-    enough = LIMITS.peak_power / math.log(
-        2.0
-    )  # the median of an exponential distribution is ln 2 of its mean
+    # the median of an exponential distribution is ln 2 of its mean
+    enough = LIMITS.peak_power / math.log(2.0)
     drift = power[1:low].max(initial=0.0)
     if k == low or power[k] < max(enough * np.median(power[low:high]), LIMITS.leaked_power * drift):
         return math.nan
     a, b, c = np.log(power[k - 1 : k + 2])
     f = (k + 0.5 * (a - c) / (a - 2.0 * b + c)) / (padded * width)
     expected = power[k] / (2.0 * math.pi * f) ** 2
-    seen = expected > LIMITS.amplitude_ratio**2 * enough * np.median(gyro[low:high])
-    if (
-        gyro.any()
-        and seen
-        and not 1.0 / LIMITS.amplitude_ratio**2 < gyro[k] / expected < LIMITS.amplitude_ratio**2
-    ):
+    agreeing = LIMITS.amplitude_ratio**2
+    seen = expected > agreeing * enough * np.median(gyro[low:high])
+    if gyro.any() and seen and not 1.0 / agreeing < gyro[k] / expected < agreeing:
         return math.nan
     return float(f)
 

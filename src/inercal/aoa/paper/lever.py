@@ -30,24 +30,14 @@ def centrifugal(
     """Readings (n, N) without their centrifugal term, and where (n,) the gyro made them so, 1 or 0.
 
     ``mechanical``: A + q w^2, which leaves q (2 w dw + dw^2) for an error dw of the gyro. ``low-pass``: the part
-    (q X^2/2) cos 2 Om t of an oscillation is filtered out, q X^2/2 stays; the filter has no delay, so it looks ahead,
-    its cutoff is sqrt(2) times the median of the oscillation's frequency over the whole recording, and it takes all
-    else beyond with it: of g sin theta the part at 2 Om, (theta_m^2/4) sin theta_0, and any faster motion. Where
-    nothing oscillates nothing is filtered. ``decision``: the gyro where the peak rate X of the 10 s about a row is
-    above (2 + sqrt 6) dw, otherwise the filter.
+    (q X^2/2) cos 2 Om t of an oscillation is filtered out, q X^2/2 stays; the filter looks ahead, its cutoff is sqrt(2)
+    times the median of the oscillation's frequency over the whole recording, and it takes all else beyond with it: of
+    g sin theta the part at 2 Om, (theta_m^2/4) sin theta_0, and any faster motion. Where nothing oscillates nothing is
+    filtered. ``decision``: the gyro where the peak rate X of the 10 s about a row is above (2 + sqrt 6) dw, otherwise
+    the filter.
 
-    Parameters
-    ----------
-    way : "none", "low-pass", "mechanical" or "decision"
-    t : (n,) s
-        Increasing.
-    acc : (n, N) m/s^2
-    gyro : (n,) rad/s
-        As it reads: at a roll of cosine ``level`` that times the rate of pitch.
-    layout : Layout
-    level : float
-    noise : float
-        Standard deviation dw of the gyro [rad/s].
+    ``t`` (n,) [s] increases; ``acc`` (n, N) [m/s^2]; ``gyro`` (n,) [rad/s] as it reads, ``level`` times the rate of
+    pitch at a roll of that cosine, with ``noise`` of the standard deviation dw [rad/s].
     """
     nowhere = np.zeros(len(t))
     if way == "none":
@@ -100,18 +90,11 @@ def dual(layout: Layout, level: float) -> tuple[Array, Array]:
 
     M = 1 - p d. For the three axes -z, +x, +z the first and last of M A are the same but for their sign, and their
     noise is sqrt(r_1^2 + r_3^2)/|r_3 - r_1| times that of the readings: least with the pivot midway. ``d`` as of
-    `inercal.aoa.arms.pair_weights`. The readings are to be free of the centrifugal term before.
-
-    Raises
-    ------
-    StudyError
-        No two axes are antiparallel or parallel with an arm between them.
+    `inercal.aoa.arms.pair_weights`. The readings are to be free of the centrifugal term before. Raises `StudyError`
+    where no two axes are antiparallel or parallel with an arm between them.
     """
     weights = pair_weights(layout, level)
     if weights is None:
-        raise StudyError(
-            "sensors",
-            "found no two antiparallel or parallel axes with a lever arm between them, which the dual accelerometer "
-            "needs",
-        )
+        text = "found no two antiparallel or parallel axes with a lever arm between them"
+        raise StudyError("sensors", f"{text}, which the dual accelerometer needs")
     return weights, np.eye(len(weights)) - np.outer(tangential_arms(layout, level), weights)

@@ -11,17 +11,11 @@ from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.errors import RecordError
 
-_FINEST = 1.0 / 16.0
-"""Step of an even grid over the mean interval, at least."""
-
 
 def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.int64]:
     """Rows of ``t`` (n,) [s] that are later than all before them and than ``last``.
 
-    Raises
-    ------
-    RecordError
-        `Limits.backward_rows` successive rows are not later: the clock was set back.
+    Raises `RecordError` where so many successive rows are not later that the clock was set back.
     """
     before = np.maximum.accumulate(np.append(last, np.where(np.isnan(t), -np.inf, t)))
     taken = np.flatnonzero(t > before[:-1])
@@ -46,4 +40,4 @@ def shortened(t: Array, longest: float) -> Array:
 def usual_step(t: Array) -> float:
     """Median interval [s] of ``t`` (n,); where rows come in bursts it is at least a sixteenth of the mean one, so that
     an even grid has no more than 16 n points."""
-    return max(float(np.median(np.diff(t))), _FINEST * float(t[-1] - t[0]) / len(t))
+    return max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / len(t) / 16.0)

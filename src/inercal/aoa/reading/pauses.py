@@ -1,13 +1,12 @@
 """Pauses of a model, in which its angle stands still but for noise and buffet.
 
-In a window of half a second the angle is a line and its scatter. The model rests where the line changes,
-over the window, by less than three times that scatter and the angle's own uncertainty together: oscillations slower
-than some 2 Hz are motion, and a creep within the uncertainty counts as rest.
+In a window of half a second the angle is a line and its scatter. The model rests where the line changes, over the
+window, by less than three times that scatter and the angle's own uncertainty together: oscillations slower than some
+2 Hz are motion, and a creep within the uncertainty counts as rest.
 
-Faster ones are the buffet of a model at rest while they are small beside the moves of the record: as long as it is
-quiet, the scatter may be, root mean square, a twentieth of the range of the angle, but no less than 0.1 deg and no more
-than 0.5 deg, or three times the uncertainty where that is more. So an oscillation that is forced, as of a sine, a chirp
-or a buffet of some tenths of a degree without moves, is no rest, whatever its frequency. Nothing is to be set.
+Faster oscillations are the buffet of a model at rest while their root mean square is at most a twentieth of the range
+of the angle (no less than 0.1 deg, no more than 0.5 deg), or three times the uncertainty. So one that is forced, as a
+sine, a chirp or a buffet of some tenths of a degree without moves, is no rest, whatever its frequency.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ _EDGE = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class ReferenceMotion:
     """The reference motion of a recording.
 
     ``rows`` (n,) of the recording that are used, ``t`` (n,) [s] their times, ``whole`` (n,) False at breaks; ``span``
@@ -75,14 +75,8 @@ class Reference:
         return np.asarray(windows[:: self.span] @ self.kernel)
 
 
-def reference(recording: Recording) -> Reference:
-    """The reference motion of a recording.
-
-    Raises
-    ------
-    RecordError
-        There is none, or too little of it.
-    """
+def reference(recording: Recording) -> ReferenceMotion:
+    """The reference motion of a recording; raises `RecordError` where there is none, or too little of it."""
     from scipy.interpolate import make_interp_spline
 
     if recording.reference is None:
@@ -93,11 +87,10 @@ def reference(recording: Recording) -> Reference:
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     span = max(1, round(SPAN / step))
     if len(rows) < LIMITS.reference_spans * span:
-        raise RecordError(
-            "theta_ref",
-            f"found {len(rows)} rows with a reference angle, expected {LIMITS.reference_spans * span} or more to fit "
-            "sensors to",
+        text = (
+            f"found {len(rows)} rows with a reference angle, expected {LIMITS.reference_spans * span} or more"
         )
+        raise RecordError("theta_ref", f"{text} to fit sensors to")
     theta = np.unwrap(recording.reference[rows])
     whole = np.ones(len(t), dtype=bool)
     for cut in [0, *breaks(t, LIMITS.reference_gap * step).tolist(), len(t)]:
@@ -105,15 +98,16 @@ def reference(recording: Recording) -> Reference:
     # differences of the eighth order leave nothing of a motion; their noise is the root of 16! / 8!^2 times larger
     noise = float(np.median(np.abs(np.diff(theta, 8)))) / 0.6745 / np.sqrt(12870.0)
     spline = make_interp_spline(t, theta, k=5)
-    measured = Reference(rows, t, whole, span, noise, (spline, *(spline.derivative(k) for k in (1, 2, 3))))
+    measured = ReferenceMotion(
+        rows, t, whole, span, noise, (spline, *(spline.derivative(k) for k in (1, 2, 3)))
+    )
     shown = [measured.derivatives[0]]
     for order in (1, 2, 3):
         derivative = measured.smoothed(measured.derivatives[order](t))
         power = float(np.nanmean(derivative**2)) if np.isfinite(derivative).any() else 0.0
         of_noise = (noise / step**order) ** 2 * _gain(order, measured.kernel)
-        shown.append(
-            measured.derivatives[order] if power > LIMITS.derivative_power * of_noise else np.zeros_like
-        )
+        moves = power > LIMITS.derivative_power * of_noise
+        shown.append(measured.derivatives[order] if moves else np.zeros_like)
     return replace(measured, derivatives=tuple(shown))
 
 

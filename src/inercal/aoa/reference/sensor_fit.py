@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.reference.readings import OVERLAP, Reference, reference
+from inercal.aoa.reference.readings import OVERLAP, ReferenceMotion, reference
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.errors import RecordError
@@ -45,27 +45,16 @@ _SMALL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """Sensors as fitted to a turntable.
+    """Sensors as fitted to a turntable: ``values`` (p,) and their ``covariance`` (p, p).
 
-    Attributes
-    ----------
-    names, units : (p,)
-        ``S_1``.. scale, ``b_1``.. bias [m/s^2], ``dlambda_1``.. error of the axis angle [rad], ``dr_1``.., ``zo_1``..
-        errors of positions [m], ``tau`` delay of all sensors against the reference [s], ``b_g`` [rad/s], ``k_g``, and
-        ``tau_g`` delay of the gyro against the accelerometers [s].
-    values : (p,)
-    covariance : (p, p)
-    learned : Learned
-        Information of the record beyond the prior; its condition and weakest combinations.
-    unseen : tuple of str
-        Names of coefficients no better known than by the study's prior.
-    noise : (N + 1,) m/s^2, rad/s
-        Of one sample of accelerometers and gyro, from the residuals below some 5 Hz; NaN where there is no sensor.
-    reference_noise : float
-        rad, of one sample of the reference.
-    rows : int
-        Rows of the recording that were used.
-    converged : bool
+    ``names``: ``S_1``.. scale, ``b_1``.. bias [m/s^2], ``dlambda_1``.. error of the axis angle [rad], ``dr_1``..,
+    ``zo_1``.. errors of positions [m], ``tau`` delay of all sensors against the reference [s], ``b_g`` [rad/s],
+    ``k_g``, and ``tau_g`` delay of the gyro against the accelerometers [s].
+
+    ``learned`` is the information of the record beyond the prior, ``unseen`` the names of coefficients no better known
+    than by the study's prior. ``noise`` (N + 1,) [m/s^2, rad/s] of one sample of accelerometers and gyro, from the
+    residuals below some 5 Hz, NaN where there is no sensor; ``reference_noise`` [rad] of one sample of the reference;
+    ``rows`` of the recording that were used.
     """
 
     names: tuple[str, ...]
@@ -91,14 +80,9 @@ class Verified:
 
 
 def fit(recording: Recording, settings: AoaSettings) -> Verified:
-    """Fit the sensors to the recording's reference angle.
+    """Fit the sensors to the recording's reference angle; roll and yaw are those that the study states.
 
-    Roll and yaw are taken as the study states them: gyros for them are not used.
-
-    Raises
-    ------
-    RecordError
-        There is no reference angle, too little of it, or none that a sensor follows.
+    Raises `RecordError` where there is no reference angle, too little of it, or none that a sensor follows.
     """
     truth = reference(recording)
     names, units, usual, start = _terms(settings)
@@ -120,9 +104,8 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
             inner = np.linalg.inv(np.linalg.cholesky(information * scale + np.eye(len(x))))
             outer = np.linalg.cholesky(_spread(scores) * scale + np.eye(len(x)))
         except np.linalg.LinAlgError as error:
-            raise RecordError(
-                "theta_ref", "found angles that no sensor follows, expected those of the model"
-            ) from error
+            text = "found angles that no sensor follows, expected those of the model"
+            raise RecordError("theta_ref", text) from error
         pull = np.einsum("kip,i,ki->p", jacobian, weights, residuals, optimize=True)
         bread = inner.T @ inner
         step = wide * (bread @ (wide * pull - (x - start) / wide))
@@ -162,15 +145,14 @@ def _terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Arr
 
 
 def _linearised(
-    recording: Recording, settings: AoaSettings, truth: Reference, x: Array
+    recording: Recording, settings: AoaSettings, truth: ReferenceMotion, x: Array
 ) -> tuple[Array, Array]:
     """Smoothed residuals (k, N + 1) and derivatives (k, N + 1, p) of the model; NaN without readings."""
     layout, g = settings.layout, settings.site.gravity
     n = len(layout.names)
     S, b, dlambda, dr, zo = x[: 5 * n].reshape(5, n)
     tau, b_g, k_g, tau_g = x[5 * n :]
-    roll = settings.attitude.roll
-    c = 1.0 if roll is None else math.cos(roll.value)
+    c = settings.attitude.level
     theta, w, w2, al, jerk = truth.motion(tau)
     sine, cosine = np.sin(theta), np.cos(theta)
     ones = truth.smoothed(np.ones(len(theta)))

@@ -8,17 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reference.corrections import is_verified
 from inercal.aoa.settings import GYROS
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
-from inercal.instruments.terms import term
-
-
-def in_words(name: str) -> str:
-    """A coefficient in words: ``b_2`` is the bias of accelerometer 2."""
-    of = term(name)
-    return "" if of is None else of.name
 
 
 def displayed(estimate: Estimate) -> Estimate:
@@ -70,7 +64,7 @@ def off_statement(fit: Mapping[str, Any]) -> list[str]:
     return [
         each["name"]
         for each in fit["parameters"]
-        if each["name"] not in fit["unseen"] and abs(off_stated(each)) > 2.0 * each["u"]
+        if each["name"] not in fit["unseen"] and abs(off_stated(each)) > LIMITS.disagreeing_sigmas * each["u"]
     ]
 
 
@@ -81,11 +75,8 @@ def rest_of_fit(estimate: Estimate) -> str:
         return ""
     off, unseen = off_statement(fit), list(fit["unseen"])
     agreeing = [each["name"] for each in fit["parameters"] if each["name"] not in (*off, *unseen)]
-    groups = (
-        (agreeing, "within two u of what the study states"),
-        (unseen, "not seen in this motion"),
-    )
-    parts = [f"{words}: {', '.join(names)}" for names, words in groups if names]
+    groups = {"within two u of what the study states": agreeing, "not seen in this motion": unseen}
+    parts = [f"{words}: {', '.join(names)}" for words, names in groups.items() if names]
     return f"Fitted to theta_ref, but not listed: {'; '.join(parts)}." if parts else ""
 
 

@@ -27,6 +27,7 @@ from inercal.aoa.settings import AoaSettings, Methods
 from inercal.arrays import Array
 from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
+from inercal.geometry.rotations import principal
 
 ROLL_STEP = 1e-4
 """Change of the roll [rad] for a slope."""
@@ -85,17 +86,14 @@ def by_fusion(
     recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
 ) -> Angles:
     """The angles of the fusion, with the roll where gyros track it; stated inputs count in their uncertainty."""
-    angles, turned = (
-        of_fusion(filtered, settings.estimator.states),
-        tracked_roll(recording, problem, filtered),
-    )
-    if turned is not None:
-        angles = replace(angles, roll=turned[0], roll_u=turned[1])
-    return _with_stated(
-        angles,
-        settings,
-        lambda lean: estimate(recording, leaning(problem, lean, settings), filtered.smoothed).theta,
-    )
+    angles = of_fusion(filtered, settings.estimator.states)
+    if (tracked := tracked_roll(recording, problem, filtered)) is not None:
+        angles = replace(angles, roll=tracked[0], roll_u=tracked[1])
+
+    def run(lean: Lean) -> Array:
+        return estimate(recording, leaning(problem, lean, settings), filtered.smoothed).theta
+
+    return _with_stated(angles, settings, run)
 
 
 def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
@@ -129,7 +127,7 @@ def widened(
     Rows without a changed theta keep their uncertainty.
     """
     for lean, theta in zip(changes, turned, strict=True):
-        off = np.remainder(theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
+        off = principal(theta - angles.theta)
         slope = np.where(np.isnan(off) & np.isfinite(angles.theta), 0.0, off) / lean.step
         if lean.name == "roll":
             angles = stated_roll(replace(angles, by_roll=slope), settings.attitude)

@@ -11,12 +11,8 @@ import numpy as np
 from inercal.aoa.flow import gives_alpha
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.result.budget import ANGLE
-from inercal.aoa.result.display import (
-    in_words,
-    off_stated,
-    off_statement,
-    use_of_fit,
-)
+from inercal.aoa.result.display import off_stated, off_statement, use_of_fit
+from inercal.aoa.result.outcome import term_of
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings
 from inercal.estimate.result import Estimate
@@ -62,48 +58,41 @@ def angle(estimate: Estimate) -> Table:
         ("u of the angle, largest after 2 s", *_degrees(u["max"])),
         ("rate, largest", short(None if rate is None else math.degrees(rate)), "deg/s"),
     ]
-    for key, words in (
-        ("max_abs_deg", "largest error"),
-        ("rms_deg", "rms error"),
-        ("mean_deg", "mean error"),
-    ):
+    for key, words in (("max_abs_deg", "largest"), ("rms_deg", "rms"), ("mean_deg", "mean")):
         if key in judged:
-            rows.append((f"{words} against theta_ref", short(judged[key]), "deg"))
+            rows.append((f"{words} error against theta_ref", short(judged[key]), "deg"))
     return Table("Angle", f"By {result['method']}.", (("", ""), ("value", ""), ("unit", "")), tuple(rows))
 
 
 def points_table(points: Iterable[Point], settings: AoaSettings) -> Table:
     """Points, a row each, with alpha and beta where the study states how the model lies in the stream."""
-    flow = gives_alpha(settings.attitude)
-    rows = []
-    for each in points:
-        alpha, u_alpha = _rounded(each.alpha, each.u_alpha)
-        beta, u_beta = _rounded(each.beta, each.u_beta)
-        rows.append(
-            (
-                f"{each.number:g}",
-                _numbers(each.trigger, each.last_trigger),
-                f"{each.begin:.3f}",
-                f"{each.end:.3f}",
-                *_rounded(each.theta, each.u),
-                short(math.degrees(each.scatter)),
-                *((alpha, u_alpha, beta, u_beta) if flow else ()),
-            )
+    rows = [
+        (
+            f"{each.number:g}",
+            _numbers(each.trigger, each.last_trigger),
+            f"{each.begin:.3f}",
+            f"{each.end:.3f}",
+            *_rounded(each.theta, each.u),
+            short(math.degrees(each.scatter)),
+            *_rounded(each.alpha, each.u_alpha),
+            *_rounded(each.beta, each.u_beta),
         )
+        for each in points
+    ]
+    angles = ("theta", "u", "scatter", "alpha", "u", "beta", "u")
+    heads = (
+        ("point", ""),
+        ("trigger", ""),
+        ("begins", "s"),
+        ("ends", "s"),
+        *((name, "deg") for name in angles),
+    )
+    shown = len(heads) if gives_alpha(settings.attitude) else len(heads) - 4
     return Table(
         "Points",
         "Mean angle of each point and its standard uncertainty; scatter is the standard deviation about it.",
-        (
-            ("point", ""),
-            ("trigger", ""),
-            ("begins", "s"),
-            ("ends", "s"),
-            ("theta", "deg"),
-            ("u", "deg"),
-            ("scatter", "deg"),
-            *((("alpha", "deg"), ("u", "deg"), ("beta", "deg"), ("u", "deg")) if flow else ()),
-        ),
-        tuple(rows),
+        heads[:shown],
+        tuple(row[:shown] for row in rows),
         2,
     )
 
@@ -115,7 +104,7 @@ def sensors(estimate: Estimate) -> Table:
         unit, size = shown_unit(each.unit)
         prior = estimate.result["posterior"][name]["prior"]
         value, u = rounded(each.value / size, each.u / size)
-        rows.append((name, in_words(name), value, u, short(prior / size), unit))
+        rows.append((name, term_of(name).name, value, u, short(prior / size), unit))
     return Table(
         "Errors of the sensors",
         "As estimated at the end of the recording; u before is the standard uncertainty that the study, or an earlier "
@@ -141,7 +130,7 @@ def fitted(estimate: Estimate, names: Container[str] | None = None) -> Table:
         shown, u = rounded(value / size, each["u"] / size)
         angle = f"{math.degrees(value):.4f}" if name.startswith("dlambda_") else ""
         cells = ("not seen", "–", "", "") if name in fit["unseen"] else (shown, u, unit, angle)
-        rows.append((name, in_words(name), *cells))
+        rows.append((name, term_of(name).name, *cells))
     title += "" if fit["converged"] else ": it did not converge, and is not to be used"
     noise = short(math.degrees(fit["reference_noise_rad"]))
     rows.append(("", "noise of theta_ref from sample to sample", noise, "–", "deg", ""))
@@ -175,37 +164,24 @@ def methods(estimate: Estimate) -> Table:
     """Methods side by side: errors against the reference angle where there is one, else differences from the first."""
     result = estimate.result
     judged = "reference" in result
-    rows = [
-        (
-            result["method"],
-            _errors(result.get("reference")) if judged else ("–", "–"),
-            result["angle"]["u"]["median"],
-        )
-    ]
+    first = _errors(result.get("reference")) if judged else ("–", "–")
+    lines = [(result["method"], *first, _degrees(result["angle"]["u"]["median"])[0])]
     for name, each in result["compare"].items():
-        u = each["u_median_deg"]
-        u = None if u is None else math.radians(u)
         apart = each["difference"]
-        numbers = (
-            _errors(each.get("reference"))
-            if judged
-            else (short(apart["max_abs_deg"]), short(apart["rms_deg"]))
-        )
-        rows.append((name, numbers, u))
-    lines = tuple((name, *numbers, _degrees(u)[0]) for name, numbers, u in rows) if result["compare"] else ()
-    caption, heads = (
-        (
-            "Angle less theta_ref after the first 2 s, also where the reference rests and moves.",
-            ("largest error", "rms", "mean", "rms at rest", "rms moving"),
-        )
-        if judged
-        else (f"Difference of the angle from that of {result['method']}.", ("largest difference", "rms"))
-    )
+        differences = short(apart["max_abs_deg"]), short(apart["rms_deg"])
+        numbers = _errors(each.get("reference")) if judged else differences
+        lines.append((name, *numbers, short(each["u_median_deg"])))
+    if judged:
+        caption = "Angle less theta_ref after the first 2 s, also where the reference rests and moves."
+        heads: tuple[str, ...] = ("largest error", "rms", "mean", "rms at rest", "rms moving")
+    else:
+        caption = f"Difference of the angle from that of {result['method']}."
+        heads = ("largest difference", "rms")
     return Table(
         "Methods side by side",
         f"{caption} The last column is the median u that each method states.",
         (("method", ""), *((head, "deg") for head in heads), ("u", "deg")),
-        lines,
+        tuple(lines) if result["compare"] else (),
     )
 
 
@@ -213,13 +189,8 @@ def _errors(judged: Mapping[str, Any] | None) -> tuple[str, ...]:
     """Largest, rms and mean error, and rms at rest and in motion."""
     if judged is None:
         return ("–",) * 5
-    return (
-        short(judged["max_abs_deg"]),
-        short(judged["rms_deg"]),
-        short(judged["mean_deg"]),
-        short(judged["static"]["rms_deg"]),
-        short(judged["moving"]["rms_deg"]),
-    )
+    of_all = (judged["max_abs_deg"], judged["rms_deg"], judged["mean_deg"])
+    return tuple(short(each) for each in (*of_all, judged["static"]["rms_deg"], judged["moving"]["rms_deg"]))
 
 
 def _degrees(value: float | None, digits: int = 2) -> tuple[str, str]:

@@ -82,18 +82,12 @@ def is_covariance(P: Array) -> bool:
 def _lost(recording: Recording, filtered: FilterResult) -> str | None:
     """A sentence on a filter that lost the angle too often; None otherwise."""
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
-    losses = [
-        row
-        for row in filtered.starts[1:]
-        if np.searchsorted(seen, recording.t[row] - LIMITS.blind_time)
-        < np.searchsorted(seen, recording.t[row])
-    ]
+    starts = recording.t[list(filtered.starts[1:])]
+    losses = starts[np.searchsorted(seen, starts - LIMITS.blind_time) < np.searchsorted(seen, starts)]
     if len(losses) < LIMITS.losses:
         return None
-    return (
-        f"the filter lost the angle {counted(len(losses), 'time')} though there were accelerometers, first at "
-        f"{recording.t[losses[0]]:.6g} s"
-    )
+    often = counted(len(losses), "time")
+    return f"the filter lost the angle {often} though there were accelerometers, first at {losses[0]:.6g} s"
 
 
 def _missing(answered: NDArray[np.bool_]) -> str:
