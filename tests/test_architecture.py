@@ -154,7 +154,7 @@ WITHIN = {
         "figures"
     ),
     "aoa": (
-        "limits layout settings arms flow angles motion reading fusion paper diagnosis reference result simulate task "
+        "limits layout settings angles motion reading fusion paper diagnosis reference result simulate task "
         "figures"
     ),
     "selfcal": (

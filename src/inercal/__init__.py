@@ -34,7 +34,7 @@ Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.fusion.model`
     body           x forward, y left, z up, about the pivot; theta nose-up pitch, w = theta', phi roll right wing down
     accelerometer  at (r, 0, z), lambda from +x towards -z: reads g sin(theta - lambda) at rest; gyro nose-up positive
     errors         b_i, b_g biases; dr_i, zo_i of the positions; k_g gyro scale; tau_g gyro delay
-    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.aoa.flow`)
+    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.aoa.angles`)
 
 Records: labelled columns (`inercal.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature

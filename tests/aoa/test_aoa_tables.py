@@ -15,19 +15,22 @@ from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reference.corrections import report_of
 from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected
-from inercal.aoa.result.display import delays, displayed, rest_of_fit, use_of_fit
 from inercal.aoa.result.outcome import assemble, assemble_paper, term_of
 from inercal.aoa.result.points import points
 from inercal.aoa.result.tables import (
     angle,
     answer,
+    delays,
+    displayed,
     fitted,
     methods,
     on_page,
     on_terminal,
     points_table,
+    rest_of_fit,
     sensors,
     uncertainty,
+    use_of_fit,
 )
 from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import Calibration, MotionPlan, Timing

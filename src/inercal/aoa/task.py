@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.arms import level_of
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live, smoother
 from inercal.aoa.fusion.filter_result import FilterResult
@@ -63,25 +62,22 @@ def in_order(measurement: Measurement) -> Measurement:
     if len(taken) == len(t):
         return measurement
 
-    def rows(of: Any, *names: str) -> Any:
-        """A part of the measurement with only the later rows of some fields."""
-        there = [name for name in names if getattr(of, name) is not None]
-        return replace(of, **{name: getattr(of, name)[taken] for name in there})
+    def rows(of: Any) -> Any:
+        """A part of the measurement with only the later of all rows."""
+        parts = {each.name: getattr(of, each.name) for each in fields(of)}
+        columns = {name: x for name, x in parts.items() if isinstance(x, np.ndarray) and len(x) == len(t)}
+        return replace(of, **{name: x[taken] for name, x in columns.items()})
 
-    motion = ("theta", "u", "rate", "rate_u")
-    angles = (*motion, "roll", "roll_u", "own_u", "by_roll")
     filtered = measurement.filtered
     if filtered is not None:
         starts = tuple(int(k) for k in np.searchsorted(taken, filtered.starts))
-        cut = rows(filtered, *motion, "acceleration", "innovations", "roll", "roll_u")
-        filtered = replace(cut, starts=starts)
-    kept = ("t", "acc", "gyro", "turns", "zero_angle", "point", "trigger", "reference", "masked")
+        filtered = replace(rows(filtered), starts=starts)
     return replace(
         measurement,
-        recording=rows(measurement.recording, *kept),
-        angles=rows(measurement.angles, *angles),
+        recording=rows(measurement.recording),
+        angles=rows(measurement.angles),
         filtered=filtered,
-        compared={name: rows(other, *angles) for name, other in measurement.compared.items()},
+        compared={name: rows(other) for name, other in measurement.compared.items()},
     )
 
 
@@ -119,7 +115,7 @@ def measure(
         posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
     recording = recording_of(record, settings)
     if not recording.spatial:
-        level_of(settings.attitude)
+        settings.attitude.check_pitch_shows()
     findings = implausible(recording, settings)
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)

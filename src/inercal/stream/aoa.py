@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.aoa.arms import level_of
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.limits import LIMITS
@@ -27,13 +26,13 @@ from inercal.aoa.result.columns import columns, rows
 from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.arrays import Array
-from inercal.findings import CODES, EVERYTHING, Finding, Harm
+from inercal.findings import Finding
 from inercal.records.column import Column
 from inercal.stream.lines import Lines, Sample
-from inercal.stream.run import Output, Slots
+from inercal.stream.run import Alarms, Output, Slots
 
 # bits of `AoaState.alarms`; from the last on one for each sensor
-_BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
+_CONTRADICTION, _SILENCE, _SATURATED = range(3)
 
 
 class Leaning(NamedTuple):
@@ -49,7 +48,8 @@ class AoaState(NamedTuple):
     ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by name; ``t`` [s] the
     latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
     last row with a number of the gyro. ``nis`` and ``scalars``: sum and number of the squared innovations since
-    ``window`` [s]. ``alarms`` are those given, one bit each; ``slots`` that of the last line.
+    ``window`` [s]. ``remarked``: the findings on
+    the sensors were given; ``slots`` that of the last line.
     """
 
     live: LiveState
@@ -61,7 +61,8 @@ class AoaState(NamedTuple):
     nis: float
     scalars: int
     window: float
-    alarms: int
+    remarked: bool
+    alarms: Alarms
     slots: Slots
 
 
@@ -107,7 +108,7 @@ class Aoa:
         gyros = [name for name in GYROS if name in record]
         spatial = all(name in gyros for name in GYROS[1:])
         if not spatial:
-            level_of(settings.attitude)
+            settings.attitude.check_pitch_shows()
         self._remarks = of_sensors(there, gyros, record, settings)
         places = list(record.columns)
         used = [*there, *(GYROS if spatial else GYROS[:1])]
@@ -155,7 +156,7 @@ class Aoa:
                 for each, of in zip(self._changes, self._leaning, strict=True)
             },
             t=-math.inf, begun=math.nan, temperature=math.nan,
-            heard=math.nan, nis=0.0, scalars=0, window=math.nan, alarms=0, slots=Slots(),
+            heard=math.nan, nis=0.0, scalars=0, window=math.nan, remarked=False, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
@@ -213,11 +214,11 @@ class Aoa:
 
     def _remarked(self, state: AoaState) -> AoaState:
         """The state once the findings on the sensors are given."""
-        if state.alarms & 1 << _BEGUN:
+        if state.remarked:
             return state
         for finding in self._remarks:
             self._say(finding)
-        return state._replace(alarms=state.alarms | 1 << _BEGUN)
+        return state._replace(remarked=True)
 
     def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[float, float]:
         """The angle that is stated for a row, and its standard uncertainty [rad]; NaN where there is none."""
@@ -261,11 +262,7 @@ class Aoa:
 
     def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
         """The state with an alarm given, once."""
-        if state.alarms & 1 << bit:
-            return state
-        harm = () if CODES[code].harm is Harm.NEVER else EVERYTHING
-        self._say(Finding(code, text, f"t = {t:.10g} s", harm))
-        return state._replace(alarms=state.alarms | 1 << bit)
+        return state._replace(alarms=state.alarms.give(bit, code, text, t, self._say))
 
     def _lines(
         self, state: AoaState, answers: Answers, others: Sequence[Live], turned: Sequence[Array]

@@ -17,7 +17,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
-from inercal.findings import EVERYTHING, Finding
+from inercal.findings import Finding
 from inercal.selfcal.filters.filter_result import Estimates, History, State, Trace, estimate_of
 from inercal.selfcal.filters.gaps import LONG, RECENT, advance, held_rate, usual
 from inercal.selfcal.filters.problem import FilterProblem
@@ -27,7 +27,7 @@ from inercal.selfcal.platform.coefficients import KA1
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.result.columns import columns, rows
 from inercal.stream.lines import Lines, Sample
-from inercal.stream.run import Output, Slots
+from inercal.stream.run import Alarms, Output, Slots
 
 _BAND = 5.0
 """Standard deviations that the running mean of NIS may be above its expectation."""
@@ -48,8 +48,8 @@ class SelfcalState(NamedTuple):
     the row of the last whole angles, which are in ``filter``. ``t`` [s] of the last row, ``steps`` (9,) [s] the last
     intervals (NaN before). ``doubt``: a rate was held and the encoders have not read since. ``angles`` (3,) [rad]
     of the estimated attitude. ``nis`` and ``dims``: sums of the normalised innovations squared and of the scalars in
-    them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``said`` are the alarms given,
-    one bit each; ``slots`` that of the last line.
+    them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``alarms`` are
+    those given; ``slots`` that of the last line.
     """
 
     begun: bool
@@ -67,7 +67,7 @@ class SelfcalState(NamedTuple):
     rows: int
     late: int
     gaps: int
-    said: int
+    alarms: Alarms
     slots: Slots
 
 
@@ -138,7 +138,7 @@ class Selfcal:
         return SelfcalState(
             begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
             rated=math.nan, read=math.nan, t=math.nan, steps=np.full(RECENT, np.nan), doubt=False,
-            angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, said=0, slots=Slots(),
+            angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[Output]]:
@@ -254,10 +254,9 @@ class Selfcal:
                 "outer and platform axis coincide, where the gimbal-angle model does not hold: use a quaternion filter",
             ),
         )
-        for k, (due, code, text) in enumerate(alarms):
-            if due and not state.said & 1 << k:
-                self._say(Finding(code, text, f"t = {state.t:.10g} s", EVERYTHING))
-                state = state._replace(said=state.said | 1 << k)
+        for bit, (due, code, text) in enumerate(alarms):
+            if due:
+                state = state._replace(alarms=state.alarms.give(bit, code, text, state.t, self._say))
         return state
 
     def _line(

@@ -16,7 +16,7 @@ import numpy as np
 
 from inercal.aoa.diagnosis.fit_quality import Case, fit_quality, rms
 from inercal.aoa.diagnosis.noise_check import scatter
-from inercal.aoa.layout import AXES
+from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.delay import aligned, relative_delay
 from inercal.aoa.reading.recording import Recording
@@ -224,8 +224,10 @@ def _positions(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[C
         return
 
     def times(factor: Array | float, of_height: float = 1.0) -> Change:
-        moved = replace(layout, r=layout.r * factor, z=layout.z * of_height)
-        return lambda r, s: (r, replace(s, layout=moved))
+        def moved(of: Layout) -> Layout:
+            return replace(of, r=of.r * factor, z=of.z * of_height)
+
+        return lambda r, s: (r, replace(s, layout=moved(s.layout)))
 
     example = int(np.argmax(np.abs(layout.r)))
     arm = layout.r[example]

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inercal.aoa.angles import gives_alpha
 from inercal.aoa.figures.learned import coefficients, consistency, flexure, lever_arms
 from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
-from inercal.aoa.flow import gives_alpha
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.pauses import at_rest
-from inercal.aoa.result.display import delays, displayed
-from inercal.aoa.result.tables import answer, on_page
+from inercal.aoa.result.tables import answer, delays, displayed, on_page
 from inercal.aoa.task import in_order
 from inercal.arrays import Array
 from inercal.geometry.rotations import principal

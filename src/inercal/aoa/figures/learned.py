@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.figures import sensors
+from inercal.aoa.layout import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.result.outcome import term_of
 from inercal.arrays import Array

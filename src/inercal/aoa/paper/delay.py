@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import all_weights, centrifugal_arms
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights, centrifugal_arms
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later, shortened, usual_step
 from inercal.aoa.reading.recording import Recording

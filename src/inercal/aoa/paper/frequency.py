@@ -13,8 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import all_weights
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import shortened
 from inercal.arrays import Array

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles, continuous
-from inercal.aoa.arms import all_weights, level_of, tangential_arms
+from inercal.aoa.layout import all_weights, tangential_arms
 from inercal.aoa.paper import lever, static
 from inercal.aoa.paper.delay import aligned, relative_delay
-from inercal.aoa.paper.lowpass import zero_phase
+from inercal.aoa.paper.lever import zero_phase
 from inercal.aoa.paper.residuals import error_terms
 from inercal.aoa.paper.static import spread
 from inercal.aoa.reading.clock import later
@@ -64,7 +64,8 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
     RecordError
         There is no gyro where the methods need one, or time does not go on.
     """
-    level = level_of(settings.attitude)
+    settings.attitude.check_pitch_shows()
+    level = settings.attitude.level
     _needs(recording, settings, methods, level)
     taken = later(recording.t)
     gyro_delay = settings.timing.gyro_delay

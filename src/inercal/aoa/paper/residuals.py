@@ -5,7 +5,7 @@ are the errors of an accelerometer and of the gyro, L = r_3 - r_1 the arm of the
 2021, worked out; accelerations in m/s^2, angles in rad.
 
 The covariance (`error_terms`) is of noise and biases of accelerometers and gyro, of the prior of positions and gyro
-scale, and of lever-arm terms that were left in, by the reading A - q w^2 + p al of `inercal.aoa.arms`: an error of r
+scale, and of lever-arm terms that were left in, by the reading A - q w^2 + p al of `inercal.aoa.layout`: an error of r
 enters as -(w^2 cos lambda + c al sin lambda), one of z as c^2 w^2 sin lambda - c al cos lambda, and an error e of the
 rate through compensation as 2 q w e.
 """
@@ -16,8 +16,7 @@ import math
 
 import numpy as np
 
-from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.paper.static import Errors
 from inercal.aoa.settings import AoaSettings, Tangential
 from inercal.arrays import Array

@@ -17,8 +17,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import axes
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, axes
 from inercal.aoa.settings import Static
 from inercal.arrays import Array
 from inercal.errors import StudyError

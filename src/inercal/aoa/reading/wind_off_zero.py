@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import axes
+from inercal.aoa.layout import axes
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording

@@ -145,18 +145,18 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource
         of_prior("flexure of the sting", flexure, "m/s^2", "s_", "flexure_"),
         BudgetSource("earlier run", "B", 1.0, "1", states=before),
     )
-    stated = []
+    of_inputs = []
     if timing.common_delay_u:
-        stated.append(
+        of_inputs.append(
             BudgetSource("common delay", "B", timing.common_delay_u, "s", levels=("common_delay_u",))
         )
     if zero is not None:
-        stated.append(BudgetSource("stated zero", "B", zero.u, "rad", zero=True))
+        of_inputs.append(BudgetSource("stated zero", "B", zero.u, "rad", zero=True))
     return (
         BudgetSource("accelerometer noise", "A", noise.accelerometer, "m/s^2", ("accelerometer_noise",)),
         BudgetSource("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
         *(each for each in of_states if each.states),
-        *stated,
+        *of_inputs,
         BudgetSource("motion between samples", "B", 1.0, "1", ("snap",)),
     )
 

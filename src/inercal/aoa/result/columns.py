@@ -16,8 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.flow import gives_alpha
+from inercal.aoa.angles import Angles, gives_alpha, stated_roll
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings, Attitude

@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.flow import alpha_beta
+from inercal.aoa.angles import Angles, alpha_beta
 from inercal.aoa.reading.pauses import pauses
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
