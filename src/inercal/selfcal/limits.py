@@ -85,6 +85,9 @@ class Limits:
     rough_fit: float = 0.03
     """Part by which they may differ under another order or sign, for that to be named."""
 
+    clipped_share: float = 0.01
+    """Part of a reading at an extreme by which the encoders must say more for its sensor to be saturated."""
+
     unit_ratio: float = 5.0
     """Ratio of rates to angles, or its reciprocal, from which a unit is wrong."""
 

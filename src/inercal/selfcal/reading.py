@@ -21,7 +21,7 @@ from inercal.records.column import Column
 from inercal.records.places import counted, places
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-from inercal.selfcal.diagnosis.gross import implausible, off_the_path
+from inercal.selfcal.diagnosis.gross import clipped, implausible, off_the_path
 from inercal.selfcal.filters.gaps import with_held
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
@@ -78,11 +78,18 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
-    of_record = (*worth_saying(record, columns), *findings)
     gained = all(column.increment for column in columns[:3])
     rate, held = with_held(t, rate, th, settings.world, gained)
     warm = recorded_temperature(record)
-    recording = Recording(t, rate, th, acc, sensor == "gyro", of_record, record.sources, held, warm)
+    recording = Recording(t, rate, th, acc, sensor == "gyro", (), record.sources, held, warm)
+    of_record = [  # without extremes beyond which no motion goes on
+        each
+        for each in (*worth_saying(record, columns), *findings)
+        if each.code != "saturation"
+        or each.harm[0][:-2] not in (sensor, "acc")
+        or clipped(recording, settings, each.harm[0])
+    ]
+    recording = replace(recording, findings=tuple(of_record))
     findings = implausible(recording, settings, where)
     if settings.plan is not None:
         began = float(time[np.argmax(np.isfinite(time))])

@@ -23,7 +23,16 @@ from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.estimate.hypotheses import Hypothesis, tried
 from inercal.findings import EVERYTHING, Finding
-from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
+from inercal.geometry.rotations import (
+    Axis,
+    attitude_difference,
+    boxminus,
+    conjugate,
+    log,
+    multiply,
+    rotate,
+)
+from inercal.records.checks.values import saturated
 from inercal.selfcal.diagnosis.fit_quality import Case
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
@@ -262,6 +271,30 @@ def _accelerometers(
     return [
         Finding("contradiction", f"acc: specific force does not follow the angles, {off}", harm=EVERYTHING)
     ]
+
+
+def clipped(recording: Recording, settings: SelfcalSettings, channel: str) -> bool:
+    """True for a channel (``acc_x``, ``gyro_z``) beyond whose extremes the encoders say that the motion goes on.
+
+    A quiet gyro sits at an extreme through each turn of constant rate, and is sound. A loss below
+    `LIMITS.clipped_share` is left to the innovations. True also where the encoders are silent.
+    """
+    world, noise, k = settings.world, settings.noise, "xyz".index(channel[-1])
+    q, _ = gimbals(recording.th, world)
+    if channel.startswith("acc"):
+        level = read = recording.acc[:, k]
+        expected, spread = rotate(conjugate(q), world.up)[:, k], noise.accelerometer
+    else:
+        level, read = recording.rate[:, k], recording.rate[:, k] * recording.dt
+        of_earth = rotate(conjugate(q[:-1]), world.earth) * recording.dt[:, None]
+        expected, spread = (boxminus(q[1:], q[:-1]) + of_earth)[:, k], math.sqrt(2.0) * noise.encoder
+    rows = saturated(level)
+    for run in filter(len, np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)):
+        outward = 1.0 if level[run[0]] == np.nanmax(level) else -1.0
+        lost, slack = outward * (expected[run] - read[run]).sum(), LIMITS.noise_sigmas * spread
+        if not lost <= slack * math.sqrt(len(run)) + LIMITS.clipped_share * abs(read[run].sum()):
+            return True
+    return False
 
 
 def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
