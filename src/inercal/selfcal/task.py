@@ -34,11 +34,8 @@ from inercal.selfcal.settings import KINDS, SelfcalSettings
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """An ``estimate``, and the evidence behind it for pictures and tests.
-
-    ``settings`` are those of the study; ``compared`` are the other estimators' results, by kind, where a comparison was
-    asked for; ``truth`` (p,) are the coefficients in the product form where the study states them.
-    """
+    """An ``estimate``, and the evidence behind it: ``settings`` of the study, results of other estimators that it was
+    ``compared`` with, by kind, and the ``truth`` (p,), product form, where the study states it."""
 
     estimate: Estimate
     problem: FilterProblem
@@ -68,29 +65,13 @@ def calibrate(
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
-    """Calibrate a platform from what it recorded while it turned.
+    """Calibrate a platform from what it recorded while it turned; `recording_of` says which channels it has.
 
-    Parameters
-    ----------
-    record : Record
-        ``t``, ``wc_x..`` or ``gyro_x..``, ``th_x..``, ``acc_x..``.
-    settings : SelfcalSettings
-        Site, rig, noise, prior, estimator.
-    compare : bool
-        Run all other estimators too.
-    progress : callable
-        Told each step of the work, in words.
+    ``compare`` runs all other estimators too; ``progress`` is told each step of the work, in words. The status of the
+    estimate says whether its values can be used: nothing is raised for a poor one.
 
-    Returns
-    -------
-    Calibration
-        Its estimate's status says whether the values can be used; nothing is raised for a poor one.
-
-    Raises
-    ------
-    InputError
-        The record has not the channels of a platform, the study does not fit it, or it leaves a heading unknown that
-        the record does not tell.
+    Raises InputError where the record has not the channels of a platform or the study does not fit it, or where it
+    leaves a heading unknown that the record does not tell.
     """
     clock = time.perf_counter()
     recording = recording_of(record, settings)
@@ -114,8 +95,7 @@ def calibrate(
             compared[kind] = filtering.estimate(recording, of, kind)
     progress("assembling")
     estimate = assemble(recording, settings, filtered, bounds, faults)
-    result = dict(estimate.result)
-    message = estimate.message
+    result, message = dict(estimate.result), estimate.message
     if rough and estimate.names:
         base, words = _base(settings, estimate)
         result, message = result | base, message + words

@@ -21,8 +21,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.selfcal.filters.gaps import anew
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model
+from inercal.selfcal.filters.problem import FilterProblem, Model, admitted, updating, watch
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (

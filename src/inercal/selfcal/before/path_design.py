@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from inercal.findings import Finding
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, Bounds, bounds
 from inercal.selfcal.before.observability import Seen, seen
-from inercal.selfcal.before.path_search import LOCK, criterion, search
+from inercal.selfcal.before.path_search import criterion, search
 from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import SelfcalSettings
 
@@ -128,7 +129,7 @@ def design(
                 harm=(),
             )
         ]
-        if lock < LOCK
+        if lock < LIMITS.path_cosine
         else []
     )
     by = {"worst": "largest u", "mean": "geometric mean of u"}[asked.criterion]

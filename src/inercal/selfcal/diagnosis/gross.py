@@ -126,14 +126,21 @@ def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
 def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
     """Refuse rates that turn the platform many times as fast as the angles do, or the reverse."""
     turned = np.linalg.norm(commanded, axis=1)
-    moving = (turned > 0.3 * turned.max()) & (moved > noise)
+    moving = (turned > LIMITS.moving_share * turned.max()) & (moved > noise)
     if not moving.any():
         return
     ratio = float(np.median(turned[moving] / moved[moving]))
     factor = max(ratio, 1.0 / ratio)
     if factor < LIMITS.unit_ratio:
         return
-    words = next((units for of, units in _EXCHANGED.items() if 0.8 < factor / of < 1.25), "units")
+    words = next(
+        (
+            units
+            for of, units in _EXCHANGED.items()
+            if 1.0 / LIMITS.unit_window < factor / of < LIMITS.unit_window
+        ),
+        "units",
+    )
     raise RecordError(
         where,
         f"the rates turn the platform {ratio:.4g} times as far as the angles say, expected the same: {words} look "
@@ -341,7 +348,7 @@ def off_the_path(
     """
     t = recording.t - began
     findings = []
-    if t[-1] < plan.duration - 1.5 * plan.step:
+    if t[-1] < plan.duration - LIMITS.missing_steps * plan.step:
         text = f"the recording ends after {t[-1]:.6g} s, the study's path takes {plan.duration:.6g} s"
         findings.append(Finding("truncated", text))
     nominal = plan.angles()

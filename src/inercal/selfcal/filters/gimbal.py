@@ -25,9 +25,8 @@ from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Vector
-from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model, Start
+from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.selfcal.filters.problem import FilterProblem, Model, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import Axes, angles, attitude, nearest_turn, parity
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
 from inercal.selfcal.platform.recording import Steps
@@ -263,14 +262,7 @@ def _advance(
         for j in range(p):
             c[j] += x[3 + j]
         if history:
-            q = attitude(th, world.axes, world.signs)
-            for i in range(4):
-                out.attitude[k, i] = q[i]
-            for i in range(3):
-                out.attitude_u[k, i] = math.sqrt(P[i, i])
-            for j in range(p):
-                out.coefficients[k, j] = c[j]
-                out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
+            remember(out, k, attitude(th, world.axes, world.signs), c, P)
     return points.health[0], int(points.health[1]), cosine
 
 

@@ -26,8 +26,7 @@ from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import covariance, cross, draw, empty_points, mean, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model, Start
+from inercal.selfcal.filters.problem import FilterProblem, Model, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, joint_axes, nearest_turn
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
 from inercal.selfcal.platform.recording import Steps

@@ -6,6 +6,7 @@ linear form. Derivatives are those of the model, so that a residual changes by m
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,10 +26,10 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.filters.filter_result import FilterResult, History
+from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, updating, watch
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
-from inercal.selfcal.platform.linearised import FLOOR
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
 
@@ -69,7 +70,7 @@ def readings(recording: Recording, problem: FilterProblem) -> Readings:
     used = np.column_stack([np.isfinite(acc), np.repeat(seen[:, None], 3, axis=1)])
     if problem.filter.gating is not None:
         used &= _gate(attitude, seen, problem)
-    covariance = joints @ np.swapaxes(joints, 1, 2) + FLOOR**2 * np.eye(3)
+    covariance = joints @ np.swapaxes(joints, 1, 2) + LIMITS.encoder_floor**2 * np.eye(3)
     root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
     return Readings(
         np.where(used[:, :3], acc, 0.0),
@@ -117,10 +118,40 @@ def normalised(residual: Array, measured: Readings, attitude_variance: Array | f
     return np.where(measured.used, np.hstack([residual[:, :3], encoders / np.sqrt(variance)]), np.nan)
 
 
-def least_cosine(recording: Recording) -> float:
-    """Least |cos thy| that the encoders read."""
+def batch_result(
+    kind: str,
+    recording: Recording,
+    measured: Readings,
+    path: tuple[Array, Array],
+    coefficients: tuple[Array, Array],
+    nis: Array,
+    innovations: Array | None,
+    message: str,
+) -> FilterResult:
+    """Result of an estimator of whole recordings, but its time.
+
+    ``path``: attitudes (n, 4) and standard deviations (n, 3) [rad]; ``coefficients`` (p,) and their covariance (p, p);
+    ``innovations`` (m, 6), None where no history is wanted; ``message`` says why it did not converge.
+    """
+    (c, covariance), rows = coefficients, len(recording.t)
+    history = None
+    if innovations is not None:
+        history = History(*path, np.tile(c, (rows, 1)), np.tile(np.sqrt(np.diag(covariance)), (rows, 1)))
     cosine = np.abs(np.cos(recording.th[:, 1]))
-    return float(np.min(cosine, where=np.isfinite(cosine), initial=1.0))
+    return FilterResult(
+        kind=kind,
+        coefficients=c,
+        covariance=covariance,
+        attitude=path[0][-1],
+        nis=nis,
+        dims=measured.dims,
+        innovations=np.empty((0, 6)) if innovations is None else innovations,
+        history=history,
+        seconds=math.nan,
+        converged=not message,
+        message=message,
+        gimbal_cosine=float(np.min(cosine, where=np.isfinite(cosine), initial=1.0)),
+    )
 
 
 def first_reading(recording: Recording, problem: FilterProblem) -> Start:

@@ -15,9 +15,6 @@ from inercal.selfcal.platform.rig import JOINTS, World
 
 JointName = Literal["x", "y", "z"]
 
-MOST_ROWS = 5_000_000
-"""Most rows of a plan that fit into memory with all that is computed from them."""
-
 
 @dataclass(frozen=True)
 class Turn:

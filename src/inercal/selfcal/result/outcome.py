@@ -24,7 +24,7 @@ from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import LOCK
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
@@ -113,7 +113,7 @@ def assemble(
     )
     read = {each.code for each in recording.findings} - {"gap", "outlier"}
     all_findings = [*recording.findings, *(each for each in findings if each.code not in read)]
-    if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LOCK:
+    if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LIMITS.singular_cosine:
         angle = math.degrees(math.acos(filtered.gimbal_cosine))
         text = f"the inner gimbal comes to {angle:.2f} deg, where the gimbal-angle model does not hold"
         all_findings.append(Finding("gimbal_lock", text, harm=EVERYTHING))
@@ -222,10 +222,10 @@ def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> f
     """
     errors, of = stated_errors(settings), problem(settings)
     if errors is None:
-        return agreement.limit()
+        return agreement.limit(LIMITS.nis_sigmas)
     moved = likely(recording, of, errors)
     before, after = (float(np.nansum(judging((recording, each)).nis)) for each in (of, moved))
-    return agreement.limit() + max(0.0, before - after) / agreement.rows
+    return agreement.limit(LIMITS.nis_sigmas) + max(0.0, before - after) / agreement.rows
 
 
 def _verdict(
@@ -261,14 +261,14 @@ def _verdict(
 def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str, str]:
     """Coefficients that only a turn about one axis of p shows well, where there is none -> advice."""
     earth = float(np.linalg.norm(settings.world.earth))
-    moving = np.abs(recording.rate).max(axis=1) > 2.0 * earth
-    turned = np.degrees((np.abs(recording.rate) * recording.dt[:, None])[moving].sum(axis=0))
+    moving = np.abs(recording.rate).max(axis=1) > LIMITS.turning_ratio * earth
+    turned = (np.abs(recording.rate) * recording.dt[:, None])[moving].sum(axis=0)
     words = dict[str, str]()
     for axis, coefficients in zip("XYZ", _BY_AXIS, strict=True):
-        if (by := float(turned["XYZ".index(axis)])) < 45.0:
+        if (by := float(turned["XYZ".index(axis)])) < LIMITS.turned_angle:
             text = (
-                f"{axis}_p is turned by {by:.2g} deg in all, so that {' and '.join(coefficients)} see little more "
-                f"than earth rate: add turns with {axis}_p along the turning axis"
+                f"{axis}_p is turned by {math.degrees(by):.2g} deg in all, so that {' and '.join(coefficients)} see "
+                f"little more than earth rate: add turns with {axis}_p along the turning axis"
             )
             words |= dict.fromkeys(coefficients, text)
     return words
