@@ -17,13 +17,14 @@ from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.filters.run import estimate, load_kernels
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import names, product_slope, to_product
-from inercal.selfcal.settings import FilterKind, SelfcalSettings
+from inercal.selfcal.settings import SelfcalSettings
 
 if TYPE_CHECKING:
     from inercal.estimate.coverage import Coverage, Nees

@@ -16,8 +16,9 @@ from inercal.estimate.rounding import rounded
 from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.records.record import Record
-from inercal.selfcal.before.bounds import Bounds, recorded_bounds
+from inercal.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.selfcal.diagnosis.examination import diagnose
+from inercal.selfcal.estimators import KINDS, FilterKind
 from inercal.selfcal.filters import run as filtering
 from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.filters.gaps import taken_anew
@@ -29,7 +30,7 @@ from inercal.selfcal.reading import recording_of
 from inercal.selfcal.result.comparison import side_by_side
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.settings import KINDS, SelfcalSettings
+from inercal.selfcal.settings import SelfcalSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +42,9 @@ class Calibration:
     problem: FilterProblem
     recording: Recording
     filtered: FilterResult
-    bounds: Bounds
+    bounds: PathBounds
     settings: SelfcalSettings
-    compared: Mapping[str, FilterResult] = field(default_factory=dict)
+    compared: Mapping[FilterKind, FilterResult] = field(default_factory=dict)
     truth: Array | None = None
 
 
@@ -88,7 +89,7 @@ def calibrate(
     bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
     progress("looking for faults")
     faults = [*diagnose(recording, of, filtered, stated_errors(settings)), *taken_anew(recording, filtered)]
-    compared: dict[str, FilterResult] = {}
+    compared: dict[FilterKind, FilterResult] = {}
     for kind in KINDS if compare else ():
         if kind != filtered.kind:
             progress(f"filtering ({kind})")

@@ -16,7 +16,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
-from inercal.selfcal.before.bounds import Bounds, bounds
+from inercal.selfcal.before.bounds import PathBounds, bounds
 from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion
@@ -30,7 +30,7 @@ _EVEN: Final = 1e-6
 """Part of a row that is rounding."""
 
 
-def criterion(bounds: Bounds, goal: Mapping[str, float], kind: str) -> float:
+def criterion(bounds: PathBounds, goal: Mapping[str, float], kind: str) -> float:
     """Largest (``worst``) or geometric mean (``mean``) ratio of each u to its goal, or to its prior without one."""
     wanted = [goal.get(name, prior) for name, prior in zip(bounds.names, bounds.prior, strict=True)]
     ratio = bounds.u / wanted

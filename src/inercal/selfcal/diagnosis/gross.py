@@ -52,7 +52,7 @@ _EXCHANGED = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Motion:
+class _Stretches:
     """Motion in each of m steps between rows whose angles are known.
 
     ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
@@ -109,7 +109,7 @@ def implausible(recording: Recording, settings: SelfcalSettings, where: object) 
     return findings
 
 
-def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
+def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Stretches:
     """Motion between the rows with ``complete`` angles."""
     t = recording.t
     gained = np.vstack([np.zeros(3), np.cumsum(recording.rate * recording.dt[:, None], axis=0)])
@@ -118,7 +118,7 @@ def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
     held = np.zeros(len(t), dtype=np.int64)
     held[np.array(recording.held, dtype=np.int64) + 1] = 1
     recorded = np.diff(np.cumsum(held)[complete]) == 0
-    return _Motion(
+    return _Stretches(
         recording.th[complete], np.diff(t[complete]), np.diff(gained[complete], axis=0), numbered, recorded
     )
 
@@ -148,7 +148,7 @@ def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
     )
 
 
-def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
+def _rig(motion: _Stretches, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
     """Rates against angles: gimbals of another order or with other signs, exchanged or reversed rates."""
     noise = 2.0 * settings.noise.encoder
     turned = motion.turned(settings.world)
@@ -191,12 +191,12 @@ def _fitting(pair: _Pair, hypotheses: Iterable[Hypothesis[_Pair]]) -> Finding | 
     return next((fit.finding for fit in fits if fit.case.misfit < LIMITS.rough_fit), None)
 
 
-def _other_angles(motion: _Motion, settings: SelfcalSettings) -> Iterator[Hypothesis[_Pair]]:
+def _other_angles(motion: _Stretches, settings: SelfcalSettings) -> Iterator[Hypothesis[_Pair]]:
     """Gimbals of another order or with other signs, the fewest changes first; exchanged angles."""
     of_study, world = settings.gimbals, settings.world
     now = (*of_study.axes, *of_study.signs)
 
-    def hypothesis(code: str, text: str, moved: _Motion, rig: World) -> Hypothesis[_Pair]:
+    def hypothesis(code: str, text: str, moved: _Stretches, rig: World) -> Hypothesis[_Pair]:
         text = f"th: {text}"
         return Hypothesis(
             text, code, text, lambda pair, _: replace(pair, seen=moved.turned(rig)), harm=EVERYTHING

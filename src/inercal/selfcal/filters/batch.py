@@ -37,7 +37,7 @@ from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import broken
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.residuals import (
-    Readings,
+    Measurements,
     Sensed,
     batch_result,
     first_reading,
@@ -107,7 +107,7 @@ def estimate_map(
 
 
 def _first_guess(
-    recording: Recording, problem: FilterProblem, measured: Readings, start: Start | None
+    recording: Recording, problem: FilterProblem, measured: Measurements, start: Start | None
 ) -> tuple[Array, Array]:
     """Attitudes (n, 4) and coefficients (p,) to begin with: the encoders', carried by the commands where silent."""
     seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
@@ -147,7 +147,7 @@ def _terms(
     c: Array,
     recording: Recording,
     problem: FilterProblem,
-    measured: Readings,
+    measured: Measurements,
     start: Start,
     loose: Sequence[int] = (),
 ) -> _Terms:
@@ -179,7 +179,7 @@ def _terms(
     )
 
 
-class _Step(NamedTuple):
+class _GaussNewtonStep(NamedTuple):
     """A step of Gauss-Newton: of ``attitudes`` (n, 3) [rad] and ``coefficients`` (p,), over their prior; with the
     ``covariance`` (p, p) of these and standard deviations ``attitude_u`` (n, 3) [rad], or (0, 3)."""
 
@@ -189,7 +189,7 @@ class _Step(NamedTuple):
     attitude_u: Array
 
 
-def _step(terms: _Terms, attitude_u: bool) -> _Step:
+def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     """Solve the normal equations of all terms."""
     from scipy.linalg import cho_solve_banded, cholesky_banded
 
@@ -232,10 +232,12 @@ def _step(terms: _Terms, attitude_u: bool) -> _Step:
         variance = np.empty(3 * n)
         inverse_diagonal(factor, variance)
         variance += np.einsum("ki,ij,kj->k", by_coefficients, covariance, by_coefficients, optimize=True)
-    return _Step(attitudes.reshape(n, 3), coefficients, covariance, np.sqrt(variance).reshape(-1, 3))
+    return _GaussNewtonStep(
+        attitudes.reshape(n, 3), coefficients, covariance, np.sqrt(variance).reshape(-1, 3)
+    )
 
 
-def _per_row(terms: _Terms, measured: Readings) -> Array:
+def _per_row(terms: _Terms, measured: Measurements) -> Array:
     """Squared residuals of each measured row, of the steps since the one before, and a share of those of the prior."""
     total = np.cumsum(np.sum(terms.sensed.residual**2, axis=1) + np.sum(terms.process**2, axis=1))
     nis, rows = np.full(len(total), np.nan), np.flatnonzero(measured.dims)

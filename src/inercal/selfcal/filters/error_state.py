@@ -18,7 +18,7 @@ from inercal.arrays import Array
 from inercal.estimate.kalman import empty_row, innovation_variance, scalar_update
 from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
-from inercal.selfcal.filters.problem import FilterProblem, Model, Start, admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.selfcal.platform.linearised import (
     WIDEST,
@@ -69,7 +69,7 @@ def corrected(q: Quaternion, c: Array, x: Array) -> Quaternion:
 
 
 @kernel
-def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
+def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> float:
     """The loop; returns the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate = model

@@ -13,6 +13,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion
 from inercal.geometry.rotations import multiply
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.kinematics import attitude
@@ -161,7 +162,7 @@ class FilterResult:
         Of a recursive filter, at the end, with the joint covariance of attitude and coefficients.
     """
 
-    kind: str
+    kind: FilterKind
     coefficients: Array
     covariance: Array
     attitude: Array

@@ -22,10 +22,11 @@ from inercal.estimate.factor import FACTORS
 from inercal.estimate.kalman import Row, scalar_update
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize, rotate
+from inercal.selfcal.estimators import FACTOR_OF
 from inercal.selfcal.filters.error_state import corrected
 from inercal.selfcal.filters.error_state import initial as initial
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
-from inercal.selfcal.filters.problem import FilterProblem, Model, admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.selfcal.platform.linearised import encoder_roots
 from inercal.selfcal.platform.model import (
@@ -37,7 +38,6 @@ from inercal.selfcal.platform.model import (
 )
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.settings import FACTOR_OF
 
 WIDE = 3.0
 """Length [rad] beyond which a deviation may be more than half a turn, where a logarithm is not what it came from."""
@@ -117,7 +117,7 @@ def _read(q: Quaternion, c: Array, up: Array, columns: Array, shifted: Array, z:
 
 @kernel
 def _advance(
-    state: State, model: Model, factor: int, steps: Steps, out: Estimates
+    state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th

@@ -85,7 +85,7 @@ class NoiseLevels(NamedTuple):
     encoder: float
 
 
-class Model(NamedTuple):
+class FilterModel(NamedTuple):
     """The platform as kernels take it."""
 
     world: World
@@ -103,11 +103,11 @@ class FilterProblem:
     filter: Filter = field(default_factory=Filter)
 
     @cached_property
-    def model(self) -> Model:
+    def model(self) -> FilterModel:
         """World, noise and near-level gate, for kernels."""
         noise = self.noise
         levels = NoiseLevels(float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder))
-        return Model(self.world, levels, gate_of(self.filter.gating))
+        return FilterModel(self.world, levels, gate_of(self.filter.gating))
 
 
 def problem(settings: SelfcalSettings) -> FilterProblem:

@@ -26,6 +26,7 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.limits import LIMITS
@@ -35,7 +36,7 @@ from inercal.selfcal.platform.rig import World
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class Measurements:
     """Measurements of m rows, of which those missing or stopped by the near-level gate weigh nothing.
 
     Attributes
@@ -62,7 +63,7 @@ class Readings:
         return np.asarray(np.count_nonzero(self.used, axis=1))
 
 
-def readings(recording: Recording, problem: FilterProblem) -> Readings:
+def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     """The measurements of all rows but the first."""
     acc, th = recording.acc[1:], recording.th[1:]
     seen = np.all(np.isfinite(th), axis=1)
@@ -72,7 +73,7 @@ def readings(recording: Recording, problem: FilterProblem) -> Readings:
         used &= _gate(attitude, seen, problem)
     covariance = joints @ np.swapaxes(joints, 1, 2) + LIMITS.encoder_floor**2 * np.eye(3)
     root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
-    return Readings(
+    return Measurements(
         np.where(used[:, :3], acc, 0.0),
         used[:, :3] / problem.noise.accelerometer,
         attitude,
@@ -108,7 +109,7 @@ def _gate(attitude: Array, seen: NDArray[np.bool_], problem: FilterProblem) -> N
     return passed
 
 
-def normalised(residual: Array, measured: Readings, attitude_variance: Array | float = 0.0) -> Array:
+def normalised(residual: Array, measured: Measurements, attitude_variance: Array | float = 0.0) -> Array:
     """Residuals (m, 6), whitened, each over its own standard deviation instead; NaN where not measured.
 
     ``attitude_variance`` (m, 1) [rad^2] is added to that of the encoders' attitude about each axis.
@@ -119,9 +120,9 @@ def normalised(residual: Array, measured: Readings, attitude_variance: Array | f
 
 
 def batch_result(
-    kind: str,
+    kind: FilterKind,
     recording: Recording,
-    measured: Readings,
+    measured: Measurements,
     path: tuple[Array, Array],
     coefficients: tuple[Array, Array],
     nis: Array,
@@ -188,7 +189,7 @@ class Sensed(NamedTuple):
     by_coefficients: Array
 
 
-def sensed(q: Array, c: Array, measured: Readings, world: World) -> Sensed:
+def sensed(q: Array, c: Array, measured: Measurements, world: World) -> Sensed:
     """Compare measurements with attitudes (m, 4) and coefficients (p,)."""
     base = on_base(c, world)
     back = conjugate(q)

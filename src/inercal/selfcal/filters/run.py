@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy as np
 
 from inercal.estimate.factor import NEGATIVE
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters import error_state, gimbal, multiplicative, quaternion
 from inercal.selfcal.filters.batch import estimate_map
 from inercal.selfcal.filters.filter_result import (
@@ -25,7 +26,6 @@ from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.start import estimate_lm
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording, Steps
-from inercal.selfcal.settings import FilterKind
 
 _LOADED = set[FilterKind]()
 """Recursive filters whose kernels this process has; their types do not depend on the problem."""

@@ -40,7 +40,7 @@ from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import broken
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.residuals import (
-    Readings,
+    Measurements,
     Sensed,
     batch_result,
     first_reading,
@@ -106,7 +106,7 @@ def rough_path(recording: Recording, problem: FilterProblem, start: Start) -> tu
     return at.q, at.c
 
 
-def wahba(recording: Recording, problem: FilterProblem, measured: Readings, start: Start) -> Array:
+def wahba(recording: Recording, problem: FilterProblem, measured: Measurements, start: Start) -> Array:
     """First attitude (4,) from measurements as they are, in closed form.
 
     Turned back to the first row by the commanded rates, specific forces a_k are C^T u_k, with u_k the vertical as earth
@@ -153,7 +153,7 @@ class _Along(NamedTuple):
 
 
 def _along(
-    x: Array, guess: Array, recording: Recording, problem: FilterProblem, measured: Readings
+    x: Array, guess: Array, recording: Recording, problem: FilterProblem, measured: Measurements
 ) -> _Along:
     """The path of unknowns x (3 + p,): rotation vector [rad] from ``guess``, coefficients over their prior."""
     c, since = problem.prior * x[3:], recording.t - recording.t[0]
@@ -177,7 +177,7 @@ def _along(
 
 
 def _fit(
-    recording: Recording, problem: FilterProblem, measured: Readings, start: Start
+    recording: Recording, problem: FilterProblem, measured: Measurements, start: Start
 ) -> tuple[NonlinearFit, _Along]:
     """Fit the unknowns of `_along`, from those of `wahba`, to the start, the prior and the measurements."""
     guess, size = wahba(recording, problem, measured, start), 3 + len(problem.prior)
