@@ -158,7 +158,7 @@ WITHIN = {
         "figures"
     ),
     "selfcal": (
-        "limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"
+        "estimators limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"
     ),
 }
 

@@ -11,7 +11,8 @@ from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.errors import StudyError
-from inercal.selfcal.platform.plan import MOST_ROWS, JointName, Move, Plan, Rest, Turn, path
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.plan import JointName, Move, Plan, Rest, Turn, path
 from inercal.studies.fields import Duration, QuantityText, Several, SeveralTexts, positive, refusal
 from inercal.studies.rig import Limits
 from inercal.units import Quantity, shown
@@ -118,9 +119,10 @@ def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
         x, y, z = table.start.values
         plan = replace(plan, start=(x, y, z))
     rows = plan.duration / plan.step
-    if not FEWEST <= rows <= MOST_ROWS:
+    if not FEWEST <= rows <= LIMITS.most_rows:
         raise StudyError(
-            where, f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {MOST_ROWS:,}"
+            where,
+            f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {LIMITS.most_rows:,}",
         )
     if beyond := plan.beyond(limits):
         low, high = limits[beyond[0]]
