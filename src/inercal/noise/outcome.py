@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
@@ -87,6 +87,7 @@ class ChannelNoise:
         return self.curve.lower[:, self.at], self.curve.upper[:, self.at]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Noise:
     """The ``estimate`` and what it was made from."""

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
 from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
 from inercal.selfcal.platform.coefficients import NAMES
@@ -114,6 +114,7 @@ class Search:
     seed: int = option("of the random starts", 1, least=0)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class SelfcalSettings:
     """A study of self-calibration, in SI.

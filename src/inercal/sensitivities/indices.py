@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 
 SINGULAR = 0.99
 """Sum of the first-order indices below which a position is flagged: interactions rule there."""
@@ -23,6 +23,7 @@ class VarianceParts(NamedTuple):
     interaction: Array
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Indices:
     """Variances of outputs and their parts, at each position of a rig.
