@@ -123,6 +123,7 @@ def test_a_result_goes_on(kind, found, tmp_path):
     assert page.read_text("utf-8").lower().startswith("<!doctype html>")
     again = ic.load(result.save(tmp_path / "result.json"))
     assert again.values == result.values
+    assert again.view.shown.units == result.view.shown.units
     assert again.status is result.status
     assert len(repr(again).splitlines()) == 3
     assert again.report(tmp_path / "again.html").exists()
