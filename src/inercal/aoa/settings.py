@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
 from inercal.geometry.site import Site
 from inercal.keys import (
@@ -359,6 +359,7 @@ class Disturbances:
     dropouts: float = quantity("part of the rows that are empty", "number", "0", example="1 %", bounds=PART)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class AoaSettings:
     """A study of inertial angle of attack, in SI.

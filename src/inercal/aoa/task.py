@@ -28,11 +28,13 @@ from inercal.aoa.result.points import Point, points
 from inercal.aoa.result.systematic import by_fusion, by_methods
 from inercal.aoa.result.verification import Errors, errors
 from inercal.aoa.settings import AoaSettings, Methods
+from inercal.arrays import short_repr
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """An ``estimate``, and the data behind it for files and pictures.

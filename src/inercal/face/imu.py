@@ -90,5 +90,11 @@ def loaded(estimate: Estimate) -> Result:
         pictures += [budget(shown)] if estimate.names and estimate.budget else []
         return render(shown, pictures, f"inercal {estimate.command}")
 
-    shown = estimate.shown()
+    if "output_unit" in estimate.conditions:  # of a turntable
+        from inercal.turntable.display import displayed
+        from inercal.units import parse_unit
+
+        shown = displayed(estimate, parse_unit(estimate.conditions["output_unit"]))
+    else:
+        shown = estimate.shown()
     return Result(estimate, of_coefficients(shown, page))

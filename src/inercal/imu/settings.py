@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
 from inercal.keys import RELATIVE_U, TIME, Bounds, option, quantity, within
 from inercal.rigs.chain import Chain
@@ -75,6 +75,7 @@ class AidedSettings:
     azimuth_u: float | None = None
 
 
+@short_repr
 @dataclass(frozen=True)
 class ImuSettings:
     """Settings of a calibration, in SI.

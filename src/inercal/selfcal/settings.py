@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
 from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
 from inercal.selfcal.estimators import FactorKind, FilterKind
@@ -103,6 +103,7 @@ class Search:
     seed: int = option("of the random starts", 1, least=0)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class SelfcalSettings:
     """A study of self-calibration, in SI.

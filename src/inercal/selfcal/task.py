@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
 from inercal.estimate.table import Table
@@ -33,6 +33,7 @@ from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import SelfcalSettings
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """An ``estimate``, and the evidence behind it: ``settings`` of the study, results of other estimators that it was

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 
 SINGULAR = 0.99
 """Sum of the first-order indices below which a position is flagged: interactions rule there."""
 
 
+class VarianceParts(NamedTuple):
+    """Variance and bias (o, n) of each output, V_i and VT_i - V_i (o, n, k) of each error."""
+
+    variance: Array
+    bias: Array
+    first: Array
+    interaction: Array
+
+
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Indices:
     """Variances of outputs and their parts, at each position of a rig.

@@ -76,8 +76,13 @@ def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
     changed = dict(result)
     if "noise" in changed:
         changed["noise"] = [
-            row | {key: row[key] / unit.factor for key in ("noise", "within_dwells")} | {"unit": unit.symbol}
-            for row in changed["noise"]
+            row
+            | {
+                key: None if row[key] is None else row[key] / unit.factor
+                for key in ("noise", "within_dwells")
+            }
+            | {"unit": unit.symbol}
+            for row in changed["noise"]  # of a file None where it was not known
         ]
     if "table_errors" in changed:
         changed["table_errors"] = [

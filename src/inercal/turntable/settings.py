@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from inercal.arrays import short_repr
 from inercal.geometry.site import Site
 from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity
 from inercal.rigs.chain import Chain
@@ -123,6 +124,7 @@ class RateTest:
     at: Mapping[str, float] = field(default_factory=dict)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class TurntableSettings:
     """A study of a turntable, in SI.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import Finding, Status
 from inercal.imu.aided.blocks import Blocks, cut
@@ -27,6 +27,7 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class AidedCalibration:
     """An ``estimate``, the table's ``motion`` and ``rests`` (k, 2) [s], and the ``fit`` if there is one."""

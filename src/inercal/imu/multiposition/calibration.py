@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding
 from inercal.imu.limits import LIMITS
@@ -28,6 +28,7 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 
 
+@short_repr
 @dataclass(frozen=True)
 class MultipositionCalibration:
     """An ``estimate`` and, where the fit came that far, the evidence behind it for pictures and tests."""

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import short_repr
 from inercal.findings import Finding
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
 from inercal.selfcal.before.observability import Observability, observability
@@ -36,6 +37,7 @@ class ComparedPath:
     beyond: tuple[str, ...]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Designed:
     """A path that was searched for.

@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.selfcal.platform.rig import JOINTS, World
 
 JointName = Literal["x", "y", "z"]
@@ -38,6 +38,7 @@ class Rest:
 Move: TypeAlias = Turn | Rest
 
 
+@short_repr
 @dataclass(frozen=True)
 class Plan:
     """Moves one after the other from the angles ``start`` [rad], with rows every ``step`` [s].

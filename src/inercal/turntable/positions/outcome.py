@@ -330,7 +330,8 @@ def _conditions(record: Record, readings: Readings, settings: TurntableSettings)
             readings.channels, readings.y.min(axis=0).tolist(), readings.y.max(axis=0).tolist(), strict=True
         )
     }
-    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
+    unit = readings.unit.symbol
+    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=unit)
 
 
 def _plan(readings: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:

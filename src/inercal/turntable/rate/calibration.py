@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inercal.arrays import short_repr
 from inercal.errors import StudyError
 from inercal.estimate.identifiability import in_words
 from inercal.estimate.result import Estimate
@@ -22,6 +23,7 @@ from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwe
 from inercal.turntable.settings import TurntableSettings
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class RateCalibration:
     """An ``estimate``, and the evidence behind it: stays, inputs and fits of the gyros that took part."""

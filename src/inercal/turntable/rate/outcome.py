@@ -220,5 +220,6 @@ def _shares(
 def _basis(record: Record, dwells: RateDwells, settings: TurntableSettings) -> Basis:
     """The basis of every estimate of a rate test."""
     ranges = {"rate_rad_s": [float(dwells.rate.min()), float(dwells.rate.max())]}
-    conditions = conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
+    unit = dwells.unit.symbol
+    conditions = conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=unit)
     return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
 from inercal.records.places import counted
 from inercal.rigs.outputs import table_outputs
@@ -39,6 +39,7 @@ _BY_METHOD = {
 """Publications behind each method."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Analysed:
     """A sensitivity analysis: ``indices`` at each position, and averages over them.
