@@ -155,10 +155,14 @@ COMMANDS = {
     ("apply", ""): (
         "inercal.cli.apply:apply",
         "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv, "
-        ".npz, .h5, .parquet or .nc). A self-calibration makes of wanted rates (wc) commands that turn the platform "
-        "so, and corrects its gyros and accelerometers, all in the units of the recording. With --invert the recording "
-        "holds true values and the outputs of the instrument are written. With --stream CSV lines come in on standard "
-        "input and corrected ones go out, each at once.",
+        ".npz, .h5, .parquet or .nc). Of an instrument that was calibrated on a turntable the drift is compensated by "
+        "the specific force (acc_x acc_y acc_z) or the angles of the table, and the rate left is rate_x, rate_y; a "
+        "temperature model goes by the temperature of each sample. A self-calibration makes of wanted rates (wc) "
+        "commands that turn the platform so, and corrects its gyros and accelerometers, all in the units of the "
+        "recording. With --uncertainty the standard uncertainty of each value, by that of the coefficients, stands in "
+        "a column u_acc_x, u_rate_x, ... With --invert the recording holds true values and the outputs of the "
+        "instrument are written. With --stream CSV lines come in on standard input and corrected ones go out, each at "
+        "once.",
         "inercal apply cal.json log.csv --out corrected.csv",
     ),
     ("compare", ""): (
