@@ -124,9 +124,17 @@ COMMANDS = {
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",
         "Simulate a test on a turntable, with the errors of the table and the noise of the instrument.\n\nThe study "
-        "states the true coefficients under [instrument.coefficients]. The recording goes to --out (.csv, "
-        ".npz, .h5, .parquet or .nc).",
+        "states the true coefficients under [instrument.coefficients], and under [disturbances] what real tests add. "
+        "The recording goes to --out (.csv, .npz, .h5, .parquet or .nc).",
         "inercal simulate turntable turntable.toml --seed 1 --out test.csv",
+    ),
+    ("simulate", "imu"): (
+        "inercal.cli.simulate:simulate_imu",
+        "Simulate an IMU that is held by hand in many poses, as the method multiposition calibrates it.\n\nThe study "
+        "states poses, noise and true coefficients under [simulation] (coefficients that are absent are drawn, as of a "
+        "consumer-grade unit with outputs in counts), and under [disturbances] what real recordings add. The recording "
+        "goes to --out (.csv, .npz, .h5, .parquet or .nc).",
+        "inercal simulate imu imu.toml --seed 1 --out log.csv",
     ),
     ("simulate", "selfcal"): (
         "inercal.cli.simulate:simulate_selfcal",
