@@ -85,8 +85,8 @@ STUDY = '[site]\ngravity = "9.81 m/s^2"\nlatitude = "50 deg"\n'
 def test_a_study_states_course_truth_and_disturbances(tmp_path):
     path = tmp_path / "imu.toml"
     path.write_text(
-        STUDY
-        + '[simulation]\nposes = 5\nstart = "6 s"\nsample_rate = "50 Hz"\n[simulation.coefficients]\nK1_x = "4000 count/g"\nM_xy = "1 deg"\n'
+        STUDY + '[simulation]\nposes = 5\nstart = "6 s"\nsample_rate = "50 Hz"\n'
+        '[simulation.coefficients]\nK1_x = "4000 count/g"\nM_xy = "1 deg"\n'
         '[disturbances]\nclock = "1 %"\nk2 = "30 ug/g^2"\n'
     )
     of = load_imu_study(path)
