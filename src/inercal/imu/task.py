@@ -1,4 +1,4 @@
-"""Calibration of an IMU by whichever method the settings ask for: a recording in, an estimate out."""
+"""The tasks of an IMU study: a calibration by the method it asks for, a simulated recording."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from inercal.errors import StudyError
 from inercal.findings import Finding
 from inercal.imu.settings import AidedSettings, FerrarisSettings, ImuSettings
 from inercal.records.record import Record
@@ -72,3 +75,42 @@ def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
     )
     findings = (*calibration.estimate.findings, Finding("stated_exact", text))
     return replace(calibration, estimate=replace(calibration.estimate, findings=findings))
+
+
+def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
+    """A simulated record of the study: an IMU held by hand in one pose after the other.
+
+    Coefficients that the study does not state are drawn.
+
+    Raises
+    ------
+    StudyError
+        Another method than multi-position, or no latitude for the earth rate.
+    """
+    from inercal.imu.simulate import Noise, draw_truth, hand_poses, with_values
+    from inercal.imu.simulate import simulate as simulate_poses
+
+    if settings.method is not None:
+        raise StudyError("imu.method", 'found another method, expected "multiposition" for a simulation')
+    if settings.site.latitude is None:
+        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
+    of, site = settings.simulation, settings.site
+    truth = replace(
+        with_values(draw_truth(rng), of.coefficients),
+        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
+        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
+    )
+    record, _ = simulate_poses(
+        truth,
+        hand_poses(rng, of.poses),
+        site.gravity,
+        settings.site.latitude,
+        rng,
+        rate=of.sample_rate,
+        start=of.start,
+        hold=of.hold,
+        turn=of.turning,
+        clock=1.0 + settings.disturbances.clock,
+        disturbances=settings.disturbances,
+    )
+    return record

@@ -21,6 +21,7 @@ from inercal.studies.common import (
     Version,
     site_on_earth,
 )
+from inercal.studies.disturbances import TableDisturbancesTable, disturbances_of
 from inercal.studies.instrument import InstrumentTable, instrument_of
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
@@ -106,6 +107,11 @@ class TurntableStudyFile(Strict):
     rate_test: RateTestTable | None = Field(
         default=None, title="Rate test", description="a rate test; none if absent"
     )
+    disturbances: TableDisturbancesTable = Field(
+        default=TableDisturbancesTable(),
+        title="Disturbances",
+        description="what a simulation adds to the model",
+    )
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -119,6 +125,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
     site = site_on_earth(file.site, path, "table")
     chain = chain_of(file.rig, path)
     limits = limits_of(file.rig, chain, path)
+    instrument = instrument_of(file.instrument, site.gravity, path)
     return TurntableSettings(
         site=site,
         rig=file.rig.kind,
@@ -126,9 +133,10 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         plan=plan_of(file.positions, chain, limits, path),
         design=_design(file.design, chain, limits, path),
         analysis=_analysis(file.analysis, path),
-        instrument=instrument_of(file.instrument, site.gravity, path),
+        instrument=instrument,
         limits=limits,
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
+        disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),

@@ -22,6 +22,7 @@ from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
+from inercal.turntable.positions.application import in_use
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
@@ -147,7 +148,8 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         statistics=_statistics(readings, fitting, result["plan"]["condition"]),
         result=result
         | _shares(fit, terms)
-        | {"table_errors": _table_errors(fit), "noise": _noise(readings, fit, unit)},
+        | {"table_errors": _table_errors(fit), "noise": _noise(readings, fit, unit)}
+        | in_use(fit, terms.slope, settings, unit),
     )
 
 

@@ -87,6 +87,7 @@ def assemble(
             "plan": _plan(dwells, test, full_scale),
             "tolerance_shares": _shares(settings, names, found_sources),
             "instrument": settings.instrument.kind,
+            "unit": {"gyro": unit},
             "rates": [
                 row
                 for given, fit in zip(inputs, fits, strict=True)

@@ -10,6 +10,7 @@ from inercal.instruments.by_angle import channel_model
 from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.rigs.outputs import gravity_reference, rate_reference
+from inercal.turntable.disturbances import displaced, disturbed
 from inercal.turntable.model import channels_of, stated_values
 from inercal.turntable.rate.calibration import check_rate_test
 from inercal.turntable.rate.fit import approaches
@@ -47,8 +48,18 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
         raise StudyError("rate_test.rates", 'missing, expected rates such as ["-10 deg/s", "10 deg/s"]')
     if any(symbol.startswith("S_nl") for symbol in instrument.coefficients):
         raise StudyError("instrument.coefficients", "S_nl is not stated but follows, expected S2 or S3")
+    other = settings.disturbances
+    alien = [
+        key for key in ("angle", "harmonics", "magnetic", "dead_zone", "hysteresis") if getattr(other, key)
+    ]
+    if alien:
+        raise StudyError(
+            f"disturbances.{alien[0]}", "found in a study of a rate test, expected one of positions"
+        )
+    chain = displaced(chain, other)
     rate = np.array(test.rates)
     n = len(rate)
+    t = np.asarray(instrument.dwell * (np.arange(n) + 0.5))
     angles = np.tile([test.at.get(joint, 0.0) for joint in chain.joints], (n, 1))
     turning = chain.joints.index(test.joint)
     errors = chain.draw(rng, n)
@@ -73,6 +84,8 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
         linear = model.linear(values)
         y.append(model.regressors(f, w) @ linear + linear[model.symbols.index(f"S_{axis}")] * bent)
     outputs: Array = np.stack(y, axis=-1)
+    bias = np.array([instrument.coefficients.get(f"D_F_{channel[-1]}", 0.0) for channel in channels])
+    outputs = disturbed(outputs, bias, t, other, rng)
     if instrument.noise is not None:
         outputs = outputs + rng.normal(0.0, instrument.noise, outputs.shape)
     degrees = parse_unit("deg")
@@ -86,5 +99,5 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
                 for k, channel in enumerate(channels)
             ),
         ],
-        np.asarray(instrument.dwell * (np.arange(n) + 0.5)),
+        t,
     )
