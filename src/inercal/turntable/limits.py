@@ -35,6 +35,9 @@ class Limits:
     turning_cosine: float = 0.1
     """Cosine of turning axis and gyro axis below which a gyro takes no part in a rate test."""
 
+    scatter_dof: int = 3
+    """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""
+
     scale_sigmas: float = 5.0
     """Scale factor, over its standard uncertainty, below which an output does not follow the rate."""
 
