@@ -26,7 +26,7 @@ READ_A_RECORD = {
 }
 READ_A_STUDY = {
     *("calibrate imu", "calibrate turntable", "selfcal", "aoa", "sensitivity", "design positions"),
-    *("design selfcal", "simulate turntable", "simulate selfcal", "simulate aoa"),
+    *("design tolerances", "design selfcal", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor"}
 TEMPLATES = {

@@ -25,6 +25,7 @@ from inercal.studies.instrument import InstrumentTable, instrument_of
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
 from inercal.studies.tables import as_typed, settings_of, table_of
+from inercal.studies.tolerances import CostsTable, WantedTable, tolerances_of
 from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
 
 OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
@@ -106,6 +107,10 @@ class TurntableStudyFile(Strict):
     rate_test: RateTestTable | None = Field(
         default=None, title="Rate test", description="a rate test; none if absent"
     )
+    goal: WantedTable = Field(default=WantedTable(), title="Goal", description="wanted uncertainties")
+    cost: CostsTable = Field(
+        default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
+    )
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -119,6 +124,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
     site = site_on_earth(file.site, path, "table")
     chain = chain_of(file.rig, path)
     limits = limits_of(file.rig, chain, path)
+    instrument = instrument_of(file.instrument, site.gravity, path)
     return TurntableSettings(
         site=site,
         rig=file.rig.kind,
@@ -126,9 +132,10 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         plan=plan_of(file.positions, chain, limits, path),
         design=_design(file.design, chain, limits, path),
         analysis=_analysis(file.analysis, path),
-        instrument=instrument_of(file.instrument, site.gravity, path),
+        instrument=instrument,
         limits=limits,
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
+        tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),

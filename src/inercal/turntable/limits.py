@@ -29,6 +29,9 @@ class Limits:
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
 
+    most_repeats: int = 24
+    """Times that a plan is taken, at most, where a search for tolerances may repeat it."""
+
     same_rate: float = 1e-3
     """Relative difference below which two rates are one rate."""
 
