@@ -26,7 +26,8 @@ READ_A_RECORD = {
 }
 READ_A_STUDY = {
     *("calibrate imu", "calibrate turntable", "selfcal", "aoa", "sensitivity", "design positions"),
-    *("design selfcal", "simulate imu", "simulate turntable", "simulate selfcal", "simulate aoa"),
+    *("design tolerances", "design selfcal"),
+    *("simulate imu", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor"}
 TEMPLATES = {

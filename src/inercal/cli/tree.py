@@ -113,6 +113,13 @@ COMMANDS = {
         "field.\n\n--out writes the positions (.csv) or the whole result (.json), --report a page with pictures.",
         "inercal design positions turntable.toml --out positions.csv",
     ),
+    ("design", "tolerances"): (
+        "inercal.cli.design:design_tolerances",
+        "Find the cheapest tolerances of a turntable, and the plan, that reach wanted uncertainties.\n\nThe study "
+        "states the goals under [goal] and what tolerances cost under [cost]. --out writes the tolerances and "
+        "positions as tables of a study (.toml) or the whole result (.json), --report a page with pictures.",
+        "inercal design tolerances turntable.toml --out tolerances.toml",
+    ),
     ("design", "selfcal"): (
         "inercal.cli.design:design_selfcal",
         "Find the path on which a platform calibrates itself best, and compare it with others of the same "

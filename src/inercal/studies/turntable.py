@@ -26,6 +26,7 @@ from inercal.studies.instrument import InstrumentTable, instrument_of
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
 from inercal.studies.tables import as_typed, settings_of, table_of
+from inercal.studies.tolerances import CostsTable, WantedTable, tolerances_of
 from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
 
 OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
@@ -112,6 +113,10 @@ class TurntableStudyFile(Strict):
         title="Disturbances",
         description="what a simulation adds to the model",
     )
+    goal: WantedTable = Field(default=WantedTable(), title="Goal", description="wanted uncertainties")
+    cost: CostsTable = Field(
+        default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
+    )
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -137,6 +142,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         limits=limits,
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
         disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
+        tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),

@@ -29,11 +29,17 @@ class Limits:
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
 
+    most_repeats: int = 24
+    """Times that a plan is taken, at most, where a search for tolerances may repeat it."""
+
     same_rate: float = 1e-3
     """Relative difference below which two rates are one rate."""
 
     turning_cosine: float = 0.1
     """Cosine of turning axis and gyro axis below which a gyro takes no part in a rate test."""
+
+    scatter_dof: int = 3
+    """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""
 
     scale_sigmas: float = 5.0
     """Scale factor, over its standard uncertainty, below which an output does not follow the rate."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from inercal.arrays import short_repr
+from inercal.designs.tolerances import Price
 from inercal.geometry.site import Site
 from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity, within
 from inercal.rigs.chain import Chain
@@ -103,6 +104,26 @@ class Design:
 
 
 @dataclass(frozen=True)
+class Cost:
+    """The cost of a tolerance: of the size that the study states, and its growth as the tolerance is tightened."""
+
+    cost: float = option("relative cost of the size that the study states", 1.0, least=1e-6)
+    exponent: float = option("power of the inverse size that the cost goes with", 1.0, least=0.01, most=10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """The search for tolerances: wanted u by symbol of a coefficient, or ``drift``, in SI; the price of each error.
+
+    ``drift`` is the rms u of the predicted output over all directions of gravity.
+    """
+
+    goal: Mapping[str, float] = field(default_factory=dict)
+    prices: Mapping[str, Price] = field(default_factory=dict)
+    position: float = option("cost of taking one position, in the same unit", 0.0, least=0.0)
+
+
+@dataclass(frozen=True)
 class RateTest:
     """A rate test of gyros: the table turns at each rate in turn, by whole turns or not.
 
@@ -180,8 +201,8 @@ class TurntableSettings:
         Positions to analyse, simulate or calibrate at.
     limits : mapping
         Allowed range (low, high) [rad] of a joint by its name.
-    design : Design
-        Settings of a search for positions.
+    design, tolerances
+        Settings of a search for positions, and of one for tolerances.
     disturbances : Disturbances
         Of a simulation.
     traceability, temperature, given
@@ -198,6 +219,7 @@ class TurntableSettings:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rate_test: RateTest | None = None
     disturbances: Disturbances = Disturbances()
+    tolerances: Tolerances = Tolerances()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

@@ -18,6 +18,7 @@ from inercal.records.record import Record
 from inercal.turntable.display import displayed
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
+from inercal.turntable.rate.linearity import SEED
 from inercal.turntable.rate.outcome import assemble, unobservable
 from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwells, turning_axis
 from inercal.turntable.settings import TurntableSettings
@@ -120,6 +121,7 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             test.order,
             asymmetry,
             full_scale,
+            np.random.default_rng(SEED),
         )
         for channel, given in zip(taken, inputs, strict=True)
     )
