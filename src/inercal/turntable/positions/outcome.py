@@ -86,7 +86,7 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(
-            TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
+            TypeB(error.source, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
         )
     beside, columns = fit.model.beside(fit.angles, fit.c)
     for each, column in zip(beside, np.moveaxis(columns, -1, 0), strict=True):
@@ -100,7 +100,8 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     """Put the estimate together."""
     unit = readings.unit.si
     model, conditions = MODELS[settings.instrument.kind], _conditions(record, readings, settings)
-    basis = studied(COMMAND, settings, record.sources, model, REFERENCES, conditions)
+    sources_read = (*record.sources, *settings.chain.sources)
+    basis = studied(COMMAND, settings, sources_read, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
     rank, terms_asked = worst_rank(fitting.identified)
     result: dict[str, Any] = {
