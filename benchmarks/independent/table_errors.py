@@ -71,7 +71,7 @@ CASES: dict[str, dict[str, Any]] = {
     },
     # squares of large errors against a small noise [ug]
     "large": {
-        "positions": GRID,
+        "positions": TUMBLE,
         "errors": {name: {"uniform": 600.0} for name, _, _ in TABLE if not name.startswith("phi")},
         "noise": 2.0,
         "instrument": "accelerometer",
@@ -189,7 +189,9 @@ def study(case: dict[str, Any], tables: dict[str, Any], folder: Path) -> str:
         keys += [f"harmonics = [{', '.join(harmonics)}]"] if harmonics else []
         lines.append(f"{name} = {{ {', '.join(keys)} }}")
     if case.get("instrument") == "accelerometer":
-        noise = f'kind = "accelerometer"\nnoise = "{case["noise"]} ug"\nunit = "m/s^2"'
+        terms = [f"{term}_{i}" for term in ("K0", "K1") for i in "xyz"]
+        terms += [f"M_{i}{j}" for i in "xyz" for j in "xyz" if i != j]
+        noise = f'kind = "accelerometer"\nterms = {terms!r}\nnoise = "{case["noise"]} ug"\nunit = "m/s^2"'
     else:
         earth_rate = "stated" if len(case["positions"]) % 24 == 0 else "fitted"
         noise = f'unit = "deg/h"\nnoise = "{case["noise"]} deg/h"\nearth_rate = "{earth_rate}"'
@@ -218,7 +220,7 @@ def one_test(case_name: str, seed: int, plain: dict[str, str] | None = None) -> 
         else:
             truth, y = wheel(rng, C)
             columns, head = (y + case["noise"] * rng.standard_normal(len(y)))[:, None], "y_x [deg/h]"
-            if len(phi) % 24 == 0:
+            if "stated" in text:
                 k = "\n".join(f"{s} = {truth[s]!r}" for s in ("k_x", "k_y", "k_z"))
                 text += f"[instrument.coefficients]\n{k.replace('np.float64(', '').replace(')', '')}\n"
         for old, new in (plain or {}).items():

@@ -123,9 +123,7 @@ def alternatives(fit: Regression, slope: Array) -> Alternatives:
     chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
 
     def u(changed: Chain) -> Array:
-        table = weights_of(
-            changed, fit.slopes, fit.angles, fit.beside, np.zeros_like(fit.noise), fit.samples
-        )
+        table = weights_of(changed, fit.slopes, fit.angles, fit.beside, np.zeros_like(fit.noise), fit.samples)
         noise = np.maximum(fit.noise, least_noise(table.within))
         weight = replace(table, within=table.within + np.diag(np.square(noise)))
         root = solve(rows, np.zeros_like(fit.residuals), weight).root
