@@ -53,7 +53,7 @@ def load(tmp_path):
             "site.latitude: found '120 deg', that is 2.0944 rad, expected a latitude",
         ),
         (HEAD.replace("two", "four"), "rig.kind: found 'four_axis_turntable', expected 'two_axis_turntable'"),
-        (HEAD + "speed = 1", "rig.speed: unknown key, known keys: kind, errors, base, limits"),
+        (HEAD + "speed = 1", "rig.speed: unknown key, known keys: kind, chain, errors, base, limits"),
         (HEAD + "[postions]", "postions: unknown key, did you mean positions?"),
         # errors of the table
         (
@@ -154,7 +154,7 @@ def load(tmp_path):
         (HEAD + "[positions]\nlist = []", "positions.list: found []"),
         (HEAD + '[positions]\nlist = [["0 deg"]]', "positions.list.0: found 1 angles, expected phi1, phi2"),
         (HEAD + "[positions]\nlist = [[0, 1]]", "positions.list.0.0: found '0' without a unit"),
-        (HEAD + "[positions]\ngrid = { phi1 = 36 }", "positions.grid.phi2: missing, expected a value"),
+        (HEAD + "[positions]\ngrid = { phi1 = 36 }", "positions.grid: found phi1, expected phi1, phi2"),
         (HEAD + "[positions]\ngrid = { phi1 = 0, phi2 = 1 }", "positions.grid.phi1: found 0"),
         (
             HEAD + "[positions]\ngrid = { phi1 = 9, phi2 = 9, phi3 = 9 }",

@@ -153,14 +153,11 @@ class Chain:
         """Files of measured errors."""
         return tuple(e.source for e in self.elements if isinstance(e, Known) and e.source is not None)
 
-    @property
-    def varies(self) -> bool:
-        """True if the size of an error, or a known error, follows an angle."""
-        return any(
-            bool(element.parts) if isinstance(element, Known) else element.pattern is not None
-            for element in self.elements
-            if isinstance(element, Known | Error)
-        )
+    @cached_property
+    def followed(self) -> tuple[int, ...]:
+        """Places of the joints whose angle a known error, or the size of an error, follows."""
+        pairs = zip(self.elements, self._joint_before, strict=True)
+        return tuple(sorted({joint for element, joint in pairs if _has_pattern(element)}))
 
     def sizes(self, angles: ArrayLike) -> Array:
         """Patterns (*batch, k) of the errors at ``angles`` (*batch, joints) [rad]; 1 where an error has none."""
@@ -278,12 +275,14 @@ class Chain:
         """
         angles, none = self._checked(angles, None)
         before = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
-        sizes, turned_parts = self.sizes(angles), []
+        sizes = self.sizes(angles)
+        turned_parts: list[tuple[Array, Array]] = []
         for element, value in self._values(angles, none):
             if isinstance(element, Error):
-                turn = np.zeros((3, 3)) if element.is_offset else skew(_UNIT[element.axis])
+                turn: Array = np.zeros((3, 3)) if element.is_offset else skew(_UNIT[element.axis])
                 # before K after, with C = before after
-                turned_parts.append((before @ turn * sizes[..., len(turned_parts), None, None], before))
+                size = sizes[..., len(turned_parts)][..., None, None]
+                turned_parts.append((before @ turn * size, before))
             else:
                 before = before @ _rotation(element, value)
         if not turned_parts:
@@ -325,9 +324,14 @@ class Chain:
 
 def follows_angle(element: Element) -> bool:
     """True if an element needs the angle of a joint: by a pattern, or by one value for each angle."""
+    return _has_pattern(element) or (isinstance(element, Error) and element.scope is Scope.ANGLE)
+
+
+def _has_pattern(element: Element) -> bool:
+    """True if an error is known over the angle of a joint, or has a size that follows it."""
     if isinstance(element, Known):
         return bool(element.parts)
-    return isinstance(element, Error) and (element.pattern is not None or element.scope is Scope.ANGLE)
+    return isinstance(element, Error) and element.pattern is not None
 
 
 _UNIT: dict[str, Array] = dict(zip("xyz", np.eye(3), strict=True))

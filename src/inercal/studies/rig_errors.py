@@ -193,7 +193,8 @@ def elements_of(table: NamedErrorTable, place: Place) -> list[Element]:
             place.where, f"{place.key}: found an error over angle before the first joint, expected a value"
         )
     made: list[Error] = []
-    value, parts, source = 0.0, [], None
+    value, source = 0.0, None
+    parts: list[tuple[float, Pattern]] = []
 
     def uncertain(
         name: str, u: float, what: str, pattern: Pattern | None = None, scope: Scope = Scope.RIG
@@ -272,13 +273,13 @@ def _read_table(name: str, place: Place) -> tuple[Array, Array, Array, Source]:
             row = []
         if len(row) != len(titles) or not all(map(math.isfinite, row)):
             raise StudyError(where, f"{key}, line {number}: found {shown(line)}, expected three numbers")
-        angle, error, u = (cell * factor for cell, factor in zip(row, factors, strict=True))
-        if u < 0.0 or abs(error) > LARGEST:
-            wrong = "u below zero" if u < 0.0 else "an error above 10 deg"
+        angle, error, own = (cell * factor for cell, factor in zip(row, factors, strict=True))
+        if own < 0.0 or abs(error) > LARGEST:
+            wrong = "u below zero" if own < 0.0 else "an error above 10 deg"
             raise StudyError(
                 where, f"{key}, line {number}: found {wrong}, expected an error within 10 deg and its u"
             )
-        rows.append((angle % (2.0 * math.pi), error, u))
+        rows.append((angle % (2.0 * math.pi), error, own))
     rows.sort()
     angles, errors, u = np.array(rows).reshape(-1, 3).T
     if len(rows) < 2 or np.any(np.diff(angles) < 1e-9):

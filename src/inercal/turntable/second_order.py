@@ -3,8 +3,8 @@
 To second order an error chi_k and an input of the site move a reading by ``J_k chi_k + H_kl chi_k chi_l / 2``. The
 squares have the mean ``H_kk s_k^2 / 2``, by which readings are corrected; about it, squares and products are
 uncorrelated with each other and, for symmetric distributions, with the errors themselves. Each is therefore one more
-error of the readings, with the standard deviation ``s_k s_l``, or ``s_k^2 sqrt(kurtosis - 1)`` for a square, and takes a
-new value where either of its two does.
+error of the readings, with the standard deviation ``s_k s_l``, or ``s_k^2 sqrt(kurtosis - 1)`` for a square, and takes
+a new value where either of its two does.
 """
 
 from __future__ import annotations
