@@ -150,7 +150,7 @@ def test_no_circles():
 WITHIN = {
     "imu": ("limits recording turns settings simulate multiposition ferraris aided temperature task figures"),
     "turntable": (
-        "limits settings model weights noise regression readings display sensitivity positions rate task "
+        "limits settings model weights second_order noise regression readings display sensitivity positions rate task "
         "figures"
     ),
     "aoa": (

@@ -181,7 +181,7 @@ class Place:
 
 
 def elements_of(table: NamedErrorTable, place: Place) -> list[Element]:
-    """What a study states of an error beside its distribution: what is known of it, and how well.
+    """Elements of an error beside its distribution: what is known of it, and how well.
 
     Raises
     ------

@@ -95,11 +95,14 @@ def _starting(kind: Kind, channels: Mapping[str, Unit | None]) -> dict[str, Any]
 
 
 def _hidden() -> str:
-    """Keys that a template leaves out: more sensors, and errors that a table of two axes does not have."""
+    """Keys that a template leaves out: more sensors, chains, and errors that a table of two axes does not have."""
     two, three = (
         {slot.name for slot in slots(kind)} for kind in ("two_axis_turntable", "three_axis_turntable")
     )
-    return rf"{_HIDDEN}|imu\.aided\.rig\.(errors|base|limits)|rig\.errors\.({'|'.join(sorted(three - two))})"
+    others = "|".join(sorted(three - two))
+    return (
+        rf"{_HIDDEN}|imu\.aided\.rig\.(errors|base|limits)|(imu\.aided\.)?rig\.chain|rig\.errors\.({others})"
+    )
 
 
 def _with_instrument(body: str, lines: str, given: Mapping[str, Any]) -> str:

@@ -44,7 +44,7 @@ class SecondOrder:
         )
 
     def shifts(self, gain: Array) -> tuple[Array, Array]:
-        """What it does to coefficients with ``gain`` (p, n, c): the mean (p,), and columns (p, s) of unit variance."""
+        """Shift of coefficients with ``gain`` (p, n, c): the mean (p,), and columns (p, s) of unit variance."""
         mean = np.einsum("pnc,nc->p", gain, self.mean)
         redrawn = np.einsum("pnc,ncq->pnq", gain, self.redrawn).reshape(len(gain), -1)
         return mean, np.hstack([redrawn, np.einsum("pnc,ncr->pr", gain, self.shared)])
