@@ -9,9 +9,12 @@ certificates, nothing of the truth. Results are kept in docs/uncertainty/turntab
 
 import argparse
 import math
+import os
 import tempfile
 from pathlib import Path
 from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

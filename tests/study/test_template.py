@@ -102,7 +102,8 @@ def keys_of(schema, path=""):
 
 @pytest.mark.parametrize("kind", READ)
 def test_every_key_is_there(kind):
-    """All but errors that a table of two axes does not have, chains, more sensors, and a second table of the same keys."""
+    """All but chains, errors that a table of two axes does not have, more sensors, and a second table of the same
+    keys."""
     shown = {f"{table}.{key}".lstrip(".") for table, _, key, _ in lines_of(template(kind))}
     known = set(keys_of(SCHEMA["$defs"][f"{kind.capitalize()}StudyFile"]))
     assert {key for key in shown - known if not key.startswith("instrument.coefficients.")} == set()

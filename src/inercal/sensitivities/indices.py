@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.rigs.chain import Chain
@@ -105,7 +106,7 @@ def by_position(analyse: Callable[[Chain, Array], Indices], chain: Chain, angles
 
 
 def joined(
-    parts: Sequence[Indices], axis: int, order: Array | slice = slice(None), **changed: Any
+    parts: Sequence[Indices], axis: int, order: NDArray[np.intp] | slice = slice(None), **changed: Any
 ) -> Indices:
     """Several indices as one, along outputs (``axis`` 0) or positions (1) in an ``order``; other fields ``changed``."""
     fields: dict[str, Any] = {}

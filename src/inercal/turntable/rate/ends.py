@@ -14,7 +14,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.rigs.chain import Chain, Element, Error, Joint, Scope, follows_angle
-from inercal.rigs.patterns import Known, commanded
+from inercal.rigs.patterns import Known, Numbers, commanded
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class End:
 
     error: Error
     change: Array
-    numbers: Array
+    numbers: Numbers
 
 
 def settled(chain: Chain, joint: str, angles: Array) -> Chain:

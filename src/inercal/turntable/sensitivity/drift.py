@@ -17,6 +17,7 @@ from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
 from inercal.rigs.outputs import Output, gravity_reference, rate_reference
 from inercal.sensitivities import dense
+from inercal.sensitivities.exact import positions
 from inercal.sensitivities.indices import Indices, by_position
 from inercal.turntable.model import stated_values
 from inercal.turntable.settings import TurntableSettings
@@ -90,5 +91,5 @@ def exact(
     return by_position(
         lambda chain, at: dense.analyse(dense.blocks(chain, at, DEGREES), outputs, shapley, second),
         settings.chain,
-        dense.positions(settings.chain, angles),
+        positions(settings.chain, angles),
     )
