@@ -22,6 +22,7 @@ from inercal.studies.turntable import turntable_study
 from inercal.turntable.model import table_model
 from inercal.turntable.positions.simulate import simulate, truth
 from inercal.turntable.positions.tolerance import shifts
+from inercal.turntable.rate.simulate import simulate_rate_test
 from inercal.turntable.regression import fit
 from inercal.turntable.second_order import second_order
 from inercal.turntable.sensitivity.analysis import analyse
@@ -207,3 +208,54 @@ def test_a_pattern_needs_a_joint_and_one_value_for_an_angle_needs_angles():
     assert_allclose(
         stood.attitude(turns[1], error * stood.std / 1e-3), whole.attitude(turns[1], error), atol=1e-15
     )
+
+
+def test_a_chain_of_its_own_is_the_table_that_it_describes():
+    """The two-axis table written out as a chain: the same attitudes, errors and results, but for the words."""
+    usual = turntable_study(tomllib.loads(TWO_AXES), "s")
+    slots = [e for e in usual.chain.elements if isinstance(e, Error | Joint)]
+    rows = [
+        f'{{ joint = "{e.name}", axis = "{e.axis}" }}'
+        if isinstance(e, Joint)
+        else f'{{ error = "{e.name}", axis = "{e.axis}", uniform = "2 arcmin", scope = "{e.scope.value}" }}'
+        for e in slots
+    ]
+    text = TWO_AXES.replace("two_axis_turntable", "chain").replace(
+        DEFAULT, f"rig.chain = [{', '.join(rows)}]"
+    )
+    own = turntable_study(tomllib.loads(text), "s")
+    record = simulate(usual, np.random.default_rng(5))
+    assert_allclose(simulate(own, np.random.default_rng(5))["y_x"].values, record["y_x"].values, rtol=1e-12)
+    first, second = calibrate(record, usual).estimate, calibrate(record, own).estimate
+    assert_allclose(second.values, first.values, rtol=1e-9)
+    assert_allclose(second.covariance, first.covariance, rtol=1e-9)
+
+
+DEFAULT = 'rig.errors.default = { uniform = "2 arcmin" }'
+TWO_AXES = f"""
+    site.latitude = "39.1 deg"
+    rig.kind = "two_axis_turntable"
+    {DEFAULT}
+    positions.plan = "24-position"
+    instrument.unit = "deg/h"
+    instrument.noise = "0.01 deg/h"
+    instrument.coefficients = {{ DX_F = "50 deg/h", DX_X = "60 deg/h", k_x = 1.0 }}
+"""
+
+
+def test_a_joint_that_errs_turns_by_the_difference_between_the_ends():
+    """Mean rates of a turn by hand: (phi + e) at the end less that at the beginning, over the time."""
+    text = """
+        site.latitude = "39.1 deg"
+        rig.kind = "two_axis_turntable"
+        rig.errors.dphi_z2 = { harmonics = [{ order = 2, amplitude = "60.0 arcsec", phase = "20 deg" }] }
+        instrument = { kind = "gyro", unit = "deg/s", dwell = "30 s", coefficients = { S_z = "1" } }
+        rate_test = { rates = ["1 deg/s", "-2 deg/s", "12 deg/s"], at = { phi2 = "10 deg" } }
+    """
+    settings = turntable_study(tomllib.loads(text), "s")
+    made = simulate_rate_test(settings, np.random.default_rng(1))
+    none = turntable_study(tomllib.loads(text.replace("60.0 arcsec", "1e-9 arcsec")), "s")
+    plain = simulate_rate_test(none, np.random.default_rng(1))
+    ends = 10.0 + 30.0 * np.array([1.0, -2.0, 12.0])
+    e = [60.0 / 3600.0 * np.sin(np.radians(2.0 * at + 20.0)) for at in (ends, 10.0)]
+    assert_allclose(made["gyro_z"].values - plain["gyro_z"].values, (e[0] - e[1]) / 30.0, atol=1e-12)

@@ -260,9 +260,15 @@ def _read_table(name: str, place: Place) -> tuple[Array, Array, Array, Source]:
             where, f"{key}, line 1: found {shown((lines or [''])[0])}, expected a header such as {head}"
         )
     try:
-        factors = [parse_unit(title[1], key, "angle").factor for title in titles]
+        units = [parse_unit(title[1], key, "angle") for title in titles]
     except QuantityError as problem:
         raise StudyError(where, f"{key}, line 1: {problem.message}") from problem
+    other = next((unit for unit in units if unit.dimension != "angle"), None)
+    if other is not None:
+        raise StudyError(
+            where, f"{key}, line 1: found {other.symbol}, a unit of {other.dimension}, expected an angle"
+        )
+    factors = [unit.factor for unit in units]
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         if not line.strip():
