@@ -150,8 +150,8 @@ def test_no_circles():
 WITHIN = {
     "imu": ("limits recording turns settings simulate multiposition ferraris aided temperature task figures"),
     "turntable": (
-        "limits settings disturbances model weights noise regression readings display sensitivity positions rate "
-        "task figures"
+        "limits settings disturbances model weights second_order noise regression readings display sensitivity "
+        "positions rate task figures"
     ),
     "aoa": (
         "limits layout settings angles motion reading fusion paper diagnosis reference result simulate task "

@@ -81,7 +81,7 @@ CODES: dict[str, Code] = {
     ),
     "weak_term": Code("a term is hardly known", _NEVER),
     "noise_misfit": Code("the noise is not of the kinds that are fitted", _NEVER),
-    "large_errors": Code("errors of the table are so large that their squares matter", _ALWAYS),
+    "large_errors": Code("errors of the table are so large that more than their squares matters", _ALWAYS),
     "not_stated": Code("a file does not state what a calibration should", _BY_SIZE),
     "not_held": Code("something of a calibration is not taken along", _NEVER),
     "other_frame": Code("the axes are not those of the calibration", _NEVER),

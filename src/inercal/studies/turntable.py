@@ -30,15 +30,17 @@ from inercal.studies.tolerances import CostsTable, WantedTable, tolerances_of
 from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
 
 OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
+AnalysedName = Literal["ax", "ay", "az", "wx", "wy", "wz", "y_x", "y_y"]
 
 
 class AnalysisTable(table_of(Analysis)):  # type: ignore[misc]
     """The sensitivity analysis."""
 
-    outputs: list[OutputName] = Field(
+    outputs: list[AnalysedName] = Field(
         default=["ax", "ay", "az", "wx", "wy"],
         min_length=1,
-        description="components of gravity (a) and earth rate (w) on the instrument's axes",
+        description="components of gravity (a) and earth rate (w) on the instrument's axes; y_x, y_y: outputs of a "
+        "gyrowheel with the coefficients of [instrument.coefficients]",
     )
 
 

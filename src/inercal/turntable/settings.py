@@ -18,7 +18,7 @@ from inercal.units import Quantity, Unit
 
 @dataclass(frozen=True)
 class Analysis:
-    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`."""
+    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`, or ``y_x``, ``y_y``."""
 
     outputs: tuple[str, ...] = ("ax", "ay", "az", "wx", "wy")
     method: Literal["exact", "sampled", "local"] = option(

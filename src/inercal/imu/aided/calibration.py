@@ -19,7 +19,7 @@ from inercal.imu.aided.diagnosis.gross import agreement, cures, expected, lag, t
 from inercal.imu.aided.fit import Fit, fit
 from inercal.imu.aided.model import side_of, unknowns
 from inercal.imu.aided.outcome import assemble, without_fit
-from inercal.imu.aided.table import Motion, motion_of, shifted, times
+from inercal.imu.aided.table import Motion, motion_of, shifted, times, values_of
 from inercal.imu.aided.walk import whiten
 from inercal.imu.limits import LIMITS
 from inercal.imu.settings import AidedSettings, ImuSettings
@@ -109,7 +109,7 @@ def calibrate_aided(
         estimate = without_fit(record, settings, *bad, earlier=(*findings, *motion.findings))
         return AidedCalibration(timed(estimate, clock), motion, rests)
     progress("fitting all sensors")
-    layout = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
+    layout = unknowns(settings.site, options, scales, values_of(motion, rests), settings.g_sensitivity)
     names = {each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity) for each in blocks}
 
     def fitted() -> Fit:

@@ -121,9 +121,9 @@ def type_b(
     variance = np.einsum("pi,ij,pj->p", rows, fit.covariance, rows)
     for name, places in layout.places.items():
         u = float(np.max(layout.sd[places]))
-        # an error with a value in each position has others in the next test
-        redrawn = name not in layout.stated or (len(places) > 1 and name != "earth rate")
-        source = TypeB(name, u, layout.units[name], gain[:, places] / layout.sd[places] / u, redrawn)
+        redrawn = name not in layout.stated or name in layout.redrawn
+        by_input = gain[:, places] / layout.sd[places] / u
+        source = TypeB(layout.sources.get(name, name), u, layout.units[name], by_input, redrawn)
         # priors of gains, arms and shifts are only there for order, unless the test says nothing of these
         if name in layout.stated or np.any(np.diag(source.covariance) > LIMITS.prior_share * variance):
             sources.append(source)

@@ -22,6 +22,7 @@ from inercal.geometry.site import Site
 from inercal.imu.aided.blocks import Blocks, Reference
 from inercal.imu.aided.table import Motion, error_nodes
 from inercal.imu.settings import AidedSettings
+from inercal.rigs.chain import Scope
 
 Indices = NDArray[np.int64]
 
@@ -36,7 +37,8 @@ ARM_U = 0.5
 class Unknowns:
     """The unknowns (P,) without the biases: ``places`` of each group, prior ``mean`` and ``sd``, both (P,).
 
-    The priors of ``stated`` groups are knowledge: earth rate, and the errors of the table.
+    The priors of ``stated`` groups are knowledge: earth rate, and the errors of the table. In a budget, a group has the
+    name in ``sources``, its own if there is none. The groups in ``redrawn`` have other values in the next test.
     """
 
     places: Mapping[str, Indices]
@@ -44,10 +46,16 @@ class Unknowns:
     sd: Array
     units: Mapping[str, str]
     stated: frozenset[str]
+    sources: Mapping[str, str]
+    redrawn: frozenset[str]
 
 
 def unknowns(
-    site: Site, options: AidedSettings, scales: Mapping[str, float], rests: int, g_sensitivity: bool
+    site: Site,
+    options: AidedSettings,
+    scales: Mapping[str, float],
+    values: Mapping[str, Indices],
+    g_sensitivity: bool,
 ) -> Unknowns:
     """Lay out the unknowns.
 
@@ -57,8 +65,9 @@ def unknowns(
     options : AidedSettings
     scales : mapping
         Scale factor [output per SI unit] to begin with, of ``acc`` and, where there is a gyro, ``gyro``.
-    rests : int
-        Number of rests: errors of the table have a value in each.
+    values : mapping
+        Number of the value that each error of the table has in each rest, by its name
+        (`inercal.imu.aided.table.values_of`).
     g_sensitivity : bool
     """
     groups: list[tuple[str, Array, Array, str]] = [
@@ -68,9 +77,9 @@ def unknowns(
     if "gyro" in scales:
         groups.append(("earth rate", *_earth(site, options), "rad/s"))
     for error in options.chain.errors:
-        if error.is_offset or error.scope.value == "sample":
+        if error.name not in values:
             continue
-        count = 1 if error.scope.constant else max(rests, 1)
+        count = int(values[error.name].max()) + 1
         groups.append((error.name, np.zeros(count), np.full(count, error.distribution.std), "rad"))
     for sensor, scale in scales.items():
         groups.append((f"gain {sensor}", scale * np.eye(3).ravel(), np.full(9, scale), "1"))
@@ -84,6 +93,8 @@ def unknowns(
         np.concatenate([sd for _, _, sd, _ in groups]),
         {name: unit for name, _, _, unit in groups},
         frozenset(name for name in places if name == "earth rate" or name in options.chain.factors),
+        {error.name: error.source for error in options.chain.errors},
+        frozenset(error.name for error in options.chain.errors if error.scope is Scope.POSITION),
     )
 
 

@@ -24,7 +24,7 @@ from inercal.imu.aided.diagnosis.examination import misfits
 from inercal.imu.aided.fit import Fit
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
-from inercal.imu.settings import COMMAND, MASKED, ImuSettings
+from inercal.imu.settings import COMMAND, MASKED, AidedSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
@@ -105,7 +105,9 @@ def assemble(
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
     """The basis of the estimate."""
-    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
+    method = settings.method
+    tables = method.chain.sources if isinstance(method, AidedSettings) else ()
+    return studied(COMMAND, settings, (*record.sources, *tables), MODEL, REFERENCES, conditions)
 
 
 def without_fit(

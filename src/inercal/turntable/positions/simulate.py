@@ -59,7 +59,7 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
             "instrument.sample_rate",
             f"found {n * per_dwell:.4g} samples in all, expected at most {LIMITS.most_samples:.0e}",
         )
-    errors = np.repeat(model.chain.draw(rng, n)[:, None, :], per_dwell, axis=1)
+    errors = np.repeat(model.chain.draw(rng, plan.angles)[:, None, :], per_dwell, axis=1)
     for k, error in enumerate(model.chain.errors):
         if error.scope is Scope.SAMPLE:
             errors[..., k] = error.distribution.sample(rng, (n, per_dwell))

@@ -17,6 +17,7 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
 from inercal.turntable.limits import LIMITS
+from inercal.turntable.rate.ends import settled
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
 from inercal.turntable.rate.linearity import SEED
 from inercal.turntable.rate.outcome import assemble, unobservable
@@ -67,7 +68,8 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             "the same kind of unit",
         )
     findings = [*record.findings]
-    along = turning_axis(chain, test.joint, readings.angles)
+    still = settled(chain, test.joint, readings.angles)
+    along = turning_axis(still, test.joint, readings.angles)
     taken = []
     for channel in readings.channels:
         if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine:
