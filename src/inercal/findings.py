@@ -52,6 +52,7 @@ CODES: dict[str, Code] = {
     "wrap_2pi": Code("an angle jumps by a full turn", _NEVER),
     "at_prior": Code("a parameter is no better known than before the measurement", _NEVER),
     "gimbal_lock": Code("two axes of the gimbals come close to each other", _BY_SIZE),
+    "restless_start": Code("the instrument is not at rest at the start, or restless there", _NEVER),
     "outlier": Code("single samples far from their neighbours", _BY_SIZE, rank=16),
     "contradiction": Code("sensors contradict each other", _BY_SIZE, rank=14),
     "gyro_missing": Code("there are no gyro channels, or they cannot be calibrated", _NEVER),

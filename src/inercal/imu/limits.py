@@ -13,7 +13,17 @@ class Limits:
     # every method
 
     initial_rest: float = 5.0
-    """Shortest period of rest [s] at the start of a recording."""
+    """Shortest period of rest [s] at the start of a recording by which its noise is judged."""
+
+    calm_variance: float = 3.0
+    """Variance of an output, over that of its calmest twentieth, below which a stretch is among the quietest."""
+
+    restless_variance: float = 1.5
+    """Variance of an output at the start, over that in the quietest stretches elsewhere, from which the start is
+    restless."""
+
+    fewest_at_rest: int = 16
+    """Samples of a stretch at rest that say something of the noise."""
 
     moving_variance: float = 30.0
     """Variance of an output, over that at rest, from which the instrument certainly moves."""
@@ -27,6 +37,10 @@ class Limits:
 
     scatter_probability: float = 0.05
     """Probability below which more scatter than the noise explains is not put down to chance."""
+
+    low_scatter_probability: float = 0.01
+    """Probability below which less scatter than the noise explains is not: the noise at rest was not that of the
+    poses."""
 
     condition: float = 50.0
     """Condition number of the scaled Jacobian beyond which a combination of terms counts as weakly known; sound tests

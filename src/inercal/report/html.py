@@ -62,7 +62,7 @@ _LABELS = {
     "residual_m_s2": ("residual |f| − g", "m/s²"),
     "scatter": ("standard deviation of |f| in a pose about the fit", "m/s²"),
     "scatter_over_noise": ("that deviation over what the noise at rest explains", ""),
-    "threshold": ("threshold of rest, in variances of the initial static period", ""),
+    "threshold": ("threshold of rest, in variances at rest", ""),
     "chi2": ("weighted sum of squares", ""),
     "intervals": ("static poses", ""),
     "turns": ("turns", ""),

@@ -82,14 +82,15 @@ def calibrate_multiposition(
 
 
 def _scatter(poses: Poses) -> Scatter:
-    """Residual scatter, pooled with the noise at rest unless it clearly exceeds it (F test)."""
-    from scipy.special import fdtrc
+    """Residual scatter, pooled with the noise at rest unless it clearly differs from that (F test, both sides)."""
+    from scipy.special import fdtr, fdtrc
 
     fit, noise = poses.accelerometer.fit, float(np.mean(poses.noise_variance))
     own = fit.chi2 / fit.dof
     ratio = own / noise if noise > 0 else np.inf
-    if noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < LIMITS.scatter_probability:
-        return Scatter(float(np.sqrt(own)), fit.dof, True, float(np.sqrt(ratio)))
+    more = noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < LIMITS.scatter_probability
+    if more or fdtr(fit.dof, poses.noise_dof, ratio) < LIMITS.low_scatter_probability:
+        return Scatter(float(np.sqrt(own)), fit.dof, bool(more), float(np.sqrt(ratio)))
     return Scatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
 
 

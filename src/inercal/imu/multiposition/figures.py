@@ -65,12 +65,14 @@ def _rest(calibration: MultipositionCalibration) -> Picture:
         last = len(panels) == len(recording.restlessness) - 1
         across = Axis("time [s]" if last else "", margin=0.005)
         panels.append([Panel(marks, across, Axis(f"{_WORDS[sensor]}\nvariance / at rest", "log"))])
-    ends = t[recording.initial.start], t[recording.initial.stop - 1]
+    at_rest = f"{t[recording.rest[0].start]:.1f} s to {t[recording.rest[-1].stop - 1]:.1f} s"
+    if len(recording.rest) > 1:
+        at_rest = f"{len(recording.rest)} quiet pieces, {at_rest}"
     unused = "" if judged == set(recording.restlessness) else "; the gyro took no part in finding them"
     return draw(
         "Static intervals",
-        f"Variance in a window of {recording.window} samples over the variance of the initial static period "
-        f"({ends[0]:.1f} s to {ends[1]:.1f} s), least and greatest values of pieces of the recording. Shaded: the "
+        f"Variance in a window of {recording.window} samples over the variance at rest ({at_rest}), "
+        f"least and greatest values of pieces of the recording. Shaded: the "
         f"{len(dwells)} static intervals found below the threshold of {threshold:g} (red){unused}.",
         panels,
         0.6 + 1.5 * len(panels),

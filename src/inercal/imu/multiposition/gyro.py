@@ -310,4 +310,4 @@ def _excess(miss: Array, by_verticals: Array, durations: Array, dof: float) -> f
         return floor
     from scipy.optimize import brentq
 
-    return float(brentq(surplus, floor, float(np.sum(parts)) / dof, rtol=1e-9))
+    return float(brentq(surplus, floor, 1.001 * float(np.sum(parts)) / dof, rtol=1e-9))

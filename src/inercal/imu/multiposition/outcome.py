@@ -86,7 +86,7 @@ def assemble(
         joint.values,
         uncertainty,
         verdict(recording, poses, joint.gyro, settings.site.gravity, u, findings),
-        findings=(*settled(record.findings, *MASKED), *findings),
+        findings=(*settled(record.findings, *MASKED), *recording.findings, *findings),
         statistics=statistics,
         result={
             "method": "multiposition",
@@ -197,7 +197,7 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
         _basis(record, settings),
         status,
         message,
-        findings=record.findings,
+        findings=(*record.findings, *recording.findings),
         statistics={"intervals": float(len(dwells)), "threshold": best},
         result={"method": "multiposition", "intervals": [], "turns": []},
     )

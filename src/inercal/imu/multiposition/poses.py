@@ -1,6 +1,6 @@
 """The static poses of a hand-held recording: found, averaged, and the threshold chosen.
 
-An interval is static where the windowed variance stays below a multiple of that of an initial static period;
+An interval is static where the windowed variance stays below a multiple of that at rest;
 the multiple is the one whose poses the accelerometer model fits best per degree of freedom.
 """
 
@@ -18,7 +18,7 @@ from inercal.imu.recording import Recording
 from inercal.records.dwells import Dwell, static_intervals
 
 MULTIPLES = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 28.0, 40.0)
-"""Thresholds tried, as multiples of the variance of the initial static period."""
+"""Thresholds tried, as multiples of the variance at rest."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,8 @@ def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
             start = accelerometer.fit.x
             lengths = np.array([dwell.samples for dwell in dwells]) / rate
             noise = recording.noise["acc"]
-            variance = np.sum(accelerometer.output_gradient() ** 2 * noise.variance(lengths), axis=1)
+            of_means = noise.variance(lengths) + recording.resolution["acc"] ** 2 / 12.0
+            variance = np.sum(accelerometer.output_gradient() ** 2 * of_means, axis=1)
             dof = 3.0 * noise.dof(float(np.median(lengths)))
             times = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in dwells])
             yield Poses(dwells, multiple, with_gyro, times, means, accelerometer, variance, dof)
