@@ -74,6 +74,11 @@ CODES: dict[str, Code] = {
     "poor_section": Code("a section of the recording does not hold what it should", _BY_SIZE),
     "turn_cut": Code("a turn goes on beyond its section", _BY_SIZE),
     "turn_doubtful": Code("which motion is a turn is not certain", _NEVER),
+    "outlying_pose": Code("a static pose lies off what all others say", _BY_SIZE),
+    "outlying_turn": Code("a turn lies off what all others say", _BY_SIZE),
+    "unmodelled_k2": Code(
+        "second-order coefficients of the accelerometers are not fitted, and would matter", _BY_SIZE
+    ),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
     "uncertain_site": Code("gravity or earth rate is known so badly that it rules the uncertainties", _NEVER),

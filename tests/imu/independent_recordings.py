@@ -14,11 +14,19 @@ SETTINGS = ImuSettings(Site(imu.G, (), imu.LATITUDE))
 
 
 def calibrated(
-    seed, faults=None, settings=SETTINGS, poses=24, ups=imu.random_ups, k2=0.0, **options
+    seed,
+    faults=None,
+    settings=SETTINGS,
+    poses=24,
+    ups=imu.random_ups,
+    k2=0.0,
+    acc_noise=8e-4,
+    gyro_noise=5.6e-4,
+    **options,
 ) -> tuple[MultipositionCalibration, np.ndarray]:
     """The calibration of a simulated unit, and errors over u of its coefficients that have a truth."""
     rng = np.random.default_rng(seed)
-    made = imu.unit(rng)
+    made = imu.unit(rng, acc_noise=acc_noise, gyro_noise=gyro_noise)
     made.k2 = np.broadcast_to(k2, 3)
     t, acc, gyro = imu.record(rng, made, ups(rng, poses), faults, **options)
     calibration = calibrate_multiposition(record_of(t, acc, gyro, "m/s^2", "rad/s"), settings)

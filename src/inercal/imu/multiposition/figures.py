@@ -20,6 +20,7 @@ from inercal.report.sphere import hemispheres
 from inercal.report.style import ALARM, COLOURS, INK, envelope
 
 if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
     from inercal.imu.multiposition.calibration import MultipositionCalibration
     from inercal.imu.multiposition.gyro import GyroFit
 
@@ -40,10 +41,13 @@ def pictures(calibration: MultipositionCalibration) -> list[Picture]:
     pictures += [values(estimate)] if estimate.names else []
     pictures.append(_rest(calibration))
     if poses is not None:
-        pictures.append(_residuals(poses, estimate.statistics["scatter"]))
-    if gyro is not None:
-        durations = np.array([turn["duration_s"] for turn in estimate.result["turns"]])
-        pictures.append(_misses(gyro, durations, estimate.statistics["scatter"]))
+        off = calibration.outliers
+        pictures.append(
+            _residuals(poses, estimate.statistics["scatter"], off.poses, _foretold(estimate, "poses"))
+        )
+    if poses is not None and gyro is not None:
+        told = _foretold(estimate, "turns")
+        pictures.append(_misses(gyro, poses, estimate.statistics["scatter"], off.turns, told))
     if estimate.names:
         pictures += [correlation(estimate), budget(estimate)]
     return pictures
@@ -108,45 +112,67 @@ def _lacking(fit: AccelerometerFit) -> Array:
     return np.array([cure, -cure])
 
 
-def _residuals(poses: Poses, scatter: float) -> Picture:
+def _foretold(estimate: Estimate, what: str) -> str:
+    """A sentence on every second pose or turn foretold by the others; empty where there are too few."""
+    if what not in estimate.result["held_out"]:
+        return ""
+    told = estimate.result["held_out"][what]
+    low, high = told["range_99"]
+    return (
+        f" Every second one, foretold by the others, is off by {told['rms_z']:.2f} of its u (rms; {low:.2f} to "
+        f"{high:.2f} at 99 % for {told['residuals']} residuals)."
+    )
+
+
+def _alarming(numbers: Array, values: Array, places: tuple[int, ...]) -> list[Mark]:
+    """Rings around what lies off all others."""
+    if not places:
+        return []
+    k = list(places)
+    return [Dots(numbers[k], values[k], "lies off all others", ALARM, "o", 9.0, filled=False)]
+
+
+def _residuals(poses: Poses, scatter: float, off: tuple[int, ...], foretold: str) -> Picture:
     """Residual of each pose, with what the noise explains and what the uncertainties use."""
     residuals = 1e3 * poses.accelerometer.fit.residuals
-    numbers = np.arange(1, len(residuals) + 1)
+    numbers = np.array(poses.numbers)
     noise = 1e3 * np.sqrt(poses.noise_variance)
     marks: list[Mark] = [
         Strips((-1e3 * scatter, 1e3 * scatter), level=True),
         Level(0.0),
         Dots(numbers, residuals, up=noise, bar=INK),
+        *_alarming(numbers, residuals, off),
     ]
     return draw(
         "Residual of each pose",
         "Size of the calibrated specific force less local gravity. Bars: ± one standard uncertainty by the noise at "
         f"rest; band: ± {1e3 * scatter:.2g} mm/s², the standard deviation on which the uncertainties of the "
-        f"accelerometers rest. The nine coefficients draw the residuals towards zero: {len(numbers)} poses leave "
-        f"{counted(poses.accelerometer.fit.dof, 'degree')} of freedom.",
+        f"accelerometers rest. The coefficients draw the residuals towards zero: {len(numbers)} poses leave "
+        f"{counted(poses.accelerometer.fit.dof, 'degree')} of freedom.{foretold}",
         [[Panel(marks, _counted("pose"), Axis("|f| − g [mm/s²]"), grid="y")]],
         2.1,
     )
 
 
-def _misses(gyro: GyroFit, durations: Array, scatter: float) -> Picture:
+def _misses(gyro: GyroFit, poses: Poses, scatter: float, off: tuple[int, ...], foretold: str) -> Picture:
     """Angle between carried and measured vertical after each turn."""
-    numbers = np.arange(1, len(gyro.miss) + 1)
+    numbers = np.array([poses.numbers[k] for k in gyro.first])
     misses = 1e3 * np.linalg.norm(gyro.miss, axis=1)
     by_verticals = scatter**2 * np.sum(gyro.vertical_error.reshape(len(numbers), -1) ** 2, axis=1)
     # the random walk acts in the two directions across the vertical
-    expected = 1e3 * np.sqrt(by_verticals + 2.0 * gyro.walk**2 * durations)
+    expected = 1e3 * np.sqrt(by_verticals + 2.0 * gyro.walk**2 * gyro.durations)
     marks: list[Mark] = [
         Bars(numbers, np.zeros(len(numbers)), misses, thickness=0.06, upright=True),
         Dots(numbers, misses, "miss"),
         Dots(numbers, expected, "expected, rms", COLOURS[1], "_", 9.0),
+        *_alarming(numbers, misses, off),
     ]
     return draw(
         "Miss of each turn",
         "Angle between the vertical of a pose carried through the gyro's output to the next pose and the vertical "
         f"measured there. Dashes: what the uncertainty of the verticals and the fitted angle random walk of "
-        f"{gyro.walk:.2g} rad/√s make expect. Turns left out of the fit are not counted.",
-        [[Panel(marks, _counted("turn"), Axis("miss [mrad]", limits=(0.0, None)), grid="y")]],
+        f"{gyro.walk:.2g} rad/√s make expect. A turn has the number of the pose before it.{foretold}",
+        [[Panel(marks, _counted("turn from pose"), Axis("miss [mrad]", limits=(0.0, None)), grid="y")]],
         2.1,
     )
 
