@@ -77,7 +77,7 @@ class AidedSettings:
 
 @dataclass(frozen=True)
 class Exclusion:
-    """Parts of a recording that no fit uses: ``times`` (begin, end) [s] of the record's clock, and ``poses`` by number."""
+    """Parts of a recording that no fit uses: ``times`` (begin, end) [s] of its clock, and ``poses`` by number."""
 
     times: tuple[tuple[float, float], ...] = ()
     poses: tuple[int, ...] = ()
