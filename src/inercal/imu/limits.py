@@ -57,6 +57,9 @@ class Limits:
     """Condition number of the scaled Jacobian beyond which a combination of terms counts as weakly known; sound tests
     have 1 to 20."""
 
+    ordinary_clock: float = 50e-6
+    """Relative error that the clock of a recorder has as a rule."""
+
     # multi-position
 
     fewest_poses: int = 10
