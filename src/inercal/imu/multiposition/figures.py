@@ -18,12 +18,15 @@ from inercal.report.marks import Axis, Bars, Dots, Level, Line, Mark, Panel, Str
 from inercal.report.panels import draw
 from inercal.report.sphere import hemispheres
 from inercal.report.style import ALARM, COLOURS, INK, envelope
+from inercal.units import parse_unit
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.imu.multiposition.calibration import MultipositionCalibration
     from inercal.imu.multiposition.gyro import GyroFit
 
+
+_UG, _ARCSEC = (parse_unit(symbol).factor for symbol in ("ug", "arcsec"))
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 
@@ -98,7 +101,7 @@ def _sphere(poses: Poses) -> Picture:
         "Direction of the specific force in each static pose, in the frame of the accelerometers, on two "
         "hemispheres seen along −z (equal-area projection; circles at 30° and 60° from the pole), coloured by "
         f"residual. The numbers count the poses in order of time; near ones share a label.{star}",
-        [hemispheres(fit.directions, 1e3 * fit.fit.residuals, "|f| − g [mm/s²]", lacking)],
+        [hemispheres(fit.directions, fit.fit.residuals / _UG, "|f| − g [µg]", lacking)],
         3.3,
     )
 
@@ -134,11 +137,12 @@ def _alarming(numbers: Array, values: Array, places: tuple[int, ...]) -> list[Ma
 
 def _residuals(poses: Poses, scatter: float, off: tuple[int, ...], foretold: str) -> Picture:
     """Residual of each pose, with what the noise explains and what the uncertainties use."""
-    residuals = 1e3 * poses.accelerometer.fit.residuals
+    residuals = poses.accelerometer.fit.residuals / _UG
     numbers = np.array(poses.numbers)
-    noise = 1e3 * np.sqrt(poses.noise_variance)
+    noise = np.sqrt(poses.noise_variance) / _UG
+    size = scatter / _UG
     marks: list[Mark] = [
-        Strips((-1e3 * scatter, 1e3 * scatter), level=True),
+        Strips((-size, size), level=True),
         Level(0.0),
         Dots(numbers, residuals, up=noise, bar=INK),
         *_alarming(numbers, residuals, off),
@@ -146,10 +150,10 @@ def _residuals(poses: Poses, scatter: float, off: tuple[int, ...], foretold: str
     return draw(
         "Residual of each pose",
         "Size of the calibrated specific force less local gravity. Bars: ± one standard uncertainty by the noise at "
-        f"rest; band: ± {1e3 * scatter:.2g} mm/s², the standard deviation on which the uncertainties of the "
+        f"rest; band: ± {size:.2g} µg, the standard deviation on which the uncertainties of the "
         f"accelerometers rest. The coefficients draw the residuals towards zero: {len(numbers)} poses leave "
         f"{counted(poses.accelerometer.fit.dof, 'degree')} of freedom.{foretold}",
-        [[Panel(marks, _counted("pose"), Axis("|f| − g [mm/s²]"), grid="y")]],
+        [[Panel(marks, _counted("pose"), Axis("|f| − g [µg]"), grid="y")]],
         2.1,
     )
 
@@ -157,10 +161,10 @@ def _residuals(poses: Poses, scatter: float, off: tuple[int, ...], foretold: str
 def _misses(gyro: GyroFit, poses: Poses, scatter: float, off: tuple[int, ...], foretold: str) -> Picture:
     """Angle between carried and measured vertical after each turn."""
     numbers = np.array([poses.numbers[k] for k in gyro.first])
-    misses = 1e3 * np.linalg.norm(gyro.miss, axis=1)
+    misses = np.linalg.norm(gyro.miss, axis=1) / _ARCSEC
     by_verticals = scatter**2 * np.sum(gyro.vertical_error.reshape(len(numbers), -1) ** 2, axis=1)
     # the random walk acts in the two directions across the vertical
-    expected = 1e3 * np.sqrt(by_verticals + 2.0 * gyro.walk**2 * gyro.durations)
+    expected = np.sqrt(by_verticals + 2.0 * gyro.walk**2 * gyro.durations) / _ARCSEC
     marks: list[Mark] = [
         Bars(numbers, np.zeros(len(numbers)), misses, thickness=0.06, upright=True),
         Dots(numbers, misses, "miss"),
@@ -172,7 +176,7 @@ def _misses(gyro: GyroFit, poses: Poses, scatter: float, off: tuple[int, ...], f
         "Angle between the vertical of a pose carried through the gyro's output to the next pose and the vertical "
         f"measured there. Dashes: what the uncertainty of the verticals and the fitted angle random walk of "
         f"{gyro.walk:.2g} rad/√s make expect. A turn has the number of the pose before it.{foretold}",
-        [[Panel(marks, _counted("turn from pose"), Axis("miss [mrad]", limits=(0.0, None)), grid="y")]],
+        [[Panel(marks, _counted("turn from pose"), Axis("miss [arcsec]", limits=(0.0, None)), grid="y")]],
         2.1,
     )
 
