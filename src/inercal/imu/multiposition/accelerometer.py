@@ -77,7 +77,7 @@ def specific_force(model: TriadModel, k2: Array, y: Array) -> Array:
     x = (y - model.bias) / model.scale
     # the root that is x where K2 vanishes; beyond the turning point of the parabola there is none
     along = 2.0 * x / (1.0 + np.sqrt(np.maximum(1.0 + 4.0 * k2 * x, 0.0)))
-    return apart(np.linalg.inv(model.misalignment), along)
+    return apart(np.asarray(np.linalg.inv(model.misalignment), dtype=np.float64), along)
 
 
 def inverses(model: TriadModel, k2: Array, f: Array) -> Array:

@@ -65,7 +65,7 @@ class LinearFit:
     @property
     def dof(self) -> int:
         """Degrees of freedom: rows, less the parameters that the other data do not fix."""
-        return self.residuals.size - (self.jacobian.shape[2] - self.fixed)
+        return int(self.residuals.size - self.jacobian.shape[2] + self.fixed)
 
     def weights(self, variance: float) -> Array:
         """(n d, n d) ``V^-1 - V^-1 J (J^T V^-1 J + information)^-1 J^T V^-1``, V of that ``variance``."""

@@ -153,7 +153,7 @@ def refitted(
         return poses
     means = poses.means[kept]
     accelerometer = fit_accelerometer(means, gravity, poses.accelerometer.fit.x[:PARAMETERS], squares)
-    dwells, numbers = (tuple(each[k] for k in kept) for each in (poses.dwells, poses.numbers))
+    dwells, numbers = tuple(poses.dwells[k] for k in kept), tuple(poses.numbers[k] for k in kept)
     return _poses(recording, dwells, numbers, poses.multiple, poses.with_gyro, means, accelerometer)
 
 
