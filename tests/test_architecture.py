@@ -148,7 +148,9 @@ def test_no_circles():
 
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
-    "imu": ("limits recording turns settings simulate multiposition ferraris aided temperature task figures"),
+    "imu": (
+        "limits rest recording turns settings simulate multiposition ferraris aided temperature task figures"
+    ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
         "positions rate task figures"

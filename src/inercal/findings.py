@@ -52,6 +52,7 @@ CODES: dict[str, Code] = {
     "wrap_2pi": Code("an angle jumps by a full turn", _NEVER),
     "at_prior": Code("a parameter is no better known than before the measurement", _NEVER),
     "gimbal_lock": Code("two axes of the gimbals come close to each other", _BY_SIZE),
+    "restless_start": Code("the instrument is not at rest at the start, or restless there", _NEVER),
     "outlier": Code("single samples far from their neighbours", _BY_SIZE, rank=16),
     "contradiction": Code("sensors contradict each other", _BY_SIZE, rank=14),
     "gyro_missing": Code("there are no gyro channels, or they cannot be calibrated", _NEVER),
@@ -59,6 +60,7 @@ CODES: dict[str, Code] = {
     "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),
     "bias_drift": Code("a bias drifts over the recording", _BY_SIZE),
     "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
+    "rate_without_u": Code("a sample rate was typed without an uncertainty", _BY_SIZE),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
     "hysteresis": Code("values on rising and on falling temperature differ", _NEVER),
@@ -73,6 +75,11 @@ CODES: dict[str, Code] = {
     "poor_section": Code("a section of the recording does not hold what it should", _BY_SIZE),
     "turn_cut": Code("a turn goes on beyond its section", _BY_SIZE),
     "turn_doubtful": Code("which motion is a turn is not certain", _NEVER),
+    "outlying_pose": Code("a static pose lies off what all others say", _BY_SIZE),
+    "outlying_turn": Code("a turn lies off what all others say", _BY_SIZE),
+    "unmodelled_k2": Code(
+        "second-order coefficients of the accelerometers are not fitted, and would matter", _BY_SIZE
+    ),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
     "uncertain_site": Code("gravity or earth rate is known so badly that it rules the uncertainties", _NEVER),

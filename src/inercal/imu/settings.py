@@ -126,6 +126,18 @@ class Disturbances:
 
 
 @dataclass(frozen=True)
+class Exclusion:
+    """Parts of a recording that no fit uses: ``times`` (begin, end) [s] of its clock, and ``poses`` by number."""
+
+    times: tuple[tuple[float, float], ...] = ()
+    poses: tuple[int, ...] = ()
+
+    def touches(self, begin: float, end: float) -> bool:
+        """True where some of the time from ``begin`` to ``end`` [s] is left out."""
+        return any(begin < last and first < end for first, last in self.times)
+
+
+@dataclass(frozen=True)
 class ImuSettings:
     """Settings of a calibration, in SI.
 
@@ -133,8 +145,10 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start, g_sensitivity, bias_drift, time_base_u
+    static_start, g_sensitivity, bias_drift, k2, time_base_u
         As their keys say.
+    exclude : Exclusion
+        Poses and turns to be left out.
     traceability : mapping
         ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
     method : FerrarisSettings, AidedSettings or None
@@ -154,10 +168,15 @@ class ImuSettings:
     )  # fmt: skip
     g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
     bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
+    k2: bool = option(
+        "also estimate the second-order coefficients of the accelerometers: K1 (f + K2 f^2), f along the input axis",
+        False,
+    )
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="time_base",
     )  # fmt: skip
+    exclude: Exclusion = Exclusion()
     traceability: Mapping[str, str] = field(default_factory=dict)
     method: FerrarisSettings | AidedSettings | None = None
     simulation: Simulation = Simulation()

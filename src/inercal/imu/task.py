@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import StudyError
+from inercal.estimate.suspicion import judged
 from inercal.findings import Finding
+from inercal.imu.limits import LIMITS
 from inercal.imu.settings import AidedSettings, FerrarisSettings, ImuSettings
 from inercal.records.record import Record
 
@@ -46,7 +48,11 @@ def calibrate(
     InputError
         The record does not hold what the method needs.
     """
+    if record.rate_u and not settings.time_base_u:
+        settings = replace(settings, time_base_u=record.rate_u)
     calibration = _by_method(record, settings, progress)
+    if record.rate_u == 0.0 and not settings.time_base_u:
+        calibration = _with_exact_rate(calibration)
     return calibration if settings.site.inputs else _with_exact_gravity(calibration, settings.site.gravity)
 
 
@@ -65,6 +71,27 @@ def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], 
             from inercal.imu.multiposition.calibration import calibrate_multiposition
 
             return calibrate_multiposition(record, settings, progress)
+
+
+def _with_exact_rate(calibration: Calibrated) -> Calibrated:
+    """The calibration, saying what an ordinary error of a sample rate typed without an uncertainty would do."""
+    estimate = calibration.estimate
+    scales = [estimate[f"S_{axis}"] for axis in "xyz" if f"S_{axis}" in estimate.names]
+    if not scales:
+        return calibration
+    shifts = {p.name: LIMITS.ordinary_clock * abs(p.value) / p.u for p in scales}
+    text = (
+        f"the sample rate is typed without an uncertainty: an error of {1e6 * LIMITS.ordinary_clock:.0f} ppm, ordinary "
+        f"for a clock, shifts the scale factors of the gyro by as much, {max(shifts.values()):.2g} of their u: state "
+        'its uncertainty, such as rate = "100.00(1) Hz", or imu.time_base'
+    )
+    harm = tuple(name for name, shift in shifts.items() if shift > 1.0)
+    findings, (status, message) = judged(
+        (estimate.status, estimate.message),
+        (*estimate.findings, Finding("rate_without_u", text, harm=harm)),
+        estimate.names,
+    )
+    return replace(calibration, estimate=replace(estimate, findings=findings, status=status, message=message))
 
 
 def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
 from inercal.imu.settings import (
     AidedSettings,
     Disturbances,
+    Exclusion,
     FerrarisSettings,
     ImuSettings,
     Simulation,
@@ -29,19 +31,45 @@ from inercal.studies.common import (
 )
 from inercal.studies.fields import refusal
 from inercal.studies.imu_aided import AidedTable, aided_settings
-from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings
+from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
 from inercal.studies.tables import as_typed, settings_of, table_of
-from inercal.units import parse_unit
+from inercal.units import parse_unit, shown
 
 #: keys that not all methods heed -> those that do
 _METHODS = {
     "static_start": ("multiposition",),
     "g_sensitivity": ("multiposition", "aided"),
     "bias_drift": ("multiposition",),
+    "exclude": ("multiposition",),
+    "k2": ("multiposition", "aided"),
     "ferraris": ("ferraris",),
     "aided": ("aided",),
 }
+
+
+def _left(value: object) -> object:
+    """A time or a pose to be left out, as text."""
+    if isinstance(value, str):
+        if re.fullmatch(r"pose [1-9]\d*", value.strip()):
+            return value
+        begin, dots, end = value.partition("..")
+        if dots and seconds_of(begin.strip()) < seconds_of(end.strip()):
+            return value
+    raise refusal(
+        f'found {shown(value)}, expected a time, such as "249 s .. 253 s", or a pose, such as "pose 12"'
+    )
+
+
+Left = Annotated[str, BeforeValidator(_left)]
+
+
+def exclusion_of(texts: list[str]) -> Exclusion:
+    """The parts of a recording to be left out, of texts that were read well."""
+    poses = tuple(int(text.split()[1]) for text in texts if ".." not in text)
+    ends = [text.split("..") for text in texts if ".." in text]
+    times = tuple((seconds_of(begin.strip()), seconds_of(end.strip())) for begin, end in ends)
+    return Exclusion(times, poses)
 
 
 class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
@@ -51,6 +79,12 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
         "turns by a known angle; aided: on a table whose angles are in the record",
+    )
+    exclude: list[Left] = Field(
+        default=[],
+        examples=[["249 s .. 253 s", "pose 12"]],
+        description="what no fit uses: turns that a time of the record's clock touches and poses of which it holds the "
+        "middle, and poses by their numbers, which stay as without this key",
     )
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
@@ -138,5 +172,6 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         traceability=file.traceability.model_dump(),
         method=method,
         temperature=file.conditions.temperature,
+        exclude=exclusion_of(file.imu.exclude),
         given=as_typed(data),
     )
