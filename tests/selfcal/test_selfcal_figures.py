@@ -41,8 +41,7 @@ from inercal.selfcal.platform.coefficients import (
 )
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.result.comparison import side_by_side
-from inercal.selfcal.result.tables import bounds_by_path, turns, weak_combinations
+from inercal.selfcal.result.tables import bounds_by_path, side_by_side, turns, weak_combinations
 from inercal.selfcal.task import Calibration
 from inercal.units import parse_unit
 
