@@ -428,7 +428,7 @@ def test_the_page_of_a_design():
     )
     page = check(design_page(found, settings, told(found)))
     assert page.index("Comparison of paths") < page.index("Turns") < page.index("What the path cannot see")
-    for words in ("found", "ds_z", "(rest 5 s)", "up to 5 turns", "0.0005 °/√h", "10 µg", "The path found"):
+    for words in ("found", "ds_z", "(rest 5 s)", "up to 5 turns", "0.0005 deg/√h", "10 ug", "The path found"):
         assert words in page
 
 

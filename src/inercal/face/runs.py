@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
 from inercal.errors import InputError
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, without_coefficients
 from inercal.face.study import Study
 from inercal.records.record import Record
 
@@ -45,6 +46,20 @@ def one_run(records: Sequence[Record], instead: str) -> Record:
             f"has the channels of {first[0].path if first else 'the first'}, expected one run: {instead}",
         )
     return records[0]
+
+
+def designed_by(
+    command: str, study: Study, search: Callable[[], T], references: tuple[str, ...]
+) -> tuple[T, Estimate]:
+    """What a search found, and its result; it has a ``message``, a ``result`` and ``findings``."""
+    from inercal.records.read import source_of
+
+    clock = time.perf_counter()
+    with study.at_fault():
+        designed: Any = search()
+    timing, files = {"solve": time.perf_counter() - clock}, map(source_of, study.files)
+    what = designed.message, designed.result, files, designed.findings, timing, study.keys
+    return designed, without_coefficients(command, *what, references=references)
 
 
 def _traced(calibration: Any, record: Record, study: Study) -> Any:

@@ -70,19 +70,10 @@ class Gimbals:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """Attitude of frame b on the earth.
+    """Attitude of frame b on the earth: axes of b lie along those of ``frame`` at zero heading and tilt.
 
-    Attributes
-    ----------
-    frame : str
-        Axes of n, along which those of b lie at zero heading and tilt: ``nue``, ``enu`` or ``ned``.
-    heading : float
-        From north to east [rad]: the base turned clockwise as seen from above.
-    tilt : (float, float)
-        Then, about north and about east, right-handed [rad].
-    heading_u : float
-    tilt_u : (float, float)
-        Standard uncertainties [rad].
+    ``heading`` [rad] turns the base clockwise as seen from above, from north to east; ``tilt`` [rad] then about north
+    and about east, right-handed; both with standard uncertainties ``heading_u`` and ``tilt_u`` [rad].
     """
 
     frame: Frame = "nue"
