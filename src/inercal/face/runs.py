@@ -51,7 +51,7 @@ def one_run(records: Sequence[Record], instead: str) -> Record:
 def designed_by(
     command: str, study: Study, search: Callable[[], T], references: tuple[str, ...]
 ) -> tuple[T, Estimate]:
-    """What a search found, and its result; it has a ``message``, a ``result`` and ``findings``."""
+    """Outcome of a search, with ``message``, ``result`` and ``findings``, and the result of the command."""
     from inercal.records.read import source_of
 
     clock = time.perf_counter()

@@ -71,11 +71,8 @@ class Filter:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Errors that a simulation adds to the model; none if absent.
-
-    ``harmonics`` are errors of encoders: joint 0, 1, 2, order k, amplitude [rad], phase [rad]: a sin(k th + phase).
-    ``substeps`` of the truth lie between two rows.
-    """
+    """Errors that a simulation adds to the model: ``harmonics`` of encoders, a sin(k th + phase), as joint 0, 1, 2,
+    order k, amplitude [rad], phase [rad]; ``substeps`` of the truth lie between two rows."""
 
     dropouts: float = quantity(
         "part of the rows without accelerometers and angles", "number", "0", example="1 %", bounds=PART

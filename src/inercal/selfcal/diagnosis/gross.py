@@ -51,12 +51,9 @@ _EXCHANGED = {
 
 @dataclass(frozen=True, eq=False)
 class _Stretches:
-    """Motion in each of m steps between rows whose angles are known.
-
-    ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
-    space, in p, by the rates; ``stretch`` (m,) the stretch of each step; ``recorded`` (m,) true where all rates in it
-    were recorded.
-    """
+    """Motion in each of m steps between rows whose angles are known: ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,)
+    [s] between them, ``rate`` (m, 3) [rad] the turns against inertial space, in p, by the rates; the ``stretch`` (m,)
+    of each step; ``recorded`` (m,) true where all rates in it were."""
 
     th: Array
     dt: Array
@@ -327,11 +324,8 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
 def off_the_path(
     recording: Recording, plan: Plan, world: World, began: float, rows: NDArray[np.int64]
 ) -> list[Finding]:
-    """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s].
-
-    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it: at gimbal lock they are not
-    unique.
-    """
+    """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s];
+    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it, also at gimbal lock."""
     t = recording.t - began
     findings = []
     if t[-1] < plan.duration - LIMITS.missing_steps * plan.step:

@@ -1,9 +1,7 @@
 """Gross faults of rows: readings logged late, once too often, not at all, or far off.
 
-Each is judged by the error-state filter, not here: without it the sum of normalised innovations squared must fall by
-more than chance explains (`inercal.estimate.hypotheses.Hypothesis.chance`), of all hypotheses of a kind.
-
-Angles and commands are compared from row to row: `Turning` holds the rotation in between by each.
+Each is judged by the error-state filter, not here. Angles and commands are compared from row to row by the rotation in
+between (`Turning`).
 """
 
 from __future__ import annotations

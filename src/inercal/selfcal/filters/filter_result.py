@@ -35,10 +35,8 @@ class State(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Estimates after each of m steps, a row for each: as in `History` and `FilterResult`.
-
-    Without a history all arrays but ``nis`` and ``dims`` have no rows.
-    """
+    """Estimates after each of m steps, as in `History` and `FilterResult`; without a history no rows but of ``nis`` and
+    ``dims``."""
 
     attitude: Array
     attitude_u: Array
@@ -77,10 +75,8 @@ def remember(out: Estimates, k: int, q: Quaternion, c: Array, P: Array) -> None:
 
 
 class Trace(NamedTuple):
-    """Estimates of a recursive filter after each of m steps, and its health over all of them, as in `FilterResult`.
-
-    ``restarts`` are the steps after which the attitude was taken anew (`inercal.selfcal.filters.gaps`).
-    """
+    """Estimates of a recursive filter after each of m steps, and its health over all of them, as in `FilterResult`;
+    ``restarts`` are steps here."""
 
     estimates: Estimates
     lowest_eigenvalue: float = math.nan

@@ -209,10 +209,8 @@ def sensed(q: Array, c: Array, measured: Measurements, world: World) -> Sensed:
 
 
 def turns(rate: Array, dt: Array, c: Array) -> tuple[Array, Array]:
-    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step, at commanded ``rate`` (m, 3).
-
-    With them the rotations (m, 3, p), about the axes of p after the step, per change of each coefficient.
-    """
+    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step, at commanded ``rate`` (m, 3),
+    and the rotations (m, 3, p), about the axes of p after the step, per change of each coefficient."""
     x, y, z = rate.T
     slope = np.zeros((len(rate), 3, len(c)))
     slope[:, :, KG0] = np.eye(3)

@@ -40,10 +40,8 @@ _AXES: Mapping[str, Array] = {
 
 @dataclass(frozen=True, eq=False)
 class Gimbals:
-    """The joints, outer first: ``axes`` of p along which they lie at zero angles, and their ``signs``.
-
-    A sign of -1 says that the angle counts left-handed about the axis.
-    """
+    """The joints, outer first: ``axes`` of p along which they lie at zero angles, and their ``signs``, -1 where the
+    angle counts left-handed."""
 
     axes: tuple[Axis, Axis, Axis] = ("z", "x", "y")
     signs: tuple[int, int, int] = (1, 1, 1)
@@ -103,11 +101,8 @@ class Base:
 
 
 class World(NamedTuple):
-    """Earth and gimbals of the platform, as kernels take them.
-
-    ``earth`` (3,) [rad/s] earth rate and ``up`` (3,) [m/s^2] the specific force at rest, both in b; ``axes`` (3,)
-    and ``signs`` (3,) of the gimbals.
-    """
+    """Earth rate (3,) [rad/s] and specific force at rest ``up`` (3,) [m/s^2], both in b, and ``axes`` (3,) and
+    ``signs`` (3,) of the gimbals, as kernels take them."""
 
     earth: Array
     up: Array

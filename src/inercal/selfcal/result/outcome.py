@@ -186,11 +186,8 @@ def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
 
 
 def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> float:
-    """Largest mean NIS of a recording that does not contradict the model.
-
-    It is that of an exact study, plus the part that disappears with the systematic inputs of site and base moved,
-    within their uncertainties, to where the recording fits best.
-    """
+    """Largest mean NIS of a recording that does not contradict the model: that of an exact study, plus the part that
+    disappears with systematic inputs moved, within their uncertainties, to where the recording fits best."""
     errors, of = stated_errors(settings), problem(settings)
     if errors is None:
         return agreement.limit(LIMITS.nis_sigmas)
