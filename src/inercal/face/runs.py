@@ -48,22 +48,18 @@ def one_run(records: Sequence[Record], instead: str) -> Record:
     return records[0]
 
 
-def of_design(
-    command: str, designed: Any, study: Study, began: float, references: tuple[str, ...]
-) -> Estimate:
-    """The estimate without coefficients of a design that ``began`` at that `time.perf_counter`."""
+def designed_by(
+    command: str, study: Study, search: Callable[[], T], references: tuple[str, ...]
+) -> tuple[T, Estimate]:
+    """Outcome of a search, with ``message``, ``result`` and ``findings``, and the result of the command."""
     from inercal.records.read import source_of
 
-    return without_coefficients(
-        command,
-        designed.message,
-        designed.result,
-        map(source_of, study.files),
-        designed.findings,
-        {"solve": time.perf_counter() - began},
-        study.keys,
-        references=references,
-    )
+    clock = time.perf_counter()
+    with study.at_fault():
+        designed: Any = search()
+    timing, files = {"solve": time.perf_counter() - clock}, map(source_of, study.files)
+    what = designed.message, designed.result, files, designed.findings, timing, study.keys
+    return designed, without_coefficients(command, *what, references=references)
 
 
 def _traced(calibration: Any, record: Record, study: Study) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, of_design, one_run
+from inercal.face.runs import Progress, calibrations, designed_by, one_run
 from inercal.face.study import Study
 from inercal.records.record import Record
 from inercal.turntable import task
@@ -54,10 +53,9 @@ def design(study: Study, progress: Progress = lambda _: None) -> Result:
     from inercal.turntable.positions.planning import REFERENCES
     from inercal.turntable.positions.planning import design as planned
 
-    clock = time.perf_counter()
-    with study.at_fault():
-        designed = planned(study.settings, progress)
-    result = of_design("design positions", designed, study, clock, REFERENCES)
+    designed, result = designed_by(
+        "design positions", study, lambda: planned(study.settings, progress), REFERENCES
+    )
 
     def page() -> str:
         from inercal.turntable.figures.design import page as of_page

@@ -61,13 +61,7 @@ def rows(
 
 
 def history_record(filtered: FilterResult, recording: Recording, world: World) -> Record:
-    """The columns as a record with the time stamps of the recording.
-
-    Raises
-    ------
-    ValueError
-        The estimator kept no history.
-    """
+    """The columns as a record with the time stamps of the recording; raises ValueError where no history was kept."""
     history = filtered.history
     if history is None:
         raise ValueError("found no history, expected an estimate with one")
