@@ -76,7 +76,9 @@ def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
     changed = dict(result)
     if "noise" in changed:
         changed["noise"] = [
-            row | {key: row[key] / unit.factor for key in ("noise", "within_dwells")} | {"unit": unit.symbol}
+            row
+            | {key: row[key] / unit.factor for key in ("noise", "within_dwells") if row[key] is not None}
+            | {"unit": unit.symbol}
             for row in changed["noise"]
         ]
     if "table_errors" in changed:

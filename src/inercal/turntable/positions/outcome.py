@@ -80,13 +80,19 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
         sigma, dof = float(fit.noise[k]), float(fit.noise_dof[k])
         name = f"noise of {channel.channel}"
         if np.isinf(dof):
-            components.append(TypeB(name, sigma, unit, gain[..., k]))
+            components.append(TypeB(name, sigma, unit, gain[..., k], redrawn=True))
         else:
             components.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(
-            TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
+            TypeB(
+                error.name,
+                std,
+                "m" if error.is_offset else "rad",
+                terms.slope @ shift / std,
+                redrawn=not error.scope.constant,
+            )
         )
     beside, columns = fit.model.beside(fit.angles, fit.c)
     for each, column in zip(beside, np.moveaxis(columns, -1, 0), strict=True):
@@ -131,8 +137,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     if not finite.all():
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
-    # stated noise is of type B, but not the same in repeat runs
-    uncertainty = combine(names, sources(fit, terms, unit))._replace(common=None)
+    uncertainty = combine(names, sources(fit, terms, unit))
     findings += _too_large(fit) + of_site(
         names, uncertainty.budget, [each.source for each in fit.model.references]
     )
