@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from inercal.cli.options import (
-    Files,
     MapFile,
     Overrides,
     ReportOutput,
     RunFiles,
     Span,
     StudyFile,
-    read_record,
     read_repeats,
     working,
 )
@@ -40,7 +38,7 @@ def calibrate_imu(
 
 
 def calibrate_turntable(
-    files: Files,
+    files: RunFiles,
     /,
     *,
     study: StudyFile,
@@ -50,9 +48,7 @@ def calibrate_turntable(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
-    return _calibrated(
-        "turntable", files, study, map_file, span, overrides, output, lambda *one: [read_record(*one)]
-    )
+    return _calibrated("turntable", files, study, map_file, span, overrides, output, read_repeats)
 
 
 def _calibrated(

@@ -33,7 +33,7 @@ def calibrate(
     Parameters
     ----------
     records : Record or sequence of Record
-        One run; several are repeat runs of an IMU or a platform, which are combined.
+        One run; several are repeat runs of an IMU, a turntable or a platform, which are combined.
     study : Study or path, optional
         Needed for a turntable, a platform and an angle of attack; of an IMU, ``latitude`` (and ``height``) or
         ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.

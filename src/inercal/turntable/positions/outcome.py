@@ -20,6 +20,7 @@ from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
+from inercal.rigs.chain import Scope
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.positions.application import in_use
@@ -81,13 +82,19 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
         sigma, dof = float(fit.noise[k]), float(fit.noise_dof[k])
         name = f"noise of {channel.channel}"
         if np.isinf(dof):
-            components.append(TypeB(name, sigma, unit, gain[..., k]))
+            components.append(TypeB(name, sigma, unit, gain[..., k], redrawn=True))
         else:
             components.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(
-            TypeB(error.source, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
+            TypeB(
+                error.source,
+                std,
+                "m" if error.is_offset else "rad",
+                terms.slope @ shift / std,
+                redrawn=error.scope in (Scope.POSITION, Scope.SAMPLE),
+            )
         )
     if fit.second is not None:
         columns = terms.slope @ fit.second.shifts(fit.gain)[1]
@@ -136,8 +143,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     if not finite.all():
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
-    # stated noise is of type B, but not the same in repeat runs
-    uncertainty = combine(names, sources(fit, terms, unit))._replace(common=None)
+    uncertainty = combine(names, sources(fit, terms, unit))
     findings += _too_large(fit) + of_site(
         names, uncertainty.budget, [each.source for each in fit.model.references]
     )
