@@ -25,6 +25,7 @@ from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.live import Live
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.simulate import simulate
 
 #: states -> microseconds a row that are promised of the filter, and of filter and smoother
@@ -48,7 +49,7 @@ def live(of, recording, rows: int) -> list[float]:
         clock = WALL()
         going.feed(t, acc, gyro)
         each.append(WALL() - clock)
-    return each[fusion.HELD :]
+    return each[LIMITS.starting_rows :]
 
 
 def of_states(states: int, recording, few: int, rounds: int) -> list[Row]:

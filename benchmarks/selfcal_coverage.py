@@ -15,8 +15,8 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from inercal.examples import FOLDER
+from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.monte_carlo import campaign
-from inercal.selfcal.settings import KINDS
 from inercal.studies.load import load_selfcal_study
 
 SEED = 20261121

@@ -19,10 +19,11 @@ from inercal.examples import FOLDER
 from inercal.geometry.rotations import boxplus
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.diagnosis.examination import diagnose
+from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.settings import KINDS, Disturbances
+from inercal.selfcal.settings import Disturbances
 from inercal.studies.load import load_selfcal_study
 
 SEED = 20261121

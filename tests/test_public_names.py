@@ -1,8 +1,10 @@
 """What the package shows: its public names, sorted, each resolved only when asked for."""
 
+import ast
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +16,13 @@ def test_the_public_names_are_sorted_and_all_resolve():
     assert set(dir(inercal)) == {*inercal.__all__, "__version__"}
     for name in inercal.__all__:
         assert getattr(inercal, name).__doc__
+
+
+def test_types_are_told_of_the_same_names_from_the_same_modules():
+    body = ast.parse(Path(inercal.__file__).read_text("utf-8")).body
+    (block,) = (each for each in body if isinstance(each, ast.If))
+    told = {alias.asname: each.module for each in block.body for alias in each.names}
+    assert told == inercal._WHERE
 
 
 def test_what_is_not_public_is_an_attribute_error():

@@ -8,8 +8,7 @@ from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
 from inercal.aoa.result.columns import angles_record, points_record
-from inercal.aoa.result.display import delays, rest_of_fit, use_of_fit
-from inercal.aoa.result.tables import answer, on_page, on_terminal
+from inercal.aoa.result.tables import answer, delays, on_page, on_terminal, rest_of_fit, use_of_fit
 from inercal.aoa.settings import GYROS, Methods
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import load_kernels, measure

@@ -7,11 +7,11 @@ from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.platform.coefficients import GROUPS
 from inercal.selfcal.result.columns import history_record
-from inercal.selfcal.settings import KINDS
 from inercal.selfcal.task import calibrate, compared, load_kernels
 from inercal.stream.selfcal import Selfcal
 from inercal.studies.selfcal import selfcal_study

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inercal.aoa.arms import axes, centrifugal_arms, tangential_arms
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, axes, centrifugal_arms, tangential_arms
 from inercal.aoa.paper import lever, static
 from inercal.report.style import COLOURS, QUIET, WIDTH, envelope, few_powers, figure, svg
 from inercal.units import STANDARD_GRAVITY as G

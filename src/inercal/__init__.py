@@ -34,7 +34,7 @@ Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.fusion.model`
     body           x forward, y left, z up, about the pivot; theta nose-up pitch, w = theta', phi roll right wing down
     accelerometer  at (r, 0, z), lambda from +x towards -z: reads g sin(theta - lambda) at rest; gyro nose-up positive
     errors         b_i, b_g biases; dr_i, zo_i of the positions; k_g gyro scale; tau_g gyro delay
-    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.aoa.flow`)
+    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.aoa.angles`)
 
 Records: labelled columns (`inercal.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
@@ -101,46 +101,22 @@ __version__ = "0.1.0"
 
 #: public name -> module that defines it; resolved when first asked for (PEP 562), so that importing is quick
 _WHERE = {
-    "CalibrationError": "inercal.errors",
-    "Estimate": "inercal.estimate.result",
-    "InputError": "inercal.errors",
-    "Record": "inercal.records.record",
-    "Result": "inercal.face.result",
-    "Study": "inercal.face.study",
-    "allan": "inercal.face.noise",
-    "apply": "inercal.face.calibrations",
-    "calibrate": "inercal.face.verbs",
-    "compare": "inercal.face.calibrations",
-    "design": "inercal.face.verbs",
-    "load": "inercal.face.calibrations",
-    "read": "inercal.face.recordings",
-    "record": "inercal.face.recordings",
-    "sensitivity": "inercal.face.verbs",
-    "simulate": "inercal.face.verbs",
-    "study": "inercal.face.study",
-    "temperature": "inercal.face.verbs",
+    name: f"inercal.{module}"
+    for module, names in {
+        "errors": ("CalibrationError", "InputError"),
+        "estimate.result": ("Estimate",),
+        "face.calibrations": ("apply", "compare", "load"),
+        "face.noise": ("allan",),
+        "face.recordings": ("read", "record"),
+        "face.result": ("Result",),
+        "face.study": ("Study", "study"),
+        "face.verbs": ("calibrate", "design", "sensitivity", "simulate", "temperature"),
+        "records.record": ("Record",),
+    }.items()
+    for name in names
 }
 
-__all__ = [
-    "CalibrationError",
-    "Estimate",
-    "InputError",
-    "Record",
-    "Result",
-    "Study",
-    "allan",
-    "apply",
-    "calibrate",
-    "compare",
-    "design",
-    "load",
-    "read",
-    "record",
-    "sensitivity",
-    "simulate",
-    "study",
-    "temperature",
-]
+__all__ = sorted(_WHERE)
 
 
 def __getattr__(name: str) -> object:

@@ -14,6 +14,7 @@ from inercal.aoa.fusion import run
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.live import Live
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.simulate import simulate
 
 SLOW = replace(BASE, duration=700.0, sample_rate=20.0, frequency=0.2)
@@ -37,7 +38,7 @@ def test_information_of_the_data_fades_and_that_of_the_prior_does_not(seed, step
     x, P = learned(of, np.random.default_rng(seed))
     at = np.array(list(of.nuisances.values()))
     own, rest = np.ix_(at, at), [k for k in range(of.size) if k not in at]
-    e = 1.0 - math.exp(-run.FADING_STEP * steps / run.MEMORY)
+    e = 1.0 - math.exp(-LIMITS.fading_interval * steps / LIMITS.memory_time)
     prior = np.linalg.inv(of.covariance[own])
     data = np.linalg.inv(P[own])
     expected = np.linalg.inv((1.0 - e) * data + e * prior)
@@ -92,7 +93,7 @@ def test_every_step_comes_once_wherever_blocks_end(intervals, since):
         assert stop == len(t) or one_by_one[stop - 1] > 0
         at = stop
     first = [k for k, steps in enumerate(one_by_one) if steps]
-    assert not first or t[first[0] + 1] - since >= run.MEMORY
+    assert not first or t[first[0] + 1] - since >= LIMITS.memory_time
 
 
 def test_rows_blocks_and_the_smoother_go_on_alike():
@@ -121,7 +122,7 @@ def test_a_bias_that_changes_is_followed():
     state = estimate(replace(made.recording, acc=acc), of).state
     k = of.nuisances["b_2"]
     lag = made.errors["b_2"] + drift - state.x[k]
-    most = drift * (run.MEMORY + run.FADING_STEP) / 600.0
+    most = drift * (LIMITS.memory_time + LIMITS.fading_interval) / 600.0
     assert -3.0 * math.sqrt(state.P[k, k]) < lag < most + 3.0 * math.sqrt(state.P[k, k])
     assert lag < 0.25 * drift, "what was learned in the first minutes alone is half of it off"
 

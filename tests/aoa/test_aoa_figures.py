@@ -13,7 +13,7 @@ from sting_study import BASE, DEG, G, scenario
 
 from inercal.aoa.figures import page as page_of
 from inercal.aoa.figures import pictures, sensors
-from inercal.aoa.figures.innovations import consistency
+from inercal.aoa.figures.learned import consistency
 from inercal.aoa.settings import Attitude, Disturbances, Methods, Oscillation
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
-from inercal.aoa.flow import alpha_beta, gives_alpha, theta_by_roll
+from inercal.aoa.angles import alpha_beta, gives_alpha, theta_by_roll
 from inercal.aoa.settings import Attitude
 from inercal.units import Quantity, parse_unit
 from rows import for_each

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from sting_study import DEG, NOISE, layout
 
-from inercal.aoa.paper.frequency import WINDOW, oscillation_frequency
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.paper.frequency import oscillation_frequency
 
 THREE = layout()
 
@@ -28,18 +29,22 @@ def test_an_oscillation_is_found_to_a_thousandth_of_its_frequency(frequency):
     """The bins of the window are 0.1 Hz apart."""
     t, acc, gyro = recorded(frequency)
     found = oscillation_frequency(t, acc, gyro, THREE)
-    np.testing.assert_allclose(found[t > WINDOW], frequency, rtol=1e-3)
+    np.testing.assert_allclose(found[t > LIMITS.oscillation_window], frequency, rtol=1e-3)
 
 
 def test_a_micro_oscillation_of_a_hundredth_of_a_degree_is_found():
     """0.01 deg at 0.78 Hz, of the paper's table: 0.004 rad/s^2 in noise of 0.0028 a sample."""
     t, acc, gyro = recorded(0.78, amplitude=0.01)
-    np.testing.assert_allclose(oscillation_frequency(t, acc, gyro, THREE)[t > WINDOW], 0.78, atol=5e-3)
+    np.testing.assert_allclose(
+        oscillation_frequency(t, acc, gyro, THREE)[t > LIMITS.oscillation_window], 0.78, atol=5e-3
+    )
 
 
 def test_without_noise_it_is_exact_to_what_the_other_side_of_the_spectrum_leaks():
     t, acc, gyro = recorded(2.5, noise=0.0)
-    np.testing.assert_allclose(oscillation_frequency(t, acc, gyro, THREE)[t > WINDOW], 2.5, rtol=1e-4)
+    np.testing.assert_allclose(
+        oscillation_frequency(t, acc, gyro, THREE)[t > LIMITS.oscillation_window], 2.5, rtol=1e-4
+    )
 
 
 def test_rows_to_come_change_nothing():
@@ -63,7 +68,7 @@ def test_it_follows_a_change_within_the_window():
     acc[after], gyro[after] = later_acc[after], later_gyro[after]
     found = oscillation_frequency(t, acc, gyro, THREE)
     np.testing.assert_allclose(found[(t > 10.0) & (t < 12.0)], 1.0, rtol=1e-3)
-    np.testing.assert_allclose(found[t > 12.5 + WINDOW], 2.0, rtol=1e-3)
+    np.testing.assert_allclose(found[t > 12.5 + LIMITS.oscillation_window], 2.0, rtol=1e-3)
 
 
 def test_three_periods_must_have_gone_by():
@@ -88,7 +93,9 @@ def test_what_the_gyro_does_not_show_is_no_oscillation():
         t, acc, gyro = recorded(3.0, reads=reads)
         assert np.isnan(oscillation_frequency(t, acc, gyro, THREE)).all()
     np.testing.assert_allclose(
-        oscillation_frequency(t, acc, np.full(len(t), np.nan), THREE)[t > WINDOW], 3.0, rtol=1e-3
+        oscillation_frequency(t, acc, np.full(len(t), np.nan), THREE)[t > LIMITS.oscillation_window],
+        3.0,
+        rtol=1e-3,
     )
 
 
@@ -99,7 +106,7 @@ def test_uneven_stamps_gaps_and_missing_samples_do_no_harm():
     t, acc, gyro = t[kept] + rng.uniform(0.0, 3e-4, kept.sum()), acc[kept], gyro[kept]
     acc[rng.random(len(t)) < 0.1, 0] = np.nan
     found = oscillation_frequency(t, acc, gyro, THREE)
-    np.testing.assert_allclose(found[t > WINDOW], 1.7, rtol=2e-3)
+    np.testing.assert_allclose(found[t > LIMITS.oscillation_window], 1.7, rtol=2e-3)
 
 
 def test_axes_that_show_no_angular_acceleration_show_no_frequency():

@@ -18,7 +18,7 @@ from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.layout import Layout
-from inercal.aoa.reading.clock import HELD
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import plain
 from inercal.aoa.settings import Attitude, Disturbances, Estimator, MotionPlan, Oscillation, Timing
 from inercal.aoa.simulate import simulate
@@ -140,7 +140,7 @@ def test_row_by_row_gives_the_same_digits(interrupted):
     going, out = initial(of), []
     for k in range(2000):
         going, part = advance(going, of, recording.t[k : k + 1], recording.rows[k : k + 1])
-        assert len(going.held) < HELD
+        assert len(going.held) < LIMITS.starting_rows
         out.append(part.out)
     going, part = advance(going, of, recording.t[:0], recording.rows[:0], last=True)
     np.testing.assert_array_equal(np.concatenate([*out, part.out]), whole.out)
@@ -323,8 +323,8 @@ def test_the_filter_starts_with_what_three_axes_show_at_rest():
         al = 2.0
         axes = of.layout
         read = G * np.sin(theta - axes.angle) - np.sin(axes.angle) * axes.r * al
-        acc = np.tile(read, (HELD, 1))
-        recording = plain(np.arange(HELD) * 1e-3, acc, np.zeros(HELD))
+        acc = np.tile(read, (LIMITS.starting_rows, 1))
+        recording = plain(np.arange(LIMITS.starting_rows) * 1e-3, acc, np.zeros(LIMITS.starting_rows))
         _, found = trace(of, recording)
         x = found.starts[0].x
         assert x[0] == pytest.approx(math.atan2(read[1], (read[2] - read[0]) / 2.0), abs=1e-12)

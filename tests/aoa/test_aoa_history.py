@@ -10,7 +10,7 @@ import pytest
 from scipy.io import netcdf_file
 from sting_study import DEG, study
 
-from inercal.aoa.angles import stated_roll
+from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.result.columns import angles_record, columns, points_record, rows
@@ -118,9 +118,12 @@ def test_the_uncertainty_of_a_stated_roll_is_in_the_columns_once(measured):
 
 def test_a_stream_tells_the_rows_of_a_file(measured):
     settings, _, angles = measured
-    whole = rows(angles.theta, angles.u, angles.rate, settings.attitude)
-    one = [rows(*(np.array([each[k]]) for each in (angles.theta, angles.u, angles.rate)), settings.attitude)[0]
-           for k in (50, 100, 300)]  # fmt: skip
+    whole = rows(angles, settings.attitude)
+    columns_of = (angles.theta, angles.u, angles.rate, angles.rate_u)
+    one = [
+        rows(Angles("", *(each[k : k + 1] for each in columns_of)), settings.attitude)[0]
+        for k in (50, 100, 300)
+    ]
     np.testing.assert_array_equal(whole[[50, 100, 300]], one)
     assert whole.shape[1] == len(columns(settings.attitude)) == 3
 

@@ -12,7 +12,7 @@ from sting_study import BASE, layout, scenario, study
 
 from inercal.aoa.paper.delay import relative_delay
 from inercal.aoa.paper.frequency import oscillation_frequency
-from inercal.aoa.paper.lowpass import zero_phase
+from inercal.aoa.paper.lever import zero_phase
 from inercal.aoa.reading.clock import shortened, usual_step
 from inercal.aoa.settings import Disturbances
 from inercal.aoa.simulate import simulate, to_record

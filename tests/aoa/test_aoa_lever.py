@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import DEG, NOISE, G, layout, study
 
-from inercal.aoa.arms import all_weights, axes, centrifugal_arms, pair_weights, tangential_arms
 from inercal.aoa.fusion import model
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights, axes, centrifugal_arms, pair_weights, tangential_arms
 from inercal.aoa.paper import residuals
 from inercal.aoa.paper.lever import centrifugal, differentiated, dual, peak_rate
 from inercal.aoa.paper.static import angle as angle_of

@@ -13,7 +13,7 @@ from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reading.clock import PATIENCE
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import Attitude
 from inercal.aoa.simulate import simulate
@@ -67,8 +67,9 @@ def joined(parts):
 def same(told, found, t):
     """Every row is answered, with the digits of the whole record."""
     assert_array_equal(told.t, t)
-    for name in ("theta", "u", "rate", "rate_u", "innovations"):
-        assert_array_equal(getattr(told, name), getattr(found, name))
+    for name in ("theta", "u", "rate", "rate_u"):
+        assert_array_equal(getattr(told.angles, name), getattr(found, name))
+    assert_array_equal(told.innovations, found.innovations)
 
 
 @pytest.mark.parametrize("spatial", [False, True])
@@ -141,23 +142,23 @@ def test_a_record_shorter_than_a_start_is_answered_at_its_end():
     assert len(live.feed_block(short).t) == 0
     told = live.finish()
     same(told, estimate(short, of), short.t)
-    assert np.isfinite(told.theta).all()
+    assert np.isfinite(told.angles.theta).all()
     assert len(live.finish().t) == 0
 
 
 @pytest.mark.parametrize("at", [4, 60])
-@pytest.mark.parametrize("size", [1, 7, 2 * PATIENCE])
+@pytest.mark.parametrize("size", [1, 7, 2 * LIMITS.backward_rows])
 def test_a_clock_that_was_set_back_is_said(at, size):
     """As in a file: so many rows in a row that are not later, whether rows are held or not, and however they come."""
     recording, of = flawed()
     good = rows_of(recording, slice(3, 3 + at))
-    back = rows_of(recording, np.full(2 * PATIENCE, 3))
+    back = rows_of(recording, np.full(2 * LIMITS.backward_rows, 3))
     back = replace(back, t=back.t - 1.0)
     live = Live(of, where="log.csv")
     live.feed_block(good)
-    for k in range(0, PATIENCE - size, size):
+    for k in range(0, LIMITS.backward_rows - size, size):
         live.feed_block(rows_of(back, slice(k, k + size)))
-    first = PATIENCE - 1 - (PATIENCE - 1) % size
+    first = LIMITS.backward_rows - 1 - (LIMITS.backward_rows - 1) % size
     with pytest.raises(RecordError, match=r"log\.csv.* rows in a row .*expected time to increase"):
         live.feed_block(rows_of(back, slice(first, first + size)))
     with pytest.raises(RecordError, match="rows in a row"):
@@ -175,15 +176,19 @@ def test_a_clock_that_was_set_back_is_said(at, size):
 def test_fewer_late_rows_than_that_are_left_out_however_they_come():
     recording, of = flawed()
     good = rows_of(recording, slice(3, 60))
-    back = replace(rows_of(good, np.zeros(PATIENCE - 1, np.int64)), t=np.full(PATIENCE - 1, -1.0))
+    back = replace(
+        rows_of(good, np.zeros(LIMITS.backward_rows - 1, np.int64)), t=np.full(LIMITS.backward_rows - 1, -1.0)
+    )
     live = Live(of)
     parts = [live.feed_block(good)]
     for _ in range(3):
-        parts += [live.feed_block(rows_of(back, slice(k, k + 333))) for k in range(0, PATIENCE - 1, 333)]
+        parts += [
+            live.feed_block(rows_of(back, slice(k, k + 333))) for k in range(0, LIMITS.backward_rows - 1, 333)
+        ]
         good = replace(good, t=good.t + 0.1)
         parts.append(live.feed_block(good))
     told = joined(parts)
-    assert np.isnan(told.theta).sum() == 3 * (PATIENCE - 1)
+    assert np.isnan(told.angles.theta).sum() == 3 * (LIMITS.backward_rows - 1)
 
 
 def test_the_angle_comes_with_the_sample():
@@ -193,6 +198,6 @@ def test_the_angle_comes_with_the_sample():
     live, recording = Live(problem(of)), made.recording
     for k, truth in enumerate(made.theta):
         told = live.feed(recording.t[k], recording.acc[k], recording.gyro[k])
-        if k >= fusion.HELD:
+        if k >= LIMITS.starting_rows:
             assert len(told.t) == 1
-            assert abs(told.theta[0] - truth) < 5.0 * told.u[0]
+            assert abs(told.angles.theta[0] - truth) < 5.0 * told.angles.u[0]

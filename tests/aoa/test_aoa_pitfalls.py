@@ -11,7 +11,7 @@ from inercal.aoa.fusion import loop, model
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.fusion.run import advance, initial
-from inercal.aoa.reading.clock import HELD
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.settings import Disturbances, Estimator, MotionPlan, Noise, Prior, Resonance
 from inercal.aoa.simulate import simulate
 from inercal.errors import RecordError
@@ -28,7 +28,13 @@ def told(found, simulated, after):
 
 def hard_gated(of, recording):
     """Angles (n,) of the same filter with a gate that shuts: what is off by five standard deviations is left out."""
-    _, trace = advance(initial(of), of, recording.t[:HELD], recording.rows[:HELD], last=True)
+    _, trace = advance(
+        initial(of),
+        of,
+        recording.t[: LIMITS.starting_rows],
+        recording.rows[: LIMITS.starting_rows],
+        last=True,
+    )
     x, P = (each.copy() for each in trace.starts[0][1:3])
     n, d = of.size, len(of.places.moving)
     F, Q, work, line = np.empty((d, d)), np.empty((d, d)), np.empty((d, n)), np.empty(n)

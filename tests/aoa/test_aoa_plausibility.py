@@ -108,7 +108,7 @@ def test_gross_faults_are_named(name):
     ((found, message),) = said(*change(recorded(SHORT, 0), SHORT))
     assert found == code
     assert message.startswith(text)
-    assert "as well possible" not in message
+    assert "equally possible" not in message
 
 
 @pytest.mark.slow

@@ -8,8 +8,7 @@ import pytest
 from scipy.signal import lfilter
 from sting_study import BASE, DEG, SCENARIOS, scenario, study
 
-from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.flow import theta_by_roll
+from inercal.aoa.angles import Angles, stated_roll, theta_by_roll
 from inercal.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.motion import Sines, buffet

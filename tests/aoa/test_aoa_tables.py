@@ -15,19 +15,22 @@ from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reference.corrections import report_of
 from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected
-from inercal.aoa.result.display import delays, displayed, in_words, rest_of_fit, use_of_fit
-from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.outcome import assemble, assemble_paper, term_of
 from inercal.aoa.result.points import points
 from inercal.aoa.result.tables import (
     angle,
     answer,
+    delays,
+    displayed,
     fitted,
     methods,
     on_page,
     on_terminal,
     points_table,
+    rest_of_fit,
     sensors,
     uncertainty,
+    use_of_fit,
 )
 from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import Calibration, MotionPlan, Timing
@@ -78,9 +81,11 @@ def test_units_of_the_field_are_what_they_say():
 
 def test_each_coefficient_has_words(shown):
     for name in (*shown[1].names, "tau_g", "b_roll", "b_yaw"):
-        assert in_words(name)
-    assert in_words("b_2") == "bias of accelerometer 2"
-    assert in_words("b_g") == "bias of the gyro"
+        assert term_of(name).name
+    assert term_of("b_2").name == "bias of accelerometer 2"
+    assert term_of("b_g").name == "bias of the gyro"
+    with pytest.raises(KeyError):
+        term_of("b_nobody")
 
 
 def test_the_table_of_sensors_shows_u_beside_the_prior(shown):

@@ -11,11 +11,12 @@ from scipy.stats import chi2
 from sting_study import BASE, DEG, G, layout, study
 
 from inercal.aoa.fusion.loop import root, significant
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.methods import measure as by_method
 from inercal.aoa.paper.static import gls
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.reference.sensor_fit import fit
-from inercal.aoa.result.verdict import NIS_CHANCE, NIS_LIMIT, is_covariance, nis_limit
+from inercal.aoa.result.verdict import is_covariance, nis_limit
 from inercal.aoa.settings import Methods
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
@@ -96,8 +97,8 @@ def test_few_innovations_may_scatter_more():
     """Of sound filters one in 100 000 is above: the mean of m squares of standard normal numbers."""
     for count in (1, 5, 20, 1000):
         limit = nis_limit(count)
-        assert limit == NIS_LIMIT or chi2.sf(count * limit, count) == pytest.approx(NIS_CHANCE)
-    assert nis_limit(1) > nis_limit(5) > nis_limit(20) > nis_limit(1000) == NIS_LIMIT
+        assert limit == LIMITS.mean_nis or chi2.sf(count * limit, count) == pytest.approx(LIMITS.nis_chance)
+    assert nis_limit(1) > nis_limit(5) > nis_limit(20) > nis_limit(1000) == LIMITS.mean_nis
 
 
 def test_a_gyro_that_is_clipped_from_the_start_is_no_sound_second():

@@ -13,7 +13,7 @@ import pytest
 from new_studies import filled
 
 from inercal.cli import run
-from inercal.cli.tree import COMMANDS
+from inercal.cli.tree import COMMANDS, app
 from inercal.examples import EXAMPLES, FOLDER
 from rows import for_each
 
@@ -317,3 +317,14 @@ def test_an_untouched_template_calibrates(simulated, capsys):
     data = json.loads(capsys.readouterr().out)
     share = {item["source"]: item["share"].get("K1_x", 0) for item in data["budget"]}
     assert share["latitude"] > 0.9
+
+
+def test_every_command_that_reads_a_recording_takes_a_part_of_it():
+    """Those with a column map; `monitor` reads a stream, of which each line goes out once it has come."""
+    without = []
+    for verb, kind in COMMANDS:
+        command = app()[verb][kind] if kind else app()[verb]
+        options = {name for each in command.assemble_argument_collection() for name in each.names}
+        if "--map" in options and not {"--begin", "--end"} <= options:
+            without.append(verb)
+    assert without == ["monitor"]

@@ -119,7 +119,7 @@ def test_a_choice_among_the_likeliest_and_what_is_alike():
     finding = fits[0].finding
     assert (finding.code, finding.harm) == ("unmodelled", ("*",))
     assert finding.message.startswith(
-        "the line is off by 5: correct it; as well possible: the line is too steep by"
+        "the line is off by 5: correct it; equally possible: the line is too steep by"
     )
 
 

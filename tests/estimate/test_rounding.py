@@ -20,10 +20,12 @@ POSITIVE = MAGNITUDES | st.floats(0.0, exclude_min=True, allow_infinity=False)
 @example(5e-324, 5e-324)
 @example(9.996, 0.01)
 def test_a_value_is_rounded_to_two_digits_of_its_uncertainty(value, u):
+    """Or to the 17 digits that a float has, where u is smaller than these."""
     shown, own = rounded(value, u)
     with localcontext(prec=1500):
         assert abs(Decimal(own) - Decimal(u)) <= Decimal("0.05").scaleb(Decimal(u).adjusted())
         last = Decimal(1).scaleb(Decimal(f"{u:.1e}").adjusted() - 1)
+        last = max(last, Decimal(1).scaleb(Decimal(value).adjusted() - 16) if value else last)
         error = abs(Decimal(shown) - Decimal(value))
         assert error <= last / 2
         if u > 1e-300:  # below, a float has no such digits itself
@@ -41,6 +43,7 @@ def test_a_value_is_rounded_to_two_digits_of_its_uncertainty(value, u):
         (123456789.0, 1e8, ("1.2e+08", "1.0e+08")),
         (float("nan"), 1.0, ("–", "1")),
         (2.5, 0.0, ("2.5", "0")),
+        (2.0**997, 1.0, ("1.3393857589828342e+300", "1.0e+00")),
     ],
 )
 def test_texts(value, u, texts):

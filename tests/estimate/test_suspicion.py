@@ -14,6 +14,7 @@ from inercal.estimate.files import from_json, to_json
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, EVERYTHING, Finding, Harm, Status, causes, settled
 from inercal.instruments.terms import resting_on
+from rows import for_each
 
 NAMES = ("K0_x", "D_F_x", "S_x")
 GYRO = ("D_F_x", "S_x")
@@ -93,6 +94,28 @@ def test_harm_to_a_channel_is_harm_to_what_rests_on_it():
     assert resting_on("acc_x", ("acc_x", "acc_x_T1", "gyro_x")) == ("acc_x", "acc_x_T1")
     assert resting_on("y_y", ("DX_F", "k_x", "DY_F", "kY_x")) == ("DY_F", "kY_x")
     assert resting_on("th_x", ("kg0_x", "ka0_x")) == ("kg0_x", "ka0_x")
+    assert resting_on("acc_x", ("kg0_x", "ka0_x")) == ("kg0_x", "ka0_x")
+    assert resting_on("t", ("N_gyro_x", "K0_x")) == ("N_gyro_x", "K0_x")
+    assert resting_on("temperature", ("acc_x", "acc_x_T1")) == ("acc_x", "acc_x_T1")
+
+
+@for_each(
+    ("channel", "names"),
+    [
+        ("gyro_x", ("K0_x", "K1_x", "M_xy")),
+        ("acc_x", ("D_F_x", "S_x")),
+        ("y_x", ("DY_F", "kY_x")),
+        ("gyro_x", ("N_gyro_y", "B_gyro_y")),
+        ("a1", ("N_a2",)),
+        ("th_x", ("N_gyro_y",)),
+        ("acc_x", ("gyro_x", "gyro_x_T1")),
+        ("temperature", ("K0_x", "D_F_x", "b_1")),
+    ],
+)
+def test_a_channel_on_which_nothing_rests_harms_nothing(channel, names):
+    assert resting_on(channel, names) == ()
+    harmless = estimate(finding("saturation", (channel,)), names=names)
+    assert (harmless.status, harmless.findings[0].harm) == (Status.OK, ())
 
 
 def test_a_result_that_estimates_nothing_cannot_be_harmed():

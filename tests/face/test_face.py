@@ -93,6 +93,28 @@ def test_a_result_shows_itself(kind, found):
     assert repr(result.estimate).count("\n") < 10
 
 
+def test_all_that_a_verb_returns_is_told_in_ten_lines(found, log):
+    table = ic.study("turntable", **TABLE)
+    results = [
+        *found.values(),
+        ic.design(table),
+        ic.sensitivity(table),
+        ic.temperature(ic.read(FOLDER / "thermal.csv.gz", map=FOLDER / "thermal-map.toml")),
+        ic.compare(found["imu"], found["imu"]),
+        ic.allan(ic.record(gyro_z=np.random.default_rng(1).standard_normal(6000), rate=100.0)),
+    ]
+    studies = [table, *(ic.study(FOLDER / f"{name}.toml") for name in ("ferraris", "selfcal", "sting"))]
+    told = [
+        *(part for each in results for part in (each, each.evidence, each.estimate)),
+        *(part for each in studies for part in (each, each.settings)),
+        *(log, log["acc_x"], log.triad("acc"), found["imu"]["K1_x"]),
+        *(results[4].evidence.plan, results[5].evidence.indices, studies[2].settings.plan),
+    ]
+    long = {type(each).__name__: repr(each) for each in told if repr(each).count("\n") >= 10}
+    assert long == {}
+    assert max(len(line) for each in told for line in repr(each).splitlines()) <= 250
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_result_goes_on(kind, found, tmp_path):
@@ -101,6 +123,7 @@ def test_a_result_goes_on(kind, found, tmp_path):
     assert page.read_text("utf-8").lower().startswith("<!doctype html>")
     again = ic.load(result.save(tmp_path / "result.json"))
     assert again.values == result.values
+    assert again.view.shown.units == result.view.shown.units
     assert again.status is result.status
     assert len(repr(again).splitlines()) == 3
     assert again.report(tmp_path / "again.html").exists()

@@ -14,6 +14,7 @@ from inercal.geometry.rotations import boxminus, boxplus
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
@@ -22,7 +23,7 @@ from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion, path
 from inercal.selfcal.platform.rig import Base
-from inercal.selfcal.settings import KINDS, Filter, Gating
+from inercal.selfcal.settings import Filter, Gating
 
 SEED, SEEDS = 20261121, range(8)
 SIZE = np.abs(TRUTH[:18])

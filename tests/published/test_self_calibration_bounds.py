@@ -6,7 +6,7 @@ import pytest
 from paper_study import ARCSEC, DEG, NOISE, PER_HOUR, TRUTH, gating_costs, study
 
 from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.before.observability import seen
+from inercal.selfcal.before.observability import observability
 from inercal.selfcal.before.path_design import at_rest, with_stops
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.platform.coefficients import DO, DS, KG0, NAMES
@@ -57,7 +57,7 @@ def test_plain_alternative():
 
 
 def test_two_turns_cannot_calibrate_the_platform():
-    judged = seen(along(study("paper two turns")), {})
+    judged = observability(along(study("paper two turns")), {})
     u = dict(zip(NAMES, per_cent(judged.bounds.u), strict=True))
     stated = {"kg0_x": 363.0, "ka1_z": 104.0, "do_y": 112.0, "ds_z": 57.0, "ds_x": 28.0, "do_x": 22.0}
     for name, expected in stated.items():
@@ -80,7 +80,7 @@ def test_what_is_left_of_the_misalignments_that_the_paper_never_turns():
     u = along(study("paper")).u
     assert u[DS][2] / ARCSEC == pytest.approx(37.0, rel=0.03)
     assert u[DO][1] / ARCSEC == pytest.approx(49.0, rel=0.03)
-    judged = seen(along(study("paper")), {})
+    judged = observability(along(study("paper")), {})
     assert [words.split(":")[0] for words in judged.worst(2)] == ["do_y", "ds_z"]
 
 

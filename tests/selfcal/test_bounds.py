@@ -11,7 +11,7 @@ from scipy import stats
 
 from inercal.geometry.rotations import boxminus, exp, multiply, rotate
 from inercal.selfcal.before.bounds import SOURCES, bounds, recorded_bounds
-from inercal.selfcal.before.observability import seen
+from inercal.selfcal.before.observability import observability
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
@@ -289,7 +289,7 @@ def test_near_level_gating_only_loses():
 
 
 def test_what_a_path_cannot_see_is_said():
-    judged = seen(along(study("paper two turns")), {"kg0_y": 1e-9, "ka0_x": 1.0, "kg0_x": 1e-12})
+    judged = observability(along(study("paper two turns")), {"kg0_y": 1e-9, "ka0_x": 1.0, "kg0_x": 1e-12})
     assert judged.at_prior == ("kg0_x", "ka1_z")
     assert judged.rank == 16
     assert judged.unmet == ("kg0_x", "kg0_y")
@@ -297,4 +297,4 @@ def test_what_a_path_cannot_see_is_said():
     assert said == {"kg0_x": "at_prior", "ka1_z": "at_prior", "kg0_y": "goal_missed"}
     assert judged.worst(1)[0].startswith("ka1_z")
     assert len(judged.table().splitlines()) == 19
-    assert not seen(along(study("best")), {}).findings()
+    assert not observability(along(study("best")), {}).findings()

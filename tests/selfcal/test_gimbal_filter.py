@@ -12,7 +12,8 @@ from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotat
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import gimbal as model
 from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.filters.run import LOCK, estimate
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES, to_linear
 from inercal.selfcal.platform.kinematics import angles, parity
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
@@ -187,7 +188,7 @@ def test_gimbal_lock_is_flagged(moves, integration):
     given, truth = problem(settings), to_linear(settings.truth)[:18]
     recording = simulate(experiment(settings), np.random.default_rng(1)).recording
     found = estimate(recording, given, "gimbal-ukf")
-    assert found.gimbal_cosine < LOCK
+    assert found.gimbal_cosine < LIMITS.singular_cosine
     assert not found.converged
     assert found.message
     if np.isfinite(found.coefficients).all():

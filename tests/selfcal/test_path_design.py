@@ -11,8 +11,9 @@ from paper_study import study
 from inercal.errors import StudyError
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.path_design import at_rest, design, lasting, stated_moves, with_stops
-from inercal.selfcal.before.path_search import LOCK, STARTS, criterion, search
+from inercal.selfcal.before.path_search import criterion, search
 from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import Search
 
@@ -43,14 +44,14 @@ def test_it_is_at_least_as_good_as_the_known_paths(designed):
 
 @pytest.mark.parametrize("goal", [{}, {"ds_z": 1e-7, "do_y": 1e-7, "ka0_x": 1e-6}])
 def test_it_is_at_least_as_good_by_the_worst_coefficient(goal, monkeypatch):
-    monkeypatch.setattr("inercal.selfcal.before.path_search.STARTS", 8)
+    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=8))
     asked = study("best", goal=goal, search=Search(criterion="worst"))
     assert value(search(asked), asked) <= value(asked.plan, asked)
 
 
 def test_in_a_small_space_it_finds_the_best_of_all(monkeypatch):
     """Two turns of 90° or 180° of any joints, 270 s at most: every sequence judged at full steps."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.STARTS", 6)
+    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
     asked = study("plain", search=Search(turns=2, angle=np.pi / 2, time=270.0, criterion="mean"))
     asked = replace(asked, limits={"th_y": (-np.pi / 3, np.pi / 3)})
     turns = [(joint, count * np.pi / 2) for joint in "xz" for count in (-3, -2, -1, 1, 2, 3)]
@@ -78,7 +79,7 @@ def test_it_keeps_time_number_and_limits():
     assert 0 < len(turns) <= 3
     assert found.duration == pytest.approx(333.0, abs=asked.plan.step)
     assert found.beyond(limits) == []
-    assert np.all(np.abs(np.cos(found.angles()[:, 1])) >= LOCK)
+    assert np.all(np.abs(np.cos(found.angles()[:, 1])) >= LIMITS.path_cosine)
     multiples = np.array([move.angle for move in turns]) / asked.search.angle
     assert multiples == pytest.approx(np.round(multiples))
 
@@ -86,7 +87,7 @@ def test_it_keeps_time_number_and_limits():
 @pytest.mark.parametrize("step", [0.7, 7.0])
 def test_it_keeps_time_where_turns_take_no_whole_number_of_rows(step, monkeypatch):
     """Sixteen turns of 20 s fill 320 s, but each takes 20.3 or 21 s of rows: a rest fills what is left of one less."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.STARTS", 1)
+    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=1))
     asked = study("best", search=replace(FEW, time=320.0, angle=np.radians(20.0)))
     found = search(replace(asked, plan=replace(asked.plan, step=step)))
     assert 320.0 - step < found.duration <= 320.0
@@ -97,10 +98,10 @@ def test_stated_limits_let_it_through_gimbal_lock():
     held = {"th_x": (0.0, 0.0), "th_z": (0.0, 0.0)}
     asked = study("best", limits=held, search=Search(turns=2, angle=np.pi / 6, time=360.0, criterion="mean"))
     kept = search(asked)
-    assert np.abs(np.cos(kept.angles()[:, 1])).min() >= LOCK
+    assert np.abs(np.cos(kept.angles()[:, 1])).min() >= LIMITS.path_cosine
     free = replace(asked, limits=held | {"th_y": (-np.pi, np.pi)})
     made = design(free)
-    assert np.abs(np.cos(made.plan.angles()[:, 1])).min() < LOCK
+    assert np.abs(np.cos(made.plan.angles()[:, 1])).min() < LIMITS.path_cosine
     assert "gimbal_lock" in {finding.code for finding in made.findings}
     assert made.compare[0].criterion < value(kept, asked)
     assert "th_x" in next(each for each in made.compare if each.name == "paper two turns").beyond
@@ -131,7 +132,7 @@ def test_result_holds_what_a_study_and_a_program_need(designed):
     assert max(each["d_efficiency"] for each in result["compare"]) == 1.0
     assert min(each["d_efficiency"] for each in result["compare"]) > 0.0
     assert [each["time"] for each in result["compare"]] == pytest.approx([540.0] * 5)
-    assert told == [(done, STARTS) for done in range(STARTS + 1)]
+    assert told == [(done, LIMITS.path_starts) for done in range(LIMITS.path_starts + 1)]
     assert made.table().count("\n") > 25
     assert made.plan.words() in made.message
 

@@ -10,8 +10,10 @@ from numpy.testing import assert_allclose
 from paper_study import DEG, study
 
 from inercal.errors import RecordError
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.inputs import Source
+from inercal.records.checks import check
 from inercal.records.column import Column
 from inercal.records.read import read
 from inercal.records.record import Record
@@ -20,6 +22,7 @@ from inercal.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.reading import recording_of
+from inercal.selfcal.task import calibrate
 from inercal.units import parse_unit
 
 # All three joints turn; 108 s.
@@ -170,6 +173,36 @@ def test_increments_from_a_file(tmp_path):
     found = recording_of(read(tmp_path / "r.csv", tmp_path / "map.toml"), STUDY)
     assert_allclose(found.rate, SIMULATED.rate, rtol=1e-12)
     assert "contradiction" not in codes(found)
+
+
+def of_coarse_gyros(rate):
+    """The record with measured rates (n - 1, 3), as a file of them is read: with the findings of single channels."""
+    record = of_gyros()
+    columns = {
+        name: replace(column, values=np.append(rate[:, "xyz".index(name[-1])], np.nan))
+        if name.startswith("gyro")
+        else column
+        for name, column in record.columns.items()
+    }
+    return Record(columns, check(columns), record.sources)
+
+
+def test_a_quiet_gyro_at_constant_rates_is_not_saturated():
+    """Steps of 1e-7 deg/s beside less noise: each turn is one reading, at an extreme, and the encoders agree."""
+    step = 1e-7 * DEG
+    record = of_coarse_gyros(np.round(SIMULATED.rate / step) * step)
+    assert [each.harm for each in record.findings if each.code == "saturation"] == [
+        ("gyro_x",), ("gyro_y",), ("gyro_z",)
+    ]  # fmt: skip
+    assert "saturation" not in codes(recording_of(record, STUDY))
+    assert calibrate(record, STUDY).estimate.status is Status.OK
+
+
+def test_a_clipped_gyro_is_saturated():
+    """Of turns at 5 deg/s all above 4.9 deg/s is lost, and the encoders turn on."""
+    record = of_coarse_gyros(np.clip(SIMULATED.rate, -4.9 * DEG, 4.9 * DEG))
+    assert codes(recording_of(record, STUDY)).count("saturation") == 3
+    assert calibrate(record, STUDY).estimate.status is Status.INCONSISTENT
 
 
 def test_commands_win_over_gyros():

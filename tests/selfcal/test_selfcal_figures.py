@@ -21,9 +21,9 @@ from inercal.report import innovations as filtering
 from inercal.report.cells import Cell
 from inercal.report.coefficients import dots
 from inercal.report.courses import turning
-from inercal.selfcal.before.bounds import Bounds
-from inercal.selfcal.before.observability import seen
-from inercal.selfcal.before.path_design import Designed, Judged
+from inercal.selfcal.before.bounds import PathBounds
+from inercal.selfcal.before.observability import observability
+from inercal.selfcal.before.path_design import ComparedPath, Designed
 from inercal.selfcal.figures.design import page as design_page
 from inercal.selfcal.figures.filters import attitude_errors
 from inercal.selfcal.figures.monte_carlo import page as campaign_page
@@ -105,7 +105,7 @@ def evidence(found=None, status=Status.OK, **changes):
         budget=budget,
         provenance={"settings": {}},
     )
-    bounds = Bounds(names(p), 0.9 * covariance, PRIOR[:p], np.zeros((0, p)))
+    bounds = PathBounds(names(p), 0.9 * covariance, PRIOR[:p], np.zeros((0, p)))
     of = FilterProblem(study().world, study().noise, PRIOR[:p])
     return replace(Calibration(estimate, of, recording, found, bounds, study(plan=SHORT)), **changes)
 
@@ -326,7 +326,7 @@ def test_what_the_path_cannot_see_is_named():
     scaled = 1e-4 * np.eye(p)
     scaled[8, 8] = 0.95**2
     scaled[np.ix_([0, 6], [0, 6])] = 0.5 * 0.7**2 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + 1e-5 * np.eye(2)
-    table = weak_combinations(Bounds(names(p), scaled * np.outer(prior, prior), prior, np.zeros((0, p))))
+    table = weak_combinations(PathBounds(names(p), scaled * np.outer(prior, prior), prior, np.zeros((0, p))))
     assert table.rows[0] == ("ds_z", "not seen", "95")
     combination, remark, left = table.rows[1]
     assert set(combination.split()) >= {"kg0_x", "ds_x", "-"}
@@ -406,8 +406,8 @@ def test_a_cell_maps_its_limits_to_its_edges():
 
 
 def judged(name, plan, size, settings):
-    bounds = Bounds(names(18), np.diag((size * PRIOR[:18]) ** 2), PRIOR[:18], np.zeros((0, 18)))
-    return Judged(name, plan, seen(bounds, settings.goal), float(np.max(size)), ())
+    bounds = PathBounds(names(18), np.diag((size * PRIOR[:18]) ** 2), PRIOR[:18], np.zeros((0, 18)))
+    return ComparedPath(name, plan, observability(bounds, settings.goal), float(np.max(size)), ())
 
 
 def told(found):

@@ -18,7 +18,7 @@ from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.result.outcome import assemble, verdict
-from inercal.selfcal.result.systematic import stated_errors, statements
+from inercal.selfcal.result.systematic import stated_errors, systematic_inputs
 
 PLAIN = study(path="best")
 PLAIN_LIMIT = 6.0 + 5.0 * np.sqrt(12.0 / 2700.0)
@@ -53,7 +53,7 @@ def test_earth_rate_turns_evenly_with_the_latitude_over_the_poles_too(degrees, b
     heading, latitude = 0.3, degrees * DEG + by
     (stated,) = (
         each
-        for each in statements(replace(with_latitude(PLAIN, degrees), base=Base(heading=heading)))
+        for each in systematic_inputs(replace(with_latitude(PLAIN, degrees), base=Base(heading=heading)))
         if each.name == "latitude"
     )
     north = np.array(

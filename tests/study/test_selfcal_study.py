@@ -16,9 +16,10 @@ from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
 from inercal.errors import StudyError
 from inercal.instruments.terms import TERMS
+from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
-from inercal.selfcal.settings import KINDS, Gating
+from inercal.selfcal.settings import Gating
 from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
@@ -255,7 +256,7 @@ REFUSED = {
     "plan.path=worst": "plan.path: found 'worst', expected 'paper'",
     "plan.step=0 s": "plan.step: .*a time above zero",
     "plan.rate=-1 deg/s": "plan.rate: .*a rate above zero",
-    "filter.kind=ukf": "filter.kind: found 'ukf', expected 'svd-qukf'",
+    "filter.kind=ukf": "filter.kind: found 'ukf', expected 'error-state'",
     "filter.gating=on": "filter.gating: found 'on', expected 'off'",
     "filter.knd=map": "filter.knd: unknown key, did you mean kind?",
     "disturbances.dropouts=1.0": "disturbances.dropouts: .*below 1",

@@ -1,7 +1,8 @@
-"""Limits by which the diagnosis of an angle of attack judges: one table, printed in the book."""
+"""Limits by which an angle of attack is judged, from the record to the verdict: one table, printed in the book."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from inercal.units import STANDARD_GRAVITY
@@ -112,6 +113,166 @@ class Limits:
 
     no_noise_ratio: float = 1e-3
     """The same below which there is none, as in numbers made up."""
+
+    starting_rows: int = 20
+    """Rows from which the filter starts; a recording has as many at least."""
+
+    backward_rows: int = 1000
+    """Successive rows without a later stamp from which the clock was set back; fewer are left out."""
+
+    range_rounding: float = 1e-6
+    """Part of a range by which a saturated sample may fall short of it, written with a few digits."""
+
+    stuck_samples: int = 50
+    """Successive equal samples of a stuck sensor; noise of the size of the steps makes them with 1e-7 or less."""
+
+    other_clock_gap: float = 2.5
+    """Intervals of another clock over which its samples are interpolated."""
+
+    pause_window: float = 0.5
+    """Window [s] in which a model rests or moves: some periods of a buffet, and short beside a pause."""
+
+    pause_window_rows: int = 8
+    """Rows of the shortest such window."""
+
+    shortest_pause: float = 1.0
+    """Shortest pause [s]."""
+
+    resting_sigmas: float = 3.0
+    """Standard deviations by which the angle may change over a window of a model at rest."""
+
+    resting_share: float = 1.0 / 20.0
+    """Largest scatter of a model at rest, over the range of the angle in the record."""
+
+    least_resting_scatter: float = math.radians(0.1)
+    """Scatter [rad] that a model at rest may have whatever that range."""
+
+    most_resting_scatter: float = math.radians(0.5)
+    """Scatter [rad] that no model at rest exceeds, but for its uncertainty."""
+
+    zero_rows: int = 80
+    """Rows at least of the stretch at rest of a wind-off zero."""
+
+    zero_sigmas: float = 3.0
+    """Standard deviations by which the angle may change in that stretch."""
+
+    lost_variance: float = 0.09
+    """Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
+
+    contradicting_rows: int = 500
+    """Successive rows in which a sensor surprises by twice the gate, after which theta counts as lost: half a second at
+    1 kHz, longer than the errors of one sign by a slightly wrong model, such as 5 mm of a height at 1 Hz."""
+
+    memory_time: float = 60.0
+    """Time [s] from the first row on in which nothing fades, and the time constant of fading after it."""
+
+    fading_interval: float = 10.0
+    """Interval [s] at which constants fade."""
+
+    settling_time: float = 2.0
+    """Time [s] after the first row from which innovations and errors are judged."""
+
+    level_cosine: float = 0.1
+    """Cosine of the roll below which gyro and axes across the body do not show pitch."""
+
+    pair_arm: float = 1e-3
+    """Lever arm [m] below which accelerometers do not show angular acceleration."""
+
+    parallel_axes: float = 1e-3
+    """Sine of the angle between axes, or error of a right angle [rad], below which they count as parallel or square."""
+
+    longest_delay: float = 0.1
+    """Largest delay [s] of the gyro that is looked for in the spectra."""
+
+    delay_segments: int = 4
+    """Segments of a spectrum without which there is no coherence to speak of."""
+
+    delay_chance: float = 1e-6
+    """Probability that a spectrum of noise alone has a frequency that counts as coherent."""
+
+    delay_share: float = 0.5
+    """Share of the likelihood that phases of a mere delay reach; those of a gyro with the wrong sign do not."""
+
+    bridged_samples: int = 5
+    """Samples in a row that straight lines may stand for in a spectrum: of more the phase is not that of the motion."""
+
+    gyro_gap: float = 3.0
+    """Interval, over the usual one, across which the gyro is not interpolated."""
+
+    oscillation_window: float = 10.0
+    """Window [s] in which the frequency and the peak rate of an oscillation are found."""
+
+    oscillation_periods: float = 3.0
+    """Periods that the window holds at least: fewer do not stand apart from a drift."""
+
+    peak_power: float = 20.0
+    """Power of an oscillation's peak over that of noise, which noise alone exceeds in one of a million windows."""
+
+    leaked_power: float = 1e-2
+    """Power of such a peak over that of a slower motion, of which a Hann window leaks a thousandth."""
+
+    amplitude_ratio: float = 2.0
+    """Ratio within which the amplitudes that accelerometers and gyro show must agree."""
+
+    uneven_share: float = 0.05
+    """Share of the usual interval by which another differs so that samples are put on an even grid for a low pass."""
+
+    reference_spans: int = 50
+    """Averages of 50 ms that a reference angle has at least for a fit of the sensors."""
+
+    reference_gap: float = 3.0
+    """Usual intervals that make a break of the reference angle."""
+
+    derivative_power: float = 10.0
+    """Power of a derivative of the reference over that of its noise from which it counts as motion."""
+
+    spike_sigmas: float = 6.0
+    """Standard deviations from which a row of a sensor is left out of the fit to the reference."""
+
+    widened_prior: float = 10.0
+    """Factor by which the fit to the reference widens the study's prior."""
+
+    disagreeing_sigmas: float = 2.0
+    """Standard uncertainties by which a coefficient of that fit differs from the study, to be listed."""
+
+    reference_creep: float = 1e-5
+    """Angle [rad], some seconds of arc, by which a reference may creep in half a second and stand still."""
+
+    same_sensor: float = 1e-6
+    """Change [m, rad, parts] below which a sensor counts as unchanged since an earlier run."""
+
+    sure_gravity: float = 1e-6
+    """Relative uncertainty of gravity, 0.00006 deg of the angle at most, up to which it counts as exact."""
+
+    budget_share: float = 1e-5
+    """Share of a variance below which a source is left out of the budget."""
+
+    listed_share: float = 1e-3
+    """Share of a variance below which a source is not listed for people."""
+
+    mean_nis: float = 2.0
+    """Mean squared innovation, over its variance, above which rows contradict the model."""
+
+    nis_chance: float = 1e-5
+    """Chance of a sound recording above that limit, where few innovations scatter."""
+
+    flexure_ratio: float = 5.0
+    """Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
+
+    losses: int = 3
+    """Losses of the angle without a gap from which a filter counts as lost."""
+
+    blind_time: float = 0.1
+    """Time [s] without accelerometers after which no filter has the angle."""
+
+    watched_time: float = 2.0
+    """Time [s] over which a stream averages its squared innovations."""
+
+    watched_innovations: int = 50
+    """Innovations in that time from which a stream judges."""
+
+    silent_time: float = 1.0
+    """Time [s] without a number after which a gyro is said to be silent on a stream."""
 
 
 LIMITS = Limits()

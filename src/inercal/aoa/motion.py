@@ -50,25 +50,24 @@ def buffet(rms: float, low: float, high: float, rng: np.random.Generator, count:
 
 def shaking(of: Shaking | None, rng: np.random.Generator) -> Sines:
     """A vibration as sines; no sine without one."""
-    if of is None:
-        return Sines(*np.zeros((3, 0)))
-    return buffet(of.rms, of.low, of.high, rng, _SHAKING)
+    return _sines() if of is None else buffet(of.rms, of.low, of.high, rng, _SHAKING)
 
 
 def oscillation(of: Oscillation | None) -> Sines:
     """An oscillation as one sine; no sine without one."""
-    if of is None:
-        return Sines(*np.zeros((3, 0)))
-    return Sines(np.array([of.amplitude]), np.array([2.0 * math.pi * of.frequency]), np.zeros(1))
+    return _sines() if of is None else _sines((of.amplitude, of.frequency))
+
+
+def _sines(*tones: tuple[float, float]) -> Sines:
+    """Sines of given amplitudes and frequencies [Hz], 0 at time 0."""
+    amplitude, frequency = np.reshape(tones, (-1, 2)).T
+    return Sines(amplitude, 2.0 * math.pi * frequency, np.zeros(len(tones)))
 
 
 def duration(plan: MotionPlan) -> float:
     """Length [s] of a motion: as stated, of all pauses and moves, or of its file if that is shorter.
 
-    Raises
-    ------
-    StudyError
-        A file of motion that cannot be used.
+    Raises `StudyError` for a file of motion that cannot be used.
     """
     if plan.kind == "pitch-pause":
         return plan.pause + moves(plan) * (plan.move + plan.pause)
@@ -84,27 +83,14 @@ def moves(plan: MotionPlan) -> int:
 
 
 def course(plan: MotionPlan, rng: np.random.Generator) -> Course:
-    """The pitch of a plan; its random parts are drawn here.
-
-    Raises
-    ------
-    StudyError
-        A file of motion that cannot be used.
-    """
-    two_pi = 2.0 * math.pi
+    """The pitch of a plan; its random parts are drawn here. Raises `StudyError` as `duration` does."""
     if plan.kind == "static":
         return _sweep(plan)
     if plan.kind == "pitch-pause":
         return _sum(_steps(plan), buffet(plan.rms, plan.low, plan.high, rng))
-    if plan.kind == "sine":
-        sine = Sines(np.array([plan.amplitude]), np.array([two_pi * plan.frequency]), np.zeros(1))
-        return _sum(_constant(plan.mean), sine)
-    if plan.kind == "two-tone":
-        amplitudes = np.array([plan.amplitude, plan.second_amplitude])
-        return _sum(
-            _constant(plan.mean),
-            Sines(amplitudes, two_pi * np.array([plan.frequency, plan.second_frequency]), np.zeros(2)),
-        )
+    if plan.kind in ("sine", "two-tone"):
+        tones = [(plan.amplitude, plan.frequency), (plan.second_amplitude, plan.second_frequency)]
+        return _sum(_constant(plan.mean), _sines(*tones[: 1 if plan.kind == "sine" else 2]))
     if plan.kind == "chirp":
         return _sum(_constant(plan.mean), _chirp(plan))
     if plan.kind == "buffet":

@@ -11,7 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from inercal.aoa.layout import Layout
-from inercal.arrays import Array
+from inercal.aoa.limits import LIMITS
+from inercal.arrays import Array, short_repr
+from inercal.errors import StudyError
 from inercal.geometry.site import Site
 from inercal.keys import (
     DEVIATION,
@@ -212,6 +214,18 @@ class Flow:
 class Attitude(Flow, ModelAttitude):
     """Attitude of the model in the stream beside its pitch; values [rad] with standard uncertainties."""
 
+    @property
+    def level(self) -> float:
+        """Cosine of the stated roll; 1 without one."""
+        return 1.0 if self.roll is None else math.cos(self.roll.value)
+
+    def check_pitch_shows(self) -> None:
+        """Raise `StudyError` for a model on its side, whose pitch no sensor shows."""
+        if self.roll is not None and abs(self.level) < LIMITS.level_cosine:
+            degrees = math.degrees(self.roll.value)
+            text = f"found {degrees:.6g} deg, expected one further from +-90 deg, at which pitch shows"
+            raise StudyError("model.roll", text)
+
 
 @dataclass(frozen=True)
 class Zero:
@@ -345,6 +359,7 @@ class Disturbances:
     dropouts: float = quantity("part of the rows that are empty", "number", "0", example="1 %", bounds=PART)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class AoaSettings:
     """A study of inertial angle of attack, in SI.

@@ -47,12 +47,7 @@ def simulate(
     """Move the model once as the study plans.
 
     ``errors`` of the sensors by name are drawn from the study's noise where they are not given; those of the study's
-    disturbances (pivot, heights, gyro scale and delay) are added to them.
-
-    Raises
-    ------
-    StudyError
-        The study has no motion.
+    disturbances (pivot, heights, gyro scale and delay) are added to them. Raises `StudyError` without a motion.
     """
     plan, other, layout = settings.motion, settings.disturbances, settings.layout
     if plan is None:
@@ -81,8 +76,7 @@ def simulate(
     late = longer - other.common_delay
     read = body.accelerometers(late, *moved(late), flexure[1](late)[0], flexure[2](late)[0])
     later = late - truth["tau_g"]
-    gyros = body.gyros(later, *moved(later))
-    values = np.column_stack([read, *gyros])
+    values = np.column_stack([read, *body.gyros(later, *moved(later))])
     values = _limited(values, other, step)[before:]
     noise = np.array([settings.noise.accelerometer] * n + [settings.noise.gyro] * 3)
     values += noise * rng.standard_normal(values.shape)

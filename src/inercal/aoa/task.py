@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.arms import level_of
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live, smoother
 from inercal.aoa.fusion.filter_result import FilterResult
@@ -29,11 +28,13 @@ from inercal.aoa.result.points import Point, points
 from inercal.aoa.result.systematic import by_fusion, by_methods
 from inercal.aoa.result.verification import Errors, errors
 from inercal.aoa.settings import AoaSettings, Methods
+from inercal.arrays import short_repr
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """An ``estimate``, and the data behind it for files and pictures.
@@ -63,26 +64,22 @@ def in_order(measurement: Measurement) -> Measurement:
     if len(taken) == len(t):
         return measurement
 
-    def rows(of: Any, *names: str) -> Any:
-        """A part of the measurement with only the later rows of some fields."""
-        return replace(
-            of, **{name: getattr(of, name)[taken] for name in names if getattr(of, name) is not None}
-        )
+    def rows(of: Any) -> Any:
+        """A part of the measurement with only the later of all rows."""
+        parts = {each.name: getattr(of, each.name) for each in fields(of)}
+        columns = {name: x for name, x in parts.items() if isinstance(x, np.ndarray) and len(x) == len(t)}
+        return replace(of, **{name: x[taken] for name, x in columns.items()})
 
-    motion = ("theta", "u", "rate", "rate_u")
-    angles = (*motion, "roll", "roll_u", "own_u", "by_roll")
     filtered = measurement.filtered
     if filtered is not None:
         starts = tuple(int(k) for k in np.searchsorted(taken, filtered.starts))
-        cut = rows(filtered, *motion, "acceleration", "innovations", "roll", "roll_u")
-        filtered = replace(cut, starts=starts)
-    kept = ("t", "acc", "gyro", "turns", "zero_angle", "point", "trigger", "reference", "masked")
+        filtered = replace(rows(filtered), starts=starts)
     return replace(
         measurement,
-        recording=rows(measurement.recording, *kept),
-        angles=rows(measurement.angles, *angles),
+        recording=rows(measurement.recording),
+        angles=rows(measurement.angles),
         filtered=filtered,
-        compared={name: rows(other, *angles) for name, other in measurement.compared.items()},
+        compared={name: rows(other) for name, other in measurement.compared.items()},
     )
 
 
@@ -103,31 +100,15 @@ def measure(
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Measurement:
-    """Measure the angle of attack of a model from what its sensors recorded.
+    """Measure the angle of attack of a model from a record of ``t``, ``a1`` .. and ``gyro``.
 
-    Parameters
-    ----------
-    record : Record
-        ``t``, ``a1`` .., ``gyro``; ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` where there are
-        any.
-    settings : AoaSettings
-        Site, sensors, noise, prior, timing, estimator.
-    methods : Methods or None
-        The paper's way with these choices; None for the fusion.
-    compare : bool
-        Also by the fusion of 8 and 19 states, causal and smoothed, and by the paper's methods.
-    progress : callable
-        Called with each step, in words.
+    ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger`` and ``theta_ref`` are used where the record has them.
+    ``methods`` are those of the paper, None for the fusion; with ``compare`` the angles are also found by the fusion of
+    8 and 19 states, causal and smoothed, and by the paper's methods. ``progress`` is called with each step, in words.
 
-    Returns
-    -------
-    Measurement
-        Its estimate's status says whether the angles can be used; nothing is raised for poor ones.
-
-    Raises
-    ------
-    InputError
-        The record has not the channels of a model, the study does not fit it, or an earlier result cannot be used.
+    The status of the estimate says whether the angles can be used: nothing is raised for poor ones. `InputError` is
+    raised where the record has not the channels of a model, the study does not fit it, or an earlier result cannot be
+    used.
     """
     clock = time.perf_counter()
     prior = settings.estimator.prior
@@ -136,7 +117,7 @@ def measure(
         posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
     recording = recording_of(record, settings)
     if not recording.spatial:
-        level_of(settings)
+        settings.attitude.check_pitch_shows()
     findings = implausible(recording, settings)
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)
@@ -192,9 +173,8 @@ def _compared(
             if name != done.method:
                 progress(name)
                 of = problem(chosen, recording.spatial)
-                others[name] = by_fusion(
-                    recording, chosen, of, filter_result.estimate(recording, of, smoothed)
-                )
+                filtered = filter_result.estimate(recording, of, smoothed)
+                others[name] = by_fusion(recording, chosen, of, filtered)
     for methods in MEASURED:
         if label(methods) == done.method:
             continue

@@ -27,11 +27,7 @@ def new_imu(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study, and a map guessed from the recordings."""
-    from inercal.records.guess import guess_map
-
-    column_map = guess_map(files) if files else None
-    channels = dict.fromkeys([] if column_map is None else _mapped(column_map))
-    _new("imu", files or [], output, channels, column_map, overrides or [])
+    _new("imu", files or [], overrides or [], output)
 
 
 def new_turntable(
@@ -42,16 +38,7 @@ def new_turntable(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study of a turntable, and a map guessed from recordings whose headers do not say what they hold."""
-    from inercal.records.channels import of_a_table
-    from inercal.records.guess import guess_map
-    from inercal.records.read import canonical_units
-
-    channels: Mapping[str, Unit | None] = (canonical_units(files) if files else None) or {}
-    column_map = None
-    if files and not of_a_table(channels):
-        column_map = guess_map(files, on_table=True)
-        channels = dict.fromkeys(_mapped(column_map))
-    _new("turntable", files or [], output, channels, column_map, overrides or [])
+    _new("turntable", files or [], overrides or [], output)
 
 
 def new_selfcal(
@@ -62,12 +49,7 @@ def new_selfcal(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study of a self-calibration, and a map guessed from recordings that do not say what they hold."""
-    from inercal.records.guess import guess_map
-    from inercal.records.read import canonical_units
-
-    channels = (canonical_units(files) if files else None) or {}
-    column_map = guess_map(files) if files and "th_x" not in channels else None
-    _new("selfcal", files or [], output, channels, column_map, overrides or [])
+    _new("selfcal", files or [], overrides or [], output)
 
 
 def new_aoa(
@@ -78,12 +60,28 @@ def new_aoa(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study of an angle of attack, and a map guessed from recordings that do not say what they hold."""
+    _new("aoa", files or [], overrides or [], output)
+
+
+def _described(kind: Kind, files: list[Path]) -> tuple[Mapping[str, Unit | None], str | None]:
+    """Channels of the recordings, with their units where known, and a map where the headers do not say these."""
+    from inercal.records.channels import of_a_table
     from inercal.records.guess import guess_map
     from inercal.records.read import canonical_units
 
-    channels = (canonical_units(files) if files else None) or {}
-    column_map = guess_map(files, of_model=True) if files and "a1" not in channels else None
-    _new("aoa", files or [], output, channels, column_map, overrides or [])
+    if not files:
+        return {}, None
+    channels: Mapping[str, Unit | None] = {} if kind == "imu" else canonical_units(files) or {}
+    plain = {
+        "imu": False,
+        "turntable": of_a_table(channels),
+        "selfcal": "th_x" in channels,
+        "aoa": "a1" in channels,
+    }
+    if plain[kind]:
+        return channels, None
+    column_map = guess_map(files, on_table=kind == "turntable", of_model=kind == "aoa")
+    return (dict.fromkeys(_mapped(column_map)) if kind in ("imu", "turntable") else channels), column_map
 
 
 def _mapped(column_map: str) -> list[str]:
@@ -95,14 +93,7 @@ def _mapped(column_map: str) -> list[str]:
     return [name for part in parts for name in part.get("columns", ())]
 
 
-def _new(
-    kind: Kind,
-    files: list[Path],
-    output: FileOutput,
-    channels: Mapping[str, Unit | None],
-    column_map: str | None,
-    overrides: list[str],
-) -> None:
+def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
     from inercal._files import write_text
     from inercal.estimate.result import without_coefficients
@@ -111,6 +102,7 @@ def _new(
     from inercal.studies.template import template
 
     output.check((".toml",), files)
+    channels, column_map = _described(kind, files)
     study = output.out or Path(f"{kind}.toml")
     map_file = None if column_map is None else study.with_name(f"{study.stem}-map{study.suffix}")
     written = [study] if map_file is None else [study, map_file]

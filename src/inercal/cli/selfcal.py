@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -12,12 +12,11 @@ from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFil
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError
+from inercal.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
     from inercal.cli.streaming import Estimators
     from inercal.selfcal.settings import SelfcalSettings
-
-Kind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
 
 
 def selfcal(
@@ -31,11 +30,10 @@ def selfcal(
     *,
     study: StudyFile,
     kind: Annotated[
-        Kind | None,
+        FilterKind | None,
         Parameter(
             name="--filter",
-            help="Estimator, in the place of that of the study. Points of svd-qukf are drawn by the "
-            "eigenvalues of the "
+            help="Estimator, in the place of that of the study. Points of svd-qukf are drawn by the eigenvalues of the "
             "covariance; by its singular values or its Cholesky factor with --set filter.factor=svd, or cholesky.",
         ),
     ] = None,

@@ -128,6 +128,13 @@ def units_in(text: str) -> Units:
     return dict(re.findall(r"(acc|gyro) \[([^\]]*)\]", line[1])) if line else {}
 
 
+def one_text(texts: Sequence[tuple[object, str]], name: str) -> tuple[object, str]:
+    """The path and the text of the one file; raises `InputError` where there are more."""
+    if len(texts) > 1:
+        raise InputError(name, f"found {len(texts)} files, expected one")
+    return texts[0]
+
+
 def digits(row: Array) -> list[str]:
     """Numbers as texts that read back exactly."""
     return [repr(float(value) + 0.0) for value in row]  # + 0.0 takes the sign off a zero

@@ -23,6 +23,7 @@ from inercal.convert.convention import (
     Convention,
     Terms,
     Units,
+    one_text,
     output_unit,
     per,
     triad_of_gain,
@@ -98,9 +99,7 @@ def render(terms: Terms, units: Units) -> dict[str, str]:
 
 def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     """Terms for m/s^2 and deg/s, and the units of the outputs where they are ones ("a.u." is none)."""
-    (where, text), *more = texts
-    if more:
-        raise InputError("imucal", f"found {len(texts)} files, expected one")
+    where, text = one_text(texts, "imucal")
     expected = "expected a calibration written by imucal (format version 2.0.0)"
     try:
         data: Any = json.loads(text)

@@ -36,6 +36,7 @@ from inercal.convert.convention import (
     Terms,
     Units,
     digits,
+    one_text,
     per,
     triad_of_gain,
     units_in,
@@ -139,9 +140,7 @@ def _rows(key: str, array: Array, indent: int) -> list[str]:
 
 def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     """Terms; without keys ``b`` those of the biases are left out. Outputs are in SI units unless said otherwise."""
-    (where, text), *more = texts
-    if more:
-        raise InputError("kalibr", f"found {len(texts)} files, expected one")
+    where, text = one_text(texts, "kalibr")
     whole = yaml_subset.parse(text, where)
     imus = [key for key in whole if key.startswith("imu")] if isinstance(whole, Mapping) else []
     if len(imus) != 1 or not isinstance(whole[imus[0]], Mapping):

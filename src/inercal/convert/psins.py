@@ -36,6 +36,7 @@ from inercal.convert.convention import (
     Units,
     digits,
     inverse,
+    one_text,
     per,
     triad_of_gain,
     units_in,
@@ -112,9 +113,7 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
 
     Without sf the outputs are in SI units.
     """
-    (where, text), *more = texts
-    if more:
-        raise InputError("psins", f"found {len(texts)} files, expected one")
+    where, text = one_text(texts, "psins")
     bare = re.sub(r"%.*|\.\.\.", "", text)
     matrices: dict[str, Array] = {}
     for struct, name, body in re.findall(r"(clbt\.)?\b(\w+)\s*=\s*(\[[^\]]*\]|[^;\n]*)", bare):

@@ -121,7 +121,7 @@ class Fitted(Generic[Case]):
     def finding(self) -> Finding:
         """The sentence, with the equally possible ones."""
         others = dict.fromkeys(each.sentence.split(":")[0] for each in self.alike)
-        also = f"; as well possible: {'; '.join([*others][:SHOWN])}" if others else ""
+        also = f"; equally possible: {'; '.join([*others][:SHOWN])}" if others else ""
         of = self.hypothesis
         return Finding(of.code, self.sentence + also, of.where, of.harm)
 

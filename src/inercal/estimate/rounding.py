@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 
+_DIGITS = 16
+"""Digits after the first that tell every number from its neighbours."""
+
 
 def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
     """Texts of a value, its u and further uncertainties, to two significant digits of u (GUM 7.2.6).
@@ -22,7 +25,7 @@ def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
         return (f"{round(value, 1 - first):.{1 - first}f}", *(f"{x:.1e}" for x in (u, *others)))
     if abs(value) < 1e308:  # one above may not be there when it is rounded
         value = round(value, 1 - first) + 0.0  # no digits below the last of u, also of a value smaller than u
-    digits = max(0, Decimal(str(value)).adjusted() - first + 1) if value else 0
+    digits = min(max(0, Decimal(str(value)).adjusted() - first + 1), _DIGITS) if value else 0
     return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))
 
 

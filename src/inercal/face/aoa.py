@@ -55,8 +55,7 @@ def calibrate(
 def _result(measurement: task.Measurement, by_point: bool) -> Result:
     """A measurement as a result."""
     from inercal.aoa.result.columns import angles_record, points_record
-    from inercal.aoa.result.display import delays, displayed, rest_of_fit, use_of_fit
-    from inercal.aoa.result.tables import answer, on_terminal
+    from inercal.aoa.result.tables import answer, delays, displayed, on_terminal, rest_of_fit, use_of_fit
 
     estimate, angles = measurement.estimate, measurement.angles
 
@@ -108,7 +107,7 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 
 def loaded(estimate: Estimate) -> Result:
     """A result that was saved, in the units of the command line; its angles are in files of their own."""
-    from inercal.aoa.result.display import displayed
+    from inercal.aoa.result.tables import displayed
     from inercal.face.imu import loaded as plain
 
     whole, shown = plain(estimate), displayed(estimate)

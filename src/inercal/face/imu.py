@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View, coefficients
 from inercal.face.study import Study
@@ -46,6 +48,14 @@ def calibrate(
     return Result(
         estimate, of_coefficients(shown, page), calibrated[0] if len(calibrated) == 1 else tuple(calibrated)
     )
+
+
+def simulate(study: Study, rng: np.random.Generator) -> Record:
+    """A simulated record of an IMU that is held in the poses of the study."""
+    from inercal.imu import task
+
+    with study.at_fault():
+        return task.simulate(study.settings, rng)
 
 
 def of_temperature(model: TemperatureModel) -> Result:
@@ -90,5 +100,11 @@ def loaded(estimate: Estimate) -> Result:
         pictures += [budget(shown)] if estimate.names and estimate.budget else []
         return render(shown, pictures, f"inercal {estimate.command}")
 
-    shown = estimate.shown()
+    if "output_unit" in estimate.conditions:  # of a turntable
+        from inercal.turntable.display import displayed
+        from inercal.units import parse_unit
+
+        shown = displayed(estimate, parse_unit(estimate.conditions["output_unit"]))
+    else:
+        shown = estimate.shown()
     return Result(estimate, of_coefficients(shown, page))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
 from inercal.errors import InputError
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, without_coefficients
 from inercal.face.study import Study
 from inercal.records.record import Record
 
@@ -45,6 +46,24 @@ def one_run(records: Sequence[Record], instead: str) -> Record:
             f"has the channels of {first[0].path if first else 'the first'}, expected one run: {instead}",
         )
     return records[0]
+
+
+def of_design(
+    command: str, designed: Any, study: Study, began: float, references: tuple[str, ...]
+) -> Estimate:
+    """The estimate without coefficients of a design that ``began`` at that `time.perf_counter`."""
+    from inercal.records.read import source_of
+
+    return without_coefficients(
+        command,
+        designed.message,
+        designed.result,
+        map(source_of, study.files),
+        designed.findings,
+        {"solve": time.perf_counter() - began},
+        study.keys,
+        references=references,
+    )
 
 
 def _traced(calibration: Any, record: Record, study: Study) -> Any:

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import InputError
-from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, with_span
+from inercal.face.runs import Progress, calibrations, of_design, with_span
 from inercal.face.study import Study
 from inercal.records.record import Record
 from inercal.selfcal import task
@@ -105,29 +104,18 @@ def prepare_design(study: Study) -> None:
 
 def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
     """Find the path that calibrates best; ``evidence`` is the `inercal.selfcal.before.path_design.Designed`."""
-    from inercal.records.read import source_of
     from inercal.selfcal.before.path_design import REFERENCES
     from inercal.selfcal.before.path_design import design as search
 
     clock = time.perf_counter()
     with study.at_fault():
         designed = search(study.settings, *(() if progress is None else (progress,)))
-    timing = {"solve": time.perf_counter() - clock}
-    result = without_coefficients(
-        "design selfcal",
-        designed.message,
-        designed.result,
-        map(source_of, study.files),
-        designed.findings,
-        timing,
-        study.keys,
-        references=REFERENCES,
-    )
+    result = of_design("design selfcal", designed, study, clock, REFERENCES)
 
     def page() -> str:
-        from inercal.selfcal.figures.design import page as of_design
+        from inercal.selfcal.figures.design import page as of_page
 
-        return of_design(designed, study.settings, result)
+        return of_page(designed, study.settings, result)
 
     def picture() -> Picture:
         from inercal.selfcal.figures.design import main

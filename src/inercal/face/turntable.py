@@ -11,7 +11,7 @@ import numpy as np
 from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations
+from inercal.face.runs import Progress, calibrations, of_design
 from inercal.face.study import Study
 from inercal.records.record import Record
 from inercal.turntable import task
@@ -72,29 +72,18 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 
 def design(study: Study, progress: Progress = lambda _: None) -> Result:
     """Find the positions that calibrate best; ``evidence`` is the `inercal.turntable.positions.planning.Designed`."""
-    from inercal.records.read import source_of
     from inercal.turntable.positions.planning import REFERENCES
     from inercal.turntable.positions.planning import design as planned
 
     clock = time.perf_counter()
     with study.at_fault():
         designed = planned(study.settings, progress)
-    timing = {"solve": time.perf_counter() - clock}
-    result = without_coefficients(
-        "design positions",
-        designed.message,
-        designed.result,
-        map(source_of, study.files),
-        designed.findings,
-        timing,
-        study.keys,
-        references=REFERENCES,
-    )
+    result = of_design("design positions", designed, study, clock, REFERENCES)
 
     def page() -> str:
-        from inercal.turntable.figures.design import page as of_design
+        from inercal.turntable.figures.design import page as of_page
 
-        return of_design(designed, study.settings, result)
+        return of_page(designed, study.settings, result)
 
     def picture() -> Picture:
         from inercal.turntable.figures.design import main

@@ -102,7 +102,7 @@ def _imu_study(record: Record, given: dict[str, str]) -> Study:
 
 
 def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
-    """Simulate a recording of the test that a study plans: of a turntable, a platform, or a model on a sting.
+    """Simulate a recording of the test that a study plans: of an IMU, a turntable, a platform, or a model on a sting.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
     study = study_of(study)
     if not isinstance(rng, np.random.Generator):
         raise InputError("rng", f"found {type(rng).__name__}, expected numpy.random.default_rng(seed)")
-    made: Record = _of_system(study, "simulate", "turntable, selfcal or aoa")(study, rng)
+    made: Record = _of_system(study, "simulate", "imu, turntable, selfcal or aoa")(study, rng)
     return made
 
 

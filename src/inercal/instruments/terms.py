@@ -347,16 +347,30 @@ def sized_ratio(unit: str) -> tuple[str, float]:
 def resting_on(channel: str, names: Sequence[str]) -> tuple[str, ...]:
     """Those of ``names`` that the output of a channel leads to; all where the table does not tell, as for angles.
 
+    None where all belong to other channels, as accelerometers where a gyro is dead.
+
     Examples
     --------
     >>> resting_on("gyro_x", ("K0_x", "D_F_x", "S_y"))
     ('D_F_x', 'S_y')
+    >>> resting_on("gyro_x", ("K0_x", "K1_x"))
+    ()
     """
-    kind, _, axis = channel.partition("_")
-    of_kind = {
-        "acc": {term.symbol for term in (*_ACCELEROMETER, *_ACCELEROMETER_BY_ANGLE)},
-        "gyro": {term.symbol for term in (*_GYRO, *_RATE_TEST)},
-        "y": {name for name in TERMS if name.startswith(("DX_", "k_") if axis == "x" else ("DY_", "kY_"))},
-    }
     by_name = [n for n in names if n == channel or n.startswith(f"{channel}_") or n.endswith(f"_{channel}")]
-    return tuple(by_name or [n for n in names if n in of_kind.get(kind, ())] or names)
+    if by_name or channel == "t":
+        return tuple(by_name or names)
+    if channel == "temperature":
+        return tuple(names) if any(n.rpartition("_")[2] in _OVER_TEMPERATURE for n in names) else ()
+    sensor = channel if channel.startswith("y_") else channel.partition("_")[0]
+    others = set[str]().union(*_SYMBOLS_OF.values()) if sensor in _SYMBOLS_OF else ()
+    rest = [n for n in names if n not in others and not re.search(rf"(?:^|_)(?:{_CHANNEL})(?:_|$)", n)]
+    return tuple([n for n in names if n in _SYMBOLS_OF.get(sensor, ())] or rest)
+
+
+#: sensor -> symbols of what is found from its output
+_SYMBOLS_OF = {
+    "acc": {term.symbol for term in (*_ACCELEROMETER, *_ACCELEROMETER_BY_ANGLE)},
+    "gyro": {term.symbol for term in (*_GYRO, *_RATE_TEST)},
+    "y_x": {term.symbol for term in _DRIFT if term.symbol.startswith(("DX_", "k_"))},
+    "y_y": {term.symbol for term in _DRIFT if term.symbol.startswith(("DY_", "kY_"))},
+}

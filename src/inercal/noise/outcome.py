@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate
-from inercal.findings import EVERYTHING, Finding, Status
+from inercal.findings import Finding, Status
 from inercal.instruments.noise import SYMBOLS
 from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
@@ -87,6 +87,7 @@ class ChannelNoise:
         return self.curve.lower[:, self.at], self.curve.upper[:, self.at]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Noise:
     """The ``estimate`` and what it was made from."""
@@ -219,8 +220,6 @@ def _assemble(
                 values.append(0.0)
                 dof.append(np.inf)
         blocks.append(block)
-    fitted = (*EVERYTHING, *(channel.name for channel in channels if channel.fit is not None))
-    own = [replace(each, harm=tuple(n for n in each.harm if n in fitted)) for each in record.findings]
     longest = max(channels, key=lambda each: each.curve.samples * each.curve.interval).curve
     return Estimate.of(
         Basis(
@@ -231,7 +230,7 @@ def _assemble(
         np.array(values),
         Uncertainty(block_diag(np.zeros((0, 0)), *blocks), np.array(dof)),
         _verdict(channels, disturbed),
-        findings=(*own, *findings),
+        findings=(*record.findings, *findings),
         statistics={
             "samples": float(longest.samples),
             "rate_hz": 1.0 / longest.interval,

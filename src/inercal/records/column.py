@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError
 from inercal.inputs import Source
 from inercal.records.channels import sensor_and_axis
 from inercal.units import Unit
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Column:
     """One channel.
@@ -49,6 +50,7 @@ class Column:
         return self.values * self.unit.factor + self.unit.zero
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Triad:
     """Three axes of one sensor: ``t`` (n,) [s], ``values`` (n, 3) in ``unit``, ``source`` as in `Column`."""

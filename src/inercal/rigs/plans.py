@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Positions to be taken one after the other: ``angles`` (n, joints) [rad], and what they are called."""

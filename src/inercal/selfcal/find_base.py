@@ -1,8 +1,7 @@
 """The base found from the record before the calibration, where a study states it too roughly.
 
-Filters linearise at their present estimate. About a base that is a degree off, the first rows turn beta by far more
-than the record supports in the end, while all else is known poorly too; information lost there does not come back, and
-some is made up. The batch estimator linearises all rows again and again where it stands, and so ends right.
+Filters linearise at their present estimate. About a base that is a degree off the first rows turn beta by far more than
+the record supports in the end, and make information up. The batch estimator linearises all rows again where it stands.
 """
 
 from __future__ import annotations
@@ -20,30 +19,16 @@ from inercal.selfcal.before.observability import singular
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.settings import SelfcalSettings
 
-NEAR = math.radians(2.0 / 60.0)
-"""Standard deviation [rad] of beta up to which filters find it from the base as stated.
-
-Linearising neglects its square, 0.07 arcsec: less than what is averaged of the best encoders and accelerometers.
-"""
-
-WIDTH = math.radians(60.0)
-"""Standard deviation [rad] of a first guess of the heading; the batch estimator finds it from 60 degrees away."""
-
-TELLING = math.radians(1.0)
-"""Standard uncertainty [rad] of a heading up to which it counts as found."""
-
-LAST = 10.0
-"""Prior of beta at last, in standard uncertainties of the base found: a hundredth of what the recording tells."""
-
 
 def is_rough(settings: SelfcalSettings) -> bool:
     """True for a base to be found before the calibration: heading unknown, or a wide prior of beta."""
-    wide = settings.filter.extended and bool((settings.prior[BETA] > NEAR).any())
+    wide = settings.filter.extended and bool((settings.prior[BETA] > LIMITS.base_sigma).any())
     return settings.heading_unknown or wide
 
 
@@ -53,7 +38,7 @@ def stated_well(settings: SelfcalSettings, use: str) -> None:
         raise StudyError("rig.heading", f"found it unknown, expected a known one for {use}")
     if is_rough(settings):
         widest = math.degrees(float(settings.prior[BETA].max())) * 60.0
-        limit = math.degrees(NEAR) * 60.0
+        limit = math.degrees(LIMITS.base_sigma) * 60.0
         raise StudyError(
             "prior.beta",
             f"found {widest:.3g} arcmin, with the uncertainty of heading and tilt, expected {limit:.0f} arcmin or less "
@@ -64,28 +49,23 @@ def stated_well(settings: SelfcalSettings, use: str) -> None:
 def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSettings:
     """The study with the base found from its recording, and beta, relative to that, to correct it.
 
-    The most probable base is the batch estimator's, with the prior of the study; one of unknown heading is looked for
-    from four headings, a quarter turn apart, and the most probable of these is taken. The prior of beta about the base
-    found is `LAST` times its bound, the study's where that is narrower; about level axes too, as a tilt of a minute of
-    arc by a wide heading is enough to make up information. The bound is linearised at one base: it does not add up
-    different headings. Where residuals are larger than the stated noise, so is the prior. Where rounding leaves no
-    bound the prior stays as it is: the covariance of the calibration is lost too, and its verdict says so.
+    The batch estimator finds the most probable base with the prior of the study; of an unknown heading from four, a
+    quarter turn apart, of which the most probable is taken. The prior of beta about the base found is
+    `LIMITS.base_prior_ratio` times its bound, the study's where that is narrower; about level axes too, as a tilt of a
+    minute of arc by a wide heading is enough to make up information. Larger residuals than the stated noise widen it.
+    Where rounding leaves no bound it stays, and the verdict of the calibration says why. The prior of the study enters
+    twice: that is nothing where the recording tells a hundred times more, a tenth too little in u where as much.
 
-    The prior of the study enters twice, in the base and about it: that is nothing where the recording tells a hundred
-    times more, a tenth too little in u where it tells as much.
-
-    Raises
-    ------
-    StudyError
-        The heading is unknown, and the recording tells less of it than `TELLING`: earth rate has no north at the poles.
+    Raises StudyError for an unknown heading of which the recording tells less than `LIMITS.heading_u`: at the poles
+    earth rate has no north.
     """
     prior, base, vertical = settings.prior.copy(), settings.base, _vertical(settings.base)
     guesses = [base]
     if settings.heading_unknown:
-        prior[BETA] = np.hypot(prior[BETA], WIDTH * vertical)
+        prior[BETA] = np.hypot(prior[BETA], LIMITS.heading_sigma * vertical)
         guesses = [replace(base, heading=0.5 * math.pi * k) for k in range(4)]
     wide = replace(settings, prior=prior, filter=replace(settings.filter, extended=True))
-    tried = [(guess, _batch(recording, replace(wide, base=guess))) for guess in guesses]
+    tried = [(guess, estimate(recording, problem(replace(wide, base=guess)), "map")) for guess in guesses]
     base, batch = min(tried, key=lambda each: _misfit(each[1]))
     if not math.isfinite(_misfit(batch)):
         return wide  # a recording that contradicts the model: the diagnosis says how
@@ -95,10 +75,10 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
         return near
     u = np.sqrt(np.diag(bound))
     if settings.heading_unknown:
-        _refuse_weak_heading(float(vertical @ u), settings)
+        _refuse_weak(float(vertical @ u), settings)
     scatter = math.sqrt(max(1.0, np.nansum(batch.nis) / max(batch.dims.sum(), 1)))
     last = prior.copy()
-    last[BETA] = np.minimum(prior[BETA], LAST * scatter * u)
+    last[BETA] = np.minimum(prior[BETA], LIMITS.base_prior_ratio * scatter * u)
     return replace(near, prior=last)
 
 
@@ -114,11 +94,6 @@ def relative(beta: Array, old: Base, new: Base) -> Array:
     """Beta (3,) [rad] against a ``new`` base, from that against an ``old`` one."""
     between = old.from_geographic() @ new.from_geographic().T
     return log(multiply(exp(beta), from_matrix(between)))
-
-
-def _batch(recording: Recording, settings: SelfcalSettings) -> FilterResult:
-    """The batch estimator."""
-    return estimate(recording, problem(settings), "map")
 
 
 def _misfit(batch: FilterResult) -> float:
@@ -137,17 +112,17 @@ def _bound(recording: Recording, settings: SelfcalSettings, batch: FilterResult)
 
 
 def _vertical(base: Base) -> Array:
-    """(3,) 1 for the axis of b about which the heading turns, upward or downward where the base is level; 0 else."""
+    """(3,) 1 for the axis of b about which the heading turns, vertical where the base is level; 0 else."""
     return np.abs(Base(base.frame).from_geographic()[:, 2])
 
 
-def _refuse_weak_heading(u: float, settings: SelfcalSettings) -> None:
+def _refuse_weak(u: float, settings: SelfcalSettings) -> None:
     """Refuse a heading that stays unknown."""
-    if u > TELLING:
+    if u > LIMITS.heading_u:
         at = math.degrees(settings.site.latitude or 0.0)
         raise StudyError(
             "rig.heading",
             f"found unknown, but at latitude {at:.6g} deg this recording tells it to {math.degrees(u):.2g} deg only, "
             "expected a heading that is stated with its uncertainty (or a recording from which u is below "
-            f"{math.degrees(TELLING):.2g} deg)",
+            f"{math.degrees(LIMITS.heading_u):.2g} deg)",
         )

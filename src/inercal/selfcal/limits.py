@@ -22,6 +22,69 @@ class Limits:
     explained_ratio: float = 0.5
     """The same ratio from which a gross fault is not what happened."""
 
+    least_rows: int = 10
+    """Rows at least of a recording."""
+
+    most_rows: int = 5_000_000
+    """Rows of a plan that fit into memory with all that is computed from them."""
+
+    gap_ratio: float = 1.5
+    """Ratio to the usual interval beyond which an interval is a gap: the rate was not meant for so long."""
+
+    recent_intervals: int = 9
+    """Intervals, with the one in question, of which the middle one is the usual one."""
+
+    held_sigmas: float = 5.0
+    """Standard deviations about an axis beyond which the encoders contradict a turn that was held: by chance once in a
+    million gaps, while a turn that ended a hundredth of a second before the gap did is off by more."""
+
+    encoder_floor: float = 0.05
+    """Part of the encoder noise that is taken for isotropic, against infinite information at gimbal lock."""
+
+    singular_cosine: float = 0.01
+    """Cosine of the inner gimbal's angle below which the gimbal angles of a model cannot be used."""
+
+    path_cosine: float = 0.2
+    """Cosine of the inner gimbal's angle that a designed path keeps to where its limits are not stated: nearer to lock
+    two joints are almost one."""
+
+    path_starts: int = 24
+    """Random starts of the search for a path; on the 540 s of the paper ten times as many gain less than 1 %."""
+
+    path_angles: int = 5000
+    """Angles within the time that the search can go through: it tries one change for each, again and again."""
+
+    search_turn: float = math.radians(3.0)
+    """Turn [rad] between two rows, at most, while a path is searched for."""
+
+    base_sigma: float = math.radians(2.0 / 60.0)
+    """Standard deviation [rad] of beta up to which filters find it from the base as stated: linearising neglects its
+    square, 0.07 arcsec, less than what is averaged of the best encoders and accelerometers."""
+
+    heading_sigma: float = math.radians(60.0)
+    """Standard deviation [rad] of a first guess of the heading: the batch estimator finds it from so far away."""
+
+    heading_u: float = math.radians(1.0)
+    """Standard uncertainty [rad] of a heading up to which it counts as found."""
+
+    base_prior_ratio: float = 10.0
+    """Prior of beta about the base found, in its standard uncertainties: a hundredth of what the recording tells."""
+
+    turning_ratio: float = 2.0
+    """Rate, over earth rate, from which the platform turns."""
+
+    turned_angle: float = math.radians(45.0)
+    """Angle [rad] about an axis of p below which the platform hardly turned about it."""
+
+    moving_share: float = 0.3
+    """Part of the largest turn of a stretch from which units of rates and angles are compared."""
+
+    unit_window: float = 1.25
+    """Factor within which a ratio of rates to angles is that of two units."""
+
+    missing_steps: float = 1.5
+    """Steps by which a recording may be shorter than its path."""
+
     single_rows: int = 60
     """Rows that are left out one after the other before they no longer count as single."""
 
@@ -62,13 +125,16 @@ class Limits:
     """Constant errors that are looked for, one after the other."""
 
     lock_cosine: float = 0.2
-    """Cosine of the inner gimbal's angle below which innovations are left out: they are smaller than stated there."""
+    """Cosine of the inner gimbal's angle below which innovations are left out: encoder noise is overstated there."""
 
     shown_sigmas: float = 3.0
     """Standard uncertainties of a parameter from which it is named with its value."""
 
     low_noise_ratio: float = 1.1
     """Ratio of stated noise to scatter from which it is reported: 10 % in every u."""
+
+    walk_square: float = 0.5
+    """Mean square of the encoders' innovations that a larger walk must leave, as half an octave too much does."""
 
     even_parts: int = 10
     """Parts of a recording over which noise must be the same to be called even."""
@@ -84,6 +150,9 @@ class Limits:
 
     rough_fit: float = 0.03
     """Part by which they may differ under another order or sign, for that to be named."""
+
+    clipped_share: float = 0.01
+    """Part of a reading at an extreme by which the encoders must say more for its sensor to be saturated."""
 
     unit_ratio: float = 5.0
     """Ratio of rates to angles, or its reciprocal, from which a unit is wrong."""

@@ -17,13 +17,14 @@ from inercal.estimate.runs import Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.filters.run import estimate, load_kernels
 from inercal.selfcal.find_base import stated_well
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import names, product_slope, to_product
-from inercal.selfcal.platform.linearised import FLOOR
-from inercal.selfcal.settings import FilterKind, SelfcalSettings
+from inercal.selfcal.settings import SelfcalSettings
 
 if TYPE_CHECKING:
     from inercal.estimate.coverage import Coverage, Nees
@@ -35,9 +36,6 @@ REFERENCES = (
     "section 5.4.2",
 )
 """Publications behind the judgement of many runs."""
-
-AWAY = 0.2
-"""|cos thy| above which rows count for the mean NIS: nearer to gimbal lock the encoder noise is overstated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,11 +241,11 @@ def expected_nis(experiment: Experiment, problem: FilterProblem, kind: FilterKin
     1 +- sin thy.
     """
     angles = experiment.motion.angles[1:, 1]
-    angles = angles[np.abs(np.cos(angles)) > AWAY]
+    angles = angles[np.abs(np.cos(angles)) > LIMITS.lock_cosine]
     if not len(angles):
         return dims
     sine = np.abs(np.sin(angles))
-    f = 0.0 if kind in ("svd-qukf", "gimbal-ukf") else FLOOR
+    f = 0.0 if kind in ("svd-qukf", "gimbal-ukf") else LIMITS.encoder_floor
     floor = sum(f**2 / (each + f**2) for each in (np.ones_like(sine), 1.0 + sine, 1.0 - sine))
     p = len(problem.prior)
     learned = p - float(np.square(experiment.truth[:p] / problem.prior).sum())
@@ -264,7 +262,7 @@ def one_run(
     slope = product_slope(filtered.coefficients)
     error = to_product(filtered.coefficients) - to_product(experiment.truth)[:size]
     joint_error, joint = _joint(filtered, simulated, error, slope)
-    away = np.abs(np.cos(simulated.angles[1:, 1])) > AWAY
+    away = np.abs(np.cos(simulated.angles[1:, 1])) > LIMITS.lock_cosine
     counted = away & np.isfinite(filtered.nis)
     return {
         "error": error,

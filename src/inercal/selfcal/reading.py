@@ -1,8 +1,6 @@
 """A record as a recording of a platform: SI, one clock that increases, continuous angles, a rate for every step.
 
-In a gap between rows, and where a rate is no number, the platform is taken to turn on over the base as before: a rate
-against inertial space, which follows the earth besides, would not stay the same. That is right within a turn or a
-rest. Where a turn began or ended meanwhile the encoders contradict it, and estimators take the attitude anew
+In a gap between rows, and where a rate is no number, the platform is taken to turn on over the base as before
 (`inercal.selfcal.filters.gaps`). Angles and accelerometers that are missing are left out of the updates.
 """
 
@@ -21,52 +19,36 @@ from inercal.records.column import Column
 from inercal.records.places import counted, places
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
-from inercal.selfcal.diagnosis.gross import implausible, off_the_path
+from inercal.selfcal.diagnosis.gross import clipped, implausible, off_the_path
 from inercal.selfcal.filters.gaps import with_held
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.settings import SelfcalSettings
 
-FEWEST = 10
-"""Rows at least of a recording."""
-
-_EXPECTED = "expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z"
-
 
 def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
-    """The recording in a record, with findings on all that contradicts the study.
+    """The recording in a record, from the first row with all angles and a rate, with findings on what contradicts the
+    study.
 
-    Parameters
-    ----------
-    record : Record
-        ``th_x..z``, ``acc_x..z`` and the rate of the platform, commanded (``wc_x..z``) or measured (``gyro_x..z``,
-        where there is no ``wc``), on one clock. A rate belongs to the interval from its row to the next, one that was
-        recorded as an increment to the interval before; the last row's rate (or the first increment) is not used.
-    settings : SelfcalSettings
-        Rig, site and noise, against which rates, angles and accelerometers are compared; and the plan.
+    The record has ``th_x..z``, ``acc_x..z`` and the rate of the platform, commanded (``wc_x..z``) or, where there is no
+    such, measured (``gyro_x..z``), on one clock. A rate belongs to the interval from its row to the next, one recorded
+    as an increment to the interval before; the last row's rate (or the first increment) is not used.
 
-    Returns
-    -------
-    Recording
-        From the first row of which angles and rate are complete.
-
-    Raises
-    ------
-    RecordError
-        Columns that are missing or on different clocks, time that does not increase, fewer than ten rows, no
-        accelerometers, or units of rates and angles that contradict each other.
+    Raises RecordError for columns that are missing or on different clocks, time that does not increase, fewer than
+    `LIMITS.least_rows` rows, no accelerometers, or units of rates and angles that contradict each other.
     """
     where = record.sources[0].path if record.sources else "record"
     sensor = _rate_sensor(record, where)
     columns = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
     for column in columns[1:]:
         if column.t is not columns[0].t:
-            raise RecordError(
-                where,
-                f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time",
-            )
+            text = f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time"
+            raise RecordError(where, text)
     rate, th, acc = (np.stack([each.si() for each in columns[k : k + 3]], axis=-1) for k in (0, 3, 6))
-    rate = _from_row_to_row(rate, columns[:3])
+    increment = [column.increment for column in columns[:3]]
+    # increments were gained since the row before
+    rate = np.where(increment, np.vstack([rate[1:], np.full((1, 3), np.nan)]), rate)
     if not np.isfinite(acc).any():
         raise RecordError(where, "acc_x, acc_y, acc_z hold no number, expected specific force in m/s^2 or g")
     time = columns[0].t
@@ -78,11 +60,17 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
-    of_record = (*worth_saying(record, columns), *findings)
-    gained = all(column.increment for column in columns[:3])
-    rate, held = with_held(t, rate, th, settings.world, gained)
+    rate, held = with_held(t, rate, th, settings.world, all(increment))
     warm = recorded_temperature(record)
-    recording = Recording(t, rate, th, acc, sensor == "gyro", of_record, record.sources, held, warm)
+    recording = Recording(t, rate, th, acc, sensor == "gyro", (), record.sources, held, warm)
+    of_record = [  # without extremes beyond which no motion goes on
+        each
+        for each in (*worth_saying(record, columns), *findings)
+        if each.code != "saturation"
+        or each.harm[0][:-2] not in (sensor, "acc")
+        or clipped(recording, settings, each.harm[0])
+    ]
+    recording = replace(recording, findings=tuple(of_record))
     findings = implausible(recording, settings, where)
     if settings.plan is not None:
         began = float(time[np.argmax(np.isfinite(time))])
@@ -92,16 +80,15 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
 
 def _rate_sensor(record: Record, where: str) -> str:
     """``wc`` or ``gyro``, whichever is there whole; refuses a record without all columns."""
-    there = [
-        sensor
-        for sensor in ("wc", "gyro")
-        if all(f"{sensor}_{axis}" in record and _any(record[f"{sensor}_{axis}"]) for axis in "xyz")
-    ]
+    filled = {name for name, column in record.columns.items() if np.isfinite(column.values).any()}
+    there = [sensor for sensor in ("wc", "gyro") if filled >= {f"{sensor}_{axis}" for axis in "xyz"}]
     missing = [f"{name}_{axis}" for name in ("th", "acc") for axis in "xyz" if f"{name}_{axis}" not in record]
     if not there or missing:
         lacking = f"no {', '.join(missing)}" if missing else "no whole rate wc_x, wc_y, wc_z"
+        among = ", ".join(record.columns) or "no columns"
         raise RecordError(
-            where, f"found {lacking} among {', '.join(record.columns) or 'no columns'}, {_EXPECTED}"
+            where,
+            f"found {lacking} among {among}, expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z",
         )
     return there[0]
 
@@ -120,28 +107,16 @@ def worth_saying(record: Record, columns: Collection[Column]) -> list[Finding]:
     return [each for each in record.findings if each.code != "nan" or each.message not in empty]
 
 
-def _any(column: Column) -> bool:
-    """True for a column with a number in it."""
-    return bool(np.isfinite(column.values).any())
-
-
-def _from_row_to_row(rate: Array, columns: list[Column]) -> Array:
-    """Rates (n, 3) as held from each row to the next: increments were gained since the row before."""
-    gained = [column.increment for column in columns]
-    later = np.vstack([rate[1:], np.full((1, 3), np.nan)])
-    return np.where(gained, later, rate)
-
-
 def _used_rows(t: Array, th: Array, rate: Array, where: str) -> tuple[NDArray[np.int64], list[Finding]]:
     """Rows (from 0) with a time, from the first that is complete on."""
     timed = np.flatnonzero(np.isfinite(t))
     whole = np.isfinite(th[timed]).all(axis=1) & np.isfinite(rate[timed]).all(axis=1)
     rows = timed[int(np.argmax(whole)) :] if whole.any() else timed[:0]
-    if len(rows) < FEWEST:
+    if len(rows) < LIMITS.least_rows:
         raise RecordError(
             where,
             f"found {counted(len(rows), 'row')} from the first with a time, all angles and a rate on, "
-            f"expected {FEWEST} or more",
+            f"expected {LIMITS.least_rows} or more",
         )
     findings = []
     untimed = np.setdiff1d(np.arange(rows[0], len(t)), rows)
@@ -184,7 +159,7 @@ def _gaps(t: Array, record: Record) -> list[Finding]:
     if all(finding.code != "gap" for finding in record.findings):
         return []
     step = np.diff(t)
-    long = step > 1.5 * np.median(step)
+    long = step > LIMITS.gap_ratio * np.median(step)
     text = (
         f"the platform is taken to turn on as before through {step[long].sum():.4g} s without rows; where the "
         "encoders contradict that the attitude is taken anew"

@@ -9,28 +9,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
 from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
+from inercal.selfcal.estimators import FactorKind, FilterKind
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.rig import Base, Gimbals, World, world
 from inercal.units import Quantity
 
-FilterKind = Literal["svd-qukf", "gimbal-ukf", "mukf", "error-state", "map", "lm"]
-FactorKind = Literal["cholesky", "eigen", "svd"]
-
-KINDS: tuple[FilterKind, ...] = ("error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm")
-"""All estimators, the product's default first."""
-
 _OF_A_SAMPLE = above_zero("a standard deviation of a sample")
 _OF_A_TURN = Bounds(lambda angle: 0.0 < angle <= 2.0 * math.pi, "an angle above 0 and up to 360 deg")
-FACTOR_OF: Mapping[FilterKind, FactorKind] = {
-    "svd-qukf": "eigen",
-    "gimbal-ukf": "cholesky",
-    "mukf": "cholesky",
-}
-"""Factor of the covariance that each sigma-point filter takes where the study names none."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +103,7 @@ class Search:
     seed: int = option("of the random starts", 1, least=0)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class SelfcalSettings:
     """A study of self-calibration, in SI.

@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
 from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.records.record import Record
-from inercal.selfcal.before.bounds import Bounds, recorded_bounds
+from inercal.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.selfcal.diagnosis.examination import diagnose
+from inercal.selfcal.estimators import KINDS, FilterKind
 from inercal.selfcal.filters import run as filtering
 from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.filters.gaps import taken_anew
@@ -29,24 +30,22 @@ from inercal.selfcal.reading import recording_of
 from inercal.selfcal.result.comparison import side_by_side
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.settings import KINDS, SelfcalSettings
+from inercal.selfcal.settings import SelfcalSettings
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """An ``estimate``, and the evidence behind it for pictures and tests.
-
-    ``settings`` are those of the study; ``compared`` are the other estimators' results, by kind, where a comparison was
-    asked for; ``truth`` (p,) are the coefficients in the product form where the study states them.
-    """
+    """An ``estimate``, and the evidence behind it: ``settings`` of the study, results of other estimators that it was
+    ``compared`` with, by kind, and the ``truth`` (p,), product form, where the study states it."""
 
     estimate: Estimate
     problem: FilterProblem
     recording: Recording
     filtered: FilterResult
-    bounds: Bounds
+    bounds: PathBounds
     settings: SelfcalSettings
-    compared: Mapping[str, FilterResult] = field(default_factory=dict)
+    compared: Mapping[FilterKind, FilterResult] = field(default_factory=dict)
     truth: Array | None = None
 
 
@@ -68,29 +67,13 @@ def calibrate(
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
-    """Calibrate a platform from what it recorded while it turned.
+    """Calibrate a platform from what it recorded while it turned; `recording_of` says which channels it has.
 
-    Parameters
-    ----------
-    record : Record
-        ``t``, ``wc_x..`` or ``gyro_x..``, ``th_x..``, ``acc_x..``.
-    settings : SelfcalSettings
-        Site, rig, noise, prior, estimator.
-    compare : bool
-        Run all other estimators too.
-    progress : callable
-        Told each step of the work, in words.
+    ``compare`` runs all other estimators too; ``progress`` is told each step of the work, in words. The status of the
+    estimate says whether its values can be used: nothing is raised for a poor one.
 
-    Returns
-    -------
-    Calibration
-        Its estimate's status says whether the values can be used; nothing is raised for a poor one.
-
-    Raises
-    ------
-    InputError
-        The record has not the channels of a platform, the study does not fit it, or it leaves a heading unknown that
-        the record does not tell.
+    Raises InputError where the record has not the channels of a platform or the study does not fit it, or where it
+    leaves a heading unknown that the record does not tell.
     """
     clock = time.perf_counter()
     recording = recording_of(record, settings)
@@ -107,15 +90,14 @@ def calibrate(
     bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
     progress("looking for faults")
     faults = [*diagnose(recording, of, filtered, stated_errors(settings)), *taken_anew(recording, filtered)]
-    compared: dict[str, FilterResult] = {}
+    compared: dict[FilterKind, FilterResult] = {}
     for kind in KINDS if compare else ():
         if kind != filtered.kind:
             progress(f"filtering ({kind})")
             compared[kind] = filtering.estimate(recording, of, kind)
     progress("assembling")
     estimate = assemble(recording, settings, filtered, bounds, faults)
-    result = dict(estimate.result)
-    message = estimate.message
+    result, message = dict(estimate.result), estimate.message
     if rough and estimate.names:
         base, words = _base(settings, estimate)
         result, message = result | base, message + words

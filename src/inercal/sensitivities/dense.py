@@ -23,8 +23,9 @@ from inercal.arrays import Array
 from inercal.geometry.rotations import elementary, skew
 from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
-from inercal.sensitivities.exact import Parts, drop_rounding, positions
-from inercal.sensitivities.indices import Indices
+from inercal.rigs.patterns import Known
+from inercal.sensitivities.exact import drop_rounding, positions
+from inercal.sensitivities.indices import Indices, VarianceParts
 from inercal.sensitivities.moments import moments
 from inercal.sensitivities.shapley import shapley_effects
 
@@ -80,6 +81,8 @@ def blocks(chain: Chain, angles: ArrayLike, degrees: Sequence[int]) -> Dense:
         elif isinstance(element, Joint):
             rotation = elementary(element.axis, given[:, chain.joints.index(element.name)])
             elements.append(_diagonal([_power(rotation, degree) for degree in degrees]))
+        elif isinstance(element, Known):
+            raise ValueError("found a known error, expected the chain of one position")
         else:
             elements.append(_diagonal([_power(element.rotation, degree) for degree in degrees]))
     return Dense(chain.factors, given, tuple(elements))
@@ -155,7 +158,7 @@ def closed_variance(dense: Dense, outputs: Sequence[Output], factors: Sequence[s
     return _parts(dense.scaled(inside), outputs)[0]
 
 
-def _parts(dense: Dense, outputs: Sequence[Output]) -> Parts:
+def _parts(dense: Dense, outputs: Sequence[Output]) -> VarianceParts:
     """The parts of the variance at all positions."""
     q, t = _ends(dense, outputs)
     W = np.zeros((*q.shape, q.shape[-1]))
@@ -195,7 +198,7 @@ def _parts(dense: Dense, outputs: Sequence[Output]) -> Parts:
         for e in dense.elements
         if isinstance(e, Random)
     )
-    return drop_rounding((variance, bias, first, interaction), outputs, spread)
+    return drop_rounding(VarianceParts(variance, bias, first, interaction), outputs, spread)
 
 
 def _second(dense: Dense, outputs: Sequence[Output]) -> Array:

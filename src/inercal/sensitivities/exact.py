@@ -19,7 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,13 +27,15 @@ from numpy.typing import ArrayLike, NDArray
 from inercal.arrays import Array
 from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
-from inercal.sensitivities.indices import Indices
+from inercal.rigs.patterns import Known
+from inercal.sensitivities.indices import Indices, VarianceParts, by_position
 from inercal.sensitivities.moments import moments
 from inercal.sensitivities.shapley import shapley_effects
 
+if TYPE_CHECKING:
+    from inercal.sensitivities import kernels
+
 Integers = NDArray[np.int64]
-Parts: TypeAlias = tuple[Array, Array, Array, Array]
-"""Variance and bias (o, n), V_i and VT_i - V_i (o, n, k)."""
 
 CHUNK = 128
 """Positions below which a thread of its own is not worth while."""
@@ -68,6 +70,17 @@ def analyse(
     ValueError
         Angles that do not fit the joints of the chain, or no threads.
     """
+    return by_position(
+        lambda standing, at: _analyse(standing, outputs, at, shapley, second, threads),
+        chain,
+        positions(chain, angles),
+    )
+
+
+def _analyse(
+    chain: Chain, outputs: Sequence[Output], angles: Array, shapley: bool, second: bool, threads: int | None
+) -> Indices:
+    """The parts where no error follows an angle."""
     passes = _Passes.of(chain, outputs, angles)
     variance, bias, first, interaction = passes.parts(threads)
     return Indices(
@@ -75,7 +88,7 @@ def analyse(
         outputs=tuple(output.name for output in outputs),
         units=tuple(output.unit for output in outputs),
         scales=np.array([output.scale for output in outputs]),
-        angles=passes.angles,
+        angles=passes.rig.angles,
         variance=variance,
         bias=bias,
         first_variance=first,
@@ -96,7 +109,7 @@ def closed_variance(
     KeyError
         A factor that the chain does not have.
     ValueError
-        As `analyse`.
+        As `analyse`; a chain in which errors are known or follow an angle (see `Chain.standing`).
     """
     for name in factors:
         if name not in chain.factors:
@@ -119,30 +132,23 @@ def positions(chain: Chain, angles: ArrayLike) -> Array:
     return given
 
 
-def drop_rounding(parts: Parts, outputs: Sequence[Output], spread: float) -> Parts:
+def drop_rounding(parts: VarianceParts, outputs: Sequence[Output], spread: float) -> VarianceParts:
     """Parts with no variance at all where there is that of rounding errors only.
 
     ``spread`` is the variance of all matrices together, to which a row of unit length is exposed.
     """
-    variance, bias, first, interaction = parts
     lengths = [np.dot(o.reference, o.reference) * np.dot(o.axis, o.axis) for o in outputs]
-    null = variance <= _ROUNDING**2 * spread * np.array(lengths)[:, None]
-    for part in (variance, first, interaction):
+    null = parts.variance <= _ROUNDING**2 * spread * np.array(lengths)[:, None]
+    for part in (parts.variance, parts.first, parts.interaction):
         part[null] = 0.0
-    return variance, bias, first, interaction
+    return parts
 
 
 @dataclass(frozen=True, eq=False)
 class _Passes:
-    """A chain, its positions and outputs in the arrays of `inercal.sensitivities.kernels`."""
+    """Passes of the kernels over a chain at its positions, and the outputs."""
 
-    elements: Integers
-    fixed: Array
-    errors: Array
-    angles: Array
-    u: Array
-    v: Array
-    pairs: Integers
+    rig: kernels.Rig
     outputs: tuple[Output, ...]
 
     @classmethod
@@ -159,6 +165,8 @@ class _Passes:
                 elements.append((kernels.FIXED, 0, len(fixed)))
                 fixed.append(element.rotation)
                 continue
+            if isinstance(element, Known):
+                raise ValueError("found a known error, expected the chain of one position")
             axis = "xyz".index(element.axis)
             if isinstance(element, Joint):
                 elements.append((kernels.JOINT, axis, chain.joints.index(element.name)))
@@ -169,7 +177,7 @@ class _Passes:
         matrices = np.array(fixed).reshape(-1, 3, 3)
         u, row = _distinct([output.reference for output in outputs])
         v, column = _distinct([output.axis for output in outputs])
-        return cls(
+        rig = kernels.Rig(
             np.array(elements, dtype=np.int64).reshape(-1, 3),
             np.ascontiguousarray([matrices, matrices.transpose(0, 2, 1)]),
             errors,
@@ -177,32 +185,31 @@ class _Passes:
             u,
             v,
             np.stack([row, column], axis=1),
-            tuple(outputs),
         )
+        return cls(rig, tuple(outputs))
 
     def scaled(self, factor: Array | float) -> _Passes:
         """The same with the variances of the errors multiplied by a factor, (k, 1) or a number, means kept."""
-        errors = self.errors.copy()
+        errors = self.rig.errors.copy()
         errors[:, 2:4] *= factor
-        return replace(self, errors=errors)
+        return replace(self, rig=self.rig._replace(errors=errors))
 
-    def parts(self, threads: int | None) -> Parts:
+    def parts(self, threads: int | None) -> VarianceParts:
         """The parts of the variance at all positions."""
         from inercal.sensitivities import kernels
 
-        shape = (len(self.outputs), len(self.angles))
-        variance, bias = np.zeros(shape), np.zeros(shape)
-        first, interaction = np.zeros((*shape, len(self.errors))), np.zeros((*shape, len(self.errors)))
-        self._run(kernels.analyse, threads, variance, bias, first, interaction)
-        spread = float(np.sum(self.errors[:, 2:4]))
-        return drop_rounding((variance, bias, first, interaction), self.outputs, spread)
+        shape = (len(self.outputs), len(self.rig.angles))
+        of_each = (*shape, len(self.rig.errors))
+        parts = VarianceParts(np.zeros(shape), np.zeros(shape), np.zeros(of_each), np.zeros(of_each))
+        self._run(kernels.analyse, threads, parts)
+        return drop_rounding(parts, self.outputs, float(np.sum(self.rig.errors[:, 2:4])))
 
     def second(self, threads: int | None) -> Array:
         """V_ij (o, n, k, k)."""
         from inercal.sensitivities import kernels
 
-        k = len(self.errors)
-        second = np.zeros((len(self.outputs), len(self.angles), k, k))
+        k = len(self.rig.errors)
+        second = np.zeros((len(self.outputs), len(self.rig.angles), k, k))
         self._run(kernels.second_order, threads, second)
         return second
 
@@ -211,18 +218,17 @@ class _Passes:
         _, _, first, interaction = self.scaled(z).parts(threads)
         return first + interaction
 
-    def _run(self, passes: Callable[..., None], threads: int | None, *results: Array) -> None:
+    def _run(self, passes: Callable[..., None], threads: int | None, results: Array | VarianceParts) -> None:
         """Run a kernel over all positions, in chunks on several threads where there are many."""
         if threads is not None and threads < 1:
             raise ValueError(f"found {threads} threads, expected 1 or more")
-        n, workers = len(self.angles), threads or os.cpu_count() or 1
-        given = (self.elements, self.fixed, self.errors, self.angles, self.u, self.v, self.pairs)
+        n, workers = len(self.rig.angles), threads or os.cpu_count() or 1
         if workers == 1 or n <= CHUNK:
-            passes(0, n, *given, *results)
+            passes(0, n, self.rig, results)
             return
         edges = np.linspace(0, n, min(4 * workers, -(-n // CHUNK)) + 1).astype(int).tolist()
         with ThreadPoolExecutor(workers) as pool:
-            running = [pool.submit(passes, *chunk, *given, *results) for chunk in pairwise(edges)]
+            running = [pool.submit(passes, *chunk, self.rig, results) for chunk in pairwise(edges)]
             for done in running:
                 done.result()
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
+from inercal.rigs.chain import Chain
 
 SINGULAR = 0.99
 """Sum of the first-order indices below which a position is flagged: interactions rule there."""
@@ -29,6 +31,16 @@ class Resampled:
     interaction_variance: Array
 
 
+class VarianceParts(NamedTuple):
+    """Variance and bias (o, n) of each output, V_i and VT_i - V_i (o, n, k) of each error."""
+
+    variance: Array
+    bias: Array
+    first: Array
+    interaction: Array
+
+
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Indices:
     """Variances of outputs and their parts, at each position of a rig.
@@ -126,3 +138,40 @@ def share(part: Array, variance: Array) -> Array:
 def spread(resampled: Array) -> Array:
     """Standard deviation over the resamples (b, ...)."""
     return np.asarray(np.std(resampled, axis=0, ddof=1))
+
+
+_OVER_POSITIONS = (
+    *("variance", "bias", "first_variance", "interaction_variance"),
+    *("shapley", "second_variance"),
+)
+"""Fields that have the positions in their second axis, where they are there."""
+
+
+def by_position(analyse: Callable[[Chain, Array], Indices], chain: Chain, angles: Array) -> Indices:
+    """The indices at ``angles`` (n, joints) [rad] by an analysis of chains in which no error follows an angle.
+
+    Positions at which the errors are of one size are analysed together.
+    """
+    followed = angles[:, chain.followed]
+    _, numbers = np.unique(followed, axis=0, return_inverse=True)
+    numbers = numbers.reshape(-1)
+    count = int(numbers.max(initial=0)) + 1
+    rows = [np.flatnonzero(numbers == k) for k in range(count)]
+    first = [angles[at[0]] if len(at) else np.zeros(len(chain.joints)) for at in rows]
+    parts = [analyse(chain.standing(at), angles[own]) for at, own in zip(first, rows, strict=True)]
+    if count == 1:
+        return parts[0]
+    return joined(parts, axis=1, order=np.argsort(np.concatenate(rows), kind="stable"), angles=angles)
+
+
+def joined(
+    parts: Sequence[Indices], axis: int, order: NDArray[np.intp] | slice = slice(None), **changed: Any
+) -> Indices:
+    """Several indices as one, along outputs (``axis`` 0) or positions (1) in an ``order``; other fields ``changed``."""
+    fields: dict[str, Any] = {}
+    for name in _OVER_POSITIONS:
+        values = [getattr(part, name) for part in parts]
+        if all(value is not None for value in values):
+            whole = np.concatenate(values, axis=axis)
+            fields[name] = whole[:, order] if axis else whole[order]
+    return replace(parts[0], **fields, **changed)

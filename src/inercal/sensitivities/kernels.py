@@ -17,14 +17,15 @@ of the five numbers in an array ``errors`` (k, 5).
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import kernel
+from inercal.arrays import Array
+from inercal.sensitivities.indices import VarianceParts
 
-Array: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
 
 ERROR_ROW = ("mean of cos - 1", "mean of sin", "variance of xi_1", "variance of xi_2", "slope")
@@ -32,6 +33,32 @@ ERROR_ROW = ("mean of cos - 1", "mean of sin", "variance of xi_1", "variance of 
 FIXED, JOINT, ERROR = 0, 1, 2
 """First column of ``elements`` (m, 3): what it is. Then its axis (0, 1, 2), then its row or column in ``fixed``,
 ``angles`` or ``errors``."""
+
+
+class Rig(NamedTuple):
+    """A chain, its positions and outputs.
+
+    ``elements`` (m, 3), see `FIXED`; ``fixed`` (2, f, 3, 3) known rotations, and their transposes; ``errors`` (k, 5),
+    see `ERROR_ROW`, a column of the results each; ``angles`` (n, joints) [rad]; ``u`` (r, 3) and ``v`` (c, 3) distinct
+    references in the base frame and distinct axes of the instrument; ``outputs`` (o, 2) rows of u and v of each output.
+    """
+
+    elements: Integers
+    fixed: Array
+    errors: Array
+    angles: Array
+    u: Array
+    v: Array
+    outputs: Integers
+
+
+class Rays(NamedTuple):
+    """States of all rows (r, m + 1, 12) and columns (c, m + 1, 12) at one position, and the cosine and sine of each
+    joint (joints, 2) there."""
+
+    rows: Array
+    columns: Array
+    cosines: Array
 
 
 @kernel
@@ -163,14 +190,13 @@ def parts(
 
 
 @kernel
-def carry(
-    n: int, begin: int, elements: Array, fixed: Array, errors: Array, angles: Array,
-    cosines: Array, rows: Array, columns: Array,
-) -> None:  # fmt: skip
+def carry(n: int, begin: int, rig: Rig, rays: Rays) -> None:
     """States of all rows and columns at position ``n``, going on from position ``n - 1`` unless that is before begin.
 
     What lies before the first joint that moved, and after the last one, is as it was.
     """
+    elements, fixed, errors, angles, _, _, _ = rig
+    rows, columns, cosines = rays
     m = len(elements)
     low, high = m, -1
     for e in range(m):
@@ -198,39 +224,25 @@ def start(vectors: Array, at: int, length: int) -> Array:
 
 
 @kernel
-def analyse(
-    begin: int, end: int, elements: Array, fixed: Array, errors: Array, angles: Array,
-    u: Array, v: Array, outputs: Array, variance: Array, bias: Array, first: Array, interaction: Array,
-) -> None:  # fmt: skip
-    """First-order and interaction parts of the variance at the positions ``begin`` to ``end``.
+def begun(rig: Rig) -> Rays:
+    """The rows at the first element and the columns after the last one."""
+    m = len(rig.elements)
+    return Rays(start(rig.u, 0, m + 1), start(rig.v, m, m + 1), np.zeros((rig.angles.shape[1], 2)))
 
-    Parameters
-    ----------
-    elements : (m, 3) integers
-        See `FIXED`.
-    fixed : (2, f, 3, 3)
-        Known rotations, and their transposes.
-    errors : (k, 5)
-        See `ERROR_ROW`; a column of the results each.
-    angles : (n, joints) rad
-    u, v : (r, 3), (c, 3)
-        Distinct references in the base frame, distinct axes of the instrument.
-    outputs : (o, 2) integers
-        Row of u and of v of each output.
-    variance, bias : (o, n)
-        Receive the variance, and the bias, of each output.
-    first, interaction : (o, n, k)
-        Receive V_i and VT_i - V_i; columns without an element are left alone.
-    """
-    m = len(elements)
-    rows, columns = start(u, 0, m + 1), start(v, m, m + 1)
-    cosines = np.zeros((angles.shape[1], 2))
+
+@kernel
+def analyse(begin: int, end: int, rig: Rig, results: VarianceParts) -> None:
+    """Parts of the variance at the positions ``begin`` to ``end``; columns without an element are left alone."""
+    elements, errors, outputs = rig.elements, rig.errors, rig.outputs
+    variance, bias, first, interaction = results
+    rays = begun(rig)
+    rows, columns, _ = rays
     for n in range(begin, end):
-        carry(n, begin, elements, fixed, errors, angles, cosines, rows, columns)
+        carry(n, begin, rig, rays)
         for o in range(len(outputs)):
             r, c = outputs[o, 0], outputs[o, 1]
             all_variance, all_bias = 0.0, 0.0
-            for e in range(m):
+            for e in range(len(elements)):
                 if elements[e, 0] == ERROR:
                     k = elements[e, 2]
                     variances = parts(rows, columns, r, c, e, elements[e, 1], errors[k])
@@ -241,21 +253,19 @@ def analyse(
 
 
 @kernel
-def second_order(
-    begin: int, end: int, elements: Array, fixed: Array, errors: Array, angles: Array,
-    u: Array, v: Array, outputs: Array, second: Array,
-) -> None:  # fmt: skip
-    """Parts V_ij of the variance caused by pairs of errors, into ``second`` (o, n, k, k); the rest as in `analyse`.
+def second_order(begin: int, end: int, rig: Rig, second: Array) -> None:
+    """Parts V_ij of the variance caused by pairs of errors, into ``second`` (o, n, k, k).
 
     Each part of the earlier error, met by the mean row, is carried on by means to the later error.
     """
+    elements, fixed, errors, outputs = rig.elements, rig.fixed, rig.errors, rig.outputs
     m = len(elements)
-    rows, columns = start(u, 0, m + 1), start(v, m, m + 1)
+    rays = begun(rig)
+    rows, columns, cosines = rays
     ray = np.zeros((1, m + 1, 12))
-    cosines = np.zeros((angles.shape[1], 2))
     for n in range(begin, end):
-        carry(n, begin, elements, fixed, errors, angles, cosines, rows, columns)
-        for r in range(len(u)):
+        carry(n, begin, rig, rays)
+        for r in range(len(rows)):
             for e in range(m):
                 if elements[e, 0] != ERROR:
                     continue

@@ -2,7 +2,7 @@
 
 The causal fusion of `inercal.aoa` goes on by one row at a time, to the digits that it gives on the whole file, and
 answers each row with one line: the first ones, and those after the angle was lost, are held until the filter can start
-(`inercal.aoa.fusion.live`). `inercal.aoa.reading.calibrated` calibrates the sensors, and samples at a range are left
+(`inercal.aoa.fusion.live`). `inercal.aoa.reading.from_record` calibrates the sensors, and samples at a range are left
 out. A stream does not see faults that only a whole recording shows: sensors that are flat at an extreme below their
 range, or stuck, and a model that moves in the stretch of the study's zero.
 """
@@ -15,13 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.arms import level_of
-from inercal.aoa.fusion.filter_result import SETTLED
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
-from inercal.aoa.reading.from_record import of_sensors
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.from_record import at_range, check_axes, check_unit, indication, of_sensors
 from inercal.aoa.reading.wind_off_zero import angle_at
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
@@ -29,28 +26,16 @@ from inercal.aoa.result.columns import columns, rows
 from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.arrays import Array
-from inercal.findings import CODES, EVERYTHING, Finding, Harm
+from inercal.findings import Finding
 from inercal.records.column import Column
 from inercal.stream.lines import Lines, Sample
-from inercal.stream.run import Output, Slots
-
-_CONTRADICTED = 2.0
-"""Mean of the squared innovations in a window, each over its variance, from which rows contradict the model."""
-
-_WINDOW = 2.0
-"""Length [s] of a window of innovations."""
-
-_FEWEST = 50
-"""Smallest number of innovations in a window that is judged."""
-
-_SILENT = 1.0
-"""Time [s] without a number after which a gyro is said to be silent."""
+from inercal.stream.run import Alarms, Output, Slots
 
 # bits of `AoaState.alarms`; from the last on one for each sensor
-_BEGUN, _CONTRADICTION, _SILENCE, _SATURATED = range(4)
+_CONTRADICTION, _SILENCE, _SATURATED = range(3)
 
 
-class Beside(NamedTuple):
+class Leaning(NamedTuple):
     """The fusion under a change of a stated input: its state, and theta [rad] of rows not yet answered without it."""
 
     live: LiveState
@@ -63,11 +48,12 @@ class AoaState(NamedTuple):
     ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by name; ``t`` [s] the
     latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
     last row with a number of the gyro. ``nis`` and ``scalars``: sum and number of the squared innovations since
-    ``window`` [s]. ``alarms`` are those given, one bit each; ``slots`` that of the last line.
+    ``window`` [s]. ``remarked``: the findings on
+    the sensors were given; ``slots`` that of the last line.
     """
 
     live: LiveState
-    beside: Mapping[str, Beside]
+    beside: Mapping[str, Leaning]
     t: float
     begun: float
     temperature: float
@@ -75,7 +61,8 @@ class AoaState(NamedTuple):
     nis: float
     scalars: int
     window: float
-    alarms: int
+    remarked: bool
+    alarms: Alarms
     slots: Slots
 
 
@@ -121,7 +108,7 @@ class Aoa:
         gyros = [name for name in GYROS if name in record]
         spatial = all(name in gyros for name in GYROS[1:])
         if not spatial:
-            level_of(settings)
+            settings.attitude.check_pitch_shows()
         self._remarks = of_sensors(there, gyros, record, settings)
         places = list(record.columns)
         used = [*there, *(GYROS if spatial else GYROS[:1])]
@@ -165,11 +152,11 @@ class Aoa:
         return AoaState(
             live=Live(self._problem).state,
             beside={
-                each.name: Beside(Live(of).state, np.empty(0))
+                each.name: Leaning(Live(of).state, np.empty(0))
                 for each, of in zip(self._changes, self._leaning, strict=True)
             },
             t=-math.inf, begun=math.nan, temperature=math.nan,
-            heard=math.nan, nis=0.0, scalars=0, window=math.nan, alarms=0, slots=Slots(),
+            heard=math.nan, nis=0.0, scalars=0, window=math.nan, remarked=False, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
@@ -186,10 +173,9 @@ class Aoa:
         if later:
             zero_angle = self._zero(state, sample.t, values[:n])
             state = self._heard(state, sample.t, gyro)
-        answers = self._live.feed(sample.t, values[:n], gyro, roll, yaw, *zero_angle)
-        turned = [
-            each.feed(sample.t, values[:n], gyro, roll, yaw, *zero_angle).theta for each in self._others
-        ]
+        read = (sample.t, values[:n], gyro, roll, yaw, *zero_angle)
+        answers = self._live.feed(*read)
+        turned = [each.feed(*read).angles.theta for each in self._others]
         if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
@@ -201,7 +187,7 @@ class Aoa:
     def finish(self, state: AoaState) -> Sequence[Output]:
         """The lines of rows that were still held."""
         live, others = self._from(state)
-        return self._lines(state, live.finish(), others, [each.finish().theta for each in others])[1]
+        return self._lines(state, live.finish(), others, [each.finish().angles.theta for each in others])[1]
 
     def _from(self, state: AoaState) -> tuple[Live, list[Live]]:
         """The fusion, and those under changes, as a state left them."""
@@ -228,11 +214,11 @@ class Aoa:
 
     def _remarked(self, state: AoaState) -> AoaState:
         """The state once the findings on the sensors are given."""
-        if state.alarms & 1 << _BEGUN:
+        if state.remarked:
             return state
         for finding in self._remarks:
             self._say(finding)
-        return state._replace(alarms=state.alarms | 1 << _BEGUN)
+        return state._replace(remarked=True)
 
     def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[float, float]:
         """The angle that is stated for a row, and its standard uncertainty [rad]; NaN where there is none."""
@@ -245,8 +231,8 @@ class Aoa:
         """The state with the last row of the gyro, or an alarm where it is silent."""
         if math.isfinite(gyro) or math.isnan(state.heard):
             return state._replace(heard=t)
-        if self._has_gyro and t - state.heard > _SILENT:
-            text = f"gyro: no number for {_SILENT:g} s; angles go on from accelerometers alone, less well"
+        if self._has_gyro and t - state.heard > LIMITS.silent_time:
+            text = f"gyro: no number for {LIMITS.silent_time:g} s; angles go on from accelerometers alone, less well"
             return self._alarm(state, _SILENCE, "gyro_missing", text, t)
         return state
 
@@ -258,17 +244,17 @@ class Aoa:
         gate = self._problem.constants.gate
         for t, innovations in zip(answers.t.tolist(), answers.innovations, strict=True):
             squared = np.minimum(np.square(innovations[np.isfinite(innovations)]), gate)
-            if not squared.size or t - state.begun < SETTLED:
+            if not squared.size or t - state.begun < LIMITS.settling_time:
                 continue
             window = t if math.isnan(state.window) else state.window
             nis, scalars = state.nis + float(squared.sum()), state.scalars + squared.size
             state = state._replace(nis=nis, scalars=scalars, window=window)
-            if t - window < _WINDOW:
+            if t - window < LIMITS.watched_time:
                 continue
-            if scalars >= _FEWEST and nis > _CONTRADICTED * scalars:
+            if scalars >= LIMITS.watched_innovations and nis > LIMITS.mean_nis * scalars:
                 text = (
-                    f"NIS is {nis / scalars:.3g} on average over {_WINDOW:g} s, expected 1 or less: the rows "
-                    "contradict the model or the stated noise"
+                    f"NIS is {nis / scalars:.3g} on average over {LIMITS.watched_time:g} s, expected 1 or less: "
+                    "the rows contradict the model or the stated noise"
                 )
                 state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, t)
             state = state._replace(nis=0.0, scalars=0, window=math.nan)
@@ -276,11 +262,7 @@ class Aoa:
 
     def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
         """The state with an alarm given, once."""
-        if state.alarms & 1 << bit:
-            return state
-        harm = () if CODES[code].harm is Harm.NEVER else EVERYTHING
-        self._say(Finding(code, text, f"t = {t:.10g} s", harm))
-        return state._replace(alarms=state.alarms | 1 << bit)
+        return state._replace(alarms=state.alarms.give(bit, code, text, t, self._say))
 
     def _lines(
         self, state: AoaState, answers: Answers, others: Sequence[Live], turned: Sequence[Array]
@@ -292,23 +274,10 @@ class Aoa:
             theta = np.append(before.theta, theta)
             # a filter that has lost theta, or has it anew, alone is out of step until both have it
             changed.append(np.append(theta[:rest], np.full(max(rest - len(theta), 0), np.nan)))
-            beside[name] = Beside(live.state, theta[rest:])
-        angles = widened(
-            Angles("", answers.theta, answers.u, answers.rate, answers.rate_u, answers.roll, answers.roll_u),
-            self._settings,
-            self._changes,
-            changed,
-        )
+            beside[name] = Leaning(live.state, theta[rest:])
+        angles = widened(answers.angles, self._settings, self._changes, changed)
         state = state._replace(beside=beside)
-        values = rows(
-            answers.theta,
-            angles.known_u,
-            answers.rate,
-            self._settings.attitude,
-            answers.roll,
-            answers.roll_u,
-            angles.by_roll,
-        )
+        values = rows(angles, self._settings.attitude)
         for t, row in zip(answers.t.tolist(), values.tolist(), strict=True):
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None

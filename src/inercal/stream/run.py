@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from inercal.errors import RecordError
 from inercal.estimate.checkpoint import alone, fingerprint, load, save
+from inercal.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.records.places import counted
 from inercal.records.write.text import number
 from inercal.stream.lines import Line, Lines, Sample
@@ -65,6 +66,20 @@ class Slots(NamedTuple):
         # a stamp written in decimals may fall short of its slot by its rounding
         number = math.floor(slots + 1e-12 * abs(slots) + 1e-9)
         return None if number == self.number else Slots(first, number)
+
+
+class Alarms(NamedTuple):
+    """Findings that were given while a stream runs, each once: a bit each."""
+
+    given: int = 0
+
+    def give(self, bit: int, code: str, text: str, t: float, say: Callable[[Finding], None]) -> Alarms:
+        """The alarms with one given for the row at ``t`` [s], unless it was before."""
+        if self.given >> bit & 1:
+            return self
+        harm = () if CODES[code].harm is Harm.NEVER else EVERYTHING
+        say(Finding(code, text, f"t = {t:.10g} s", harm))
+        return Alarms(self.given | 1 << bit)
 
 
 class Recursive(Protocol[S]):

@@ -17,17 +17,18 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
-from inercal.findings import EVERYTHING, Finding
+from inercal.findings import Finding
 from inercal.selfcal.filters.filter_result import Estimates, History, State, Trace, estimate_of
-from inercal.selfcal.filters.gaps import LONG, RECENT, advance, held_rate, usual
+from inercal.selfcal.filters.gaps import advance, held_rate, usual
 from inercal.selfcal.filters.problem import FilterProblem
-from inercal.selfcal.filters.run import LOCK, recursive
 from inercal.selfcal.filters.run import load_kernels as load_filter
+from inercal.selfcal.filters.run import recursive
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import KA1
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.result.columns import columns, rows
 from inercal.stream.lines import Lines, Sample
-from inercal.stream.run import Output, Slots
+from inercal.stream.run import Alarms, Output, Slots
 
 _BAND = 5.0
 """Standard deviations that the running mean of NIS may be above its expectation."""
@@ -48,8 +49,8 @@ class SelfcalState(NamedTuple):
     the row of the last whole angles, which are in ``filter``. ``t`` [s] of the last row, ``steps`` (9,) [s] the last
     intervals (NaN before). ``doubt``: a rate was held and the encoders have not read since. ``angles`` (3,) [rad]
     of the estimated attitude. ``nis`` and ``dims``: sums of the normalised innovations squared and of the scalars in
-    them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``said`` are the alarms given,
-    one bit each; ``slots`` that of the last line.
+    them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``alarms`` are
+    those given; ``slots`` that of the last line.
     """
 
     begun: bool
@@ -67,7 +68,7 @@ class SelfcalState(NamedTuple):
     rows: int
     late: int
     gaps: int
-    said: int
+    alarms: Alarms
     slots: Slots
 
 
@@ -137,8 +138,8 @@ class Selfcal:
         none = np.zeros(3)
         return SelfcalState(
             begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
-            rated=math.nan, read=math.nan, t=math.nan, steps=np.full(RECENT, np.nan), doubt=False,
-            angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, said=0, slots=Slots(),
+            rated=math.nan, read=math.nan, t=math.nan, steps=np.full(LIMITS.recent_intervals, np.nan), doubt=False,
+            angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[Output]]:
@@ -204,7 +205,7 @@ class Selfcal:
     def _after(self, state: SelfcalState, t: float, dt: float) -> SelfcalState:
         """The state with an interval seen; a gap is said."""
         state = state._replace(steps=np.append(state.steps[1:], dt))
-        if dt <= LONG * usual(state.steps):
+        if dt <= LIMITS.gap_ratio * usual(state.steps):
             return state
         return self._gap(state, t, f"{dt:.4g} s without rows, the platform is taken to turn on as before")
 
@@ -221,7 +222,7 @@ class Selfcal:
         if whole:
             state = state._replace(rate=rate, rated=t if gained else state.t)
         dt, step = t - state.t, float(usual(state.steps))
-        long, half = dt > LONG * step, 0.5 * step
+        long, half = dt > LIMITS.gap_ratio * step, 0.5 * step
         if whole and not long:
             return state, rate, False
         middle = state.rated - half if gained else state.rated + half
@@ -249,15 +250,14 @@ class Selfcal:
                 "the filter diverged: its coefficients or their uncertainties are no numbers any more",
             ),
             (
-                self._problem.filter.kind == "gimbal-ukf" and trace.gimbal_cosine < LOCK,
+                self._problem.filter.kind == "gimbal-ukf" and trace.gimbal_cosine < LIMITS.singular_cosine,
                 "gimbal_lock",
                 "outer and platform axis coincide, where the gimbal-angle model does not hold: use a quaternion filter",
             ),
         )
-        for k, (due, code, text) in enumerate(alarms):
-            if due and not state.said & 1 << k:
-                self._say(Finding(code, text, f"t = {state.t:.10g} s", EVERYTHING))
-                state = state._replace(said=state.said | 1 << k)
+        for bit, (due, code, text) in enumerate(alarms):
+            if due:
+                state = state._replace(alarms=state.alarms.give(bit, code, text, state.t, self._say))
         return state
 
     def _line(

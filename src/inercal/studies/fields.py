@@ -29,8 +29,25 @@ def positive(value: float) -> bool:
     return value > 0.0
 
 
+class AsTyped:
+    """Base of what makes a pydantic field read a value: by `parse`, and written back as it was typed."""
+
+    def parse(self, typed: Any) -> Any:
+        """Read one value; refusals go to pydantic, which knows the key."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Any], handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Validate by `parse`; write back what was typed."""
+        as_typed = core_schema.plain_serializer_function_ser_schema(
+            lambda value: value.text if isinstance(value, Quantity) else value.typed
+        )
+        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
+
+
 @dataclass(frozen=True)
-class QuantityText:
+class QuantityText(AsTyped):
     """Makes a pydantic field read a quantity from its text: ``Annotated[Quantity, QuantityText("time")]``.
 
     Parameters
@@ -61,13 +78,6 @@ class QuantityText:
         si = "" if quantity.unit.symbol == quantity.unit.si else f", that is {_in_si(quantity)}"
         raise refusal(f"found {shown(text)}{si}, expected {self.expected}")
 
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        """Validate by `parse`; write the text back as it was typed."""
-        as_typed = core_schema.plain_serializer_function_ser_schema(lambda quantity: quantity.text)
-        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
-
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
@@ -95,7 +105,7 @@ class Several:
 
 
 @dataclass(frozen=True)
-class SeveralTexts:
+class SeveralTexts(AsTyped):
     """Makes a pydantic field read a list of quantities: ``Annotated[Several, SeveralTexts(each, "x, y, z")]``.
 
     Parameters
@@ -121,13 +131,6 @@ class SeveralTexts:
             return Several((self.each.parse(typed),) * count, typed)
         words = f"a list of {count}, for {self.of}{', or one for all' if self.one else ''}"
         raise refusal(f"found {shown(typed)}, expected {words}")
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        """Validate by `parse`; write back what was typed."""
-        as_typed = core_schema.plain_serializer_function_ser_schema(lambda several: several.typed)
-        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler

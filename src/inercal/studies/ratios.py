@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import GetJsonSchemaHandler
 from pydantic_core import core_schema
 
 from inercal.errors import QuantityError
-from inercal.studies.fields import QuantityText, refusal
+from inercal.studies.fields import AsTyped, QuantityText, refusal
 from inercal.units import Quantity, parse_quantity, parse_unit, shown
 
 ELECTRIC = {"voltage": "V", "count": "count"}
@@ -29,23 +29,8 @@ class Ratio:
     typed: object
 
 
-class _RatioText:
-    """Base of the fields here: read by `parse`, written back as typed."""
-
-    def parse(self, typed: object) -> Ratio:
-        """Read one value; refusals go to pydantic, which knows the key."""
-        raise NotImplementedError
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        """Validate by `parse`; write the text back as it was typed."""
-        as_typed = core_schema.plain_serializer_function_ser_schema(lambda ratio: ratio.typed)
-        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
-
-
 @dataclass(frozen=True)
-class ScaleText(_RatioText):
+class ScaleText(AsTyped):
     """A scale to a ``dimension``: a number, or so much per volt or count, or volts or counts per so much.
 
     The two units are parted by a slash: the last one before V or count, the first one behind it, so that ``deg/s``
@@ -100,7 +85,7 @@ class ScaleText(_RatioText):
 
 
 @dataclass(frozen=True)
-class SlopeText(_RatioText):
+class SlopeText(AsTyped):
     """A change with temperature: ``10 ug/K``; ``dimension`` above the bar, ``example`` a good value."""
 
     dimension: str

@@ -96,14 +96,15 @@ def _starting(kind: Kind, channels: Mapping[str, Unit | None]) -> dict[str, Any]
 
 
 def _hidden() -> str:
-    """Keys that a template leaves out: more sensors, and errors that a table of two axes does not have."""
+    """Keys that a template leaves out: more sensors, chains, and errors that a table of two axes does not have."""
     two, three = (
         {slot.name for slot in slots(kind)} for kind in ("two_axis_turntable", "three_axis_turntable")
     )
     each = "|".join(sorted(two | three))
     symbols = "|".join(symbol for symbols in SYMBOLS.values() for symbol in symbols if symbol != "DX_F")
     others = "|".join(sorted(three - two))
-    return rf"{_HIDDEN}|cost\.({each})|goal\.({symbols})|imu\.aided\.rig\.(errors|base|limits)|rig\.errors\.({others})"
+    of_rig = rf"(imu\.aided\.)?rig\.chain|imu\.aided\.rig\.(errors|base|limits)|rig\.errors\.({others})"
+    return rf"{_HIDDEN}|cost\.({each})|goal\.({symbols})|{of_rig}"
 
 
 def _with_instrument(body: str, lines: str, given: Mapping[str, Any]) -> str:

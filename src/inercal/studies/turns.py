@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.errors import StudyError
-from inercal.selfcal.platform.plan import MOST_ROWS, JointName, Move, Plan, Rest, Turn, path
-from inercal.studies.fields import Duration, QuantityText, Several, SeveralTexts, positive, refusal
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.plan import JointName, Move, Plan, Rest, Turn, path
+from inercal.studies.fields import AsTyped, Duration, QuantityText, Several, SeveralTexts, positive, refusal
 from inercal.studies.rig import Limits
 from inercal.units import Quantity, shown
 
@@ -36,7 +37,7 @@ class TypedMove:
     typed: list[str]
 
 
-class MoveTexts:
+class MoveTexts(AsTyped):
     """Makes a pydantic field read a turn or a rest."""
 
     def parse(self, typed: object) -> TypedMove:
@@ -50,13 +51,6 @@ class MoveTexts:
                 turn = Turn(joint, _ANGLE.parse(angle).value, _RATE.parse(rate).value)
                 return TypedMove(turn, [joint, angle, rate])
         raise refusal(f"found {shown(typed)}, expected a turn such as {_EXPECTED}")
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        """Validate by `parse`; write back what was typed."""
-        as_typed = core_schema.plain_serializer_function_ser_schema(lambda entry: entry.typed)
-        return core_schema.no_info_plain_validator_function(self.parse, serialization=as_typed)
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -118,9 +112,10 @@ def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
         x, y, z = table.start.values
         plan = replace(plan, start=(x, y, z))
     rows = plan.duration / plan.step
-    if not FEWEST <= rows <= MOST_ROWS:
+    if not FEWEST <= rows <= LIMITS.most_rows:
         raise StudyError(
-            where, f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {MOST_ROWS:,}"
+            where,
+            f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {LIMITS.most_rows:,}",
         )
     if beyond := plan.beyond(limits):
         low, high = limits[beyond[0]]

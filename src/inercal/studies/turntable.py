@@ -21,6 +21,7 @@ from inercal.studies.common import (
     Version,
     site_on_earth,
 )
+from inercal.studies.disturbances import TableDisturbancesTable, disturbances_of
 from inercal.studies.instrument import InstrumentTable, instrument_of
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
@@ -29,15 +30,17 @@ from inercal.studies.tolerances import CostsTable, WantedTable, tolerances_of
 from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
 
 OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
+AnalysedName = Literal["ax", "ay", "az", "wx", "wy", "wz", "y_x", "y_y"]
 
 
 class AnalysisTable(table_of(Analysis)):  # type: ignore[misc]
     """The sensitivity analysis."""
 
-    outputs: list[OutputName] = Field(
+    outputs: list[AnalysedName] = Field(
         default=["ax", "ay", "az", "wx", "wy"],
         min_length=1,
-        description="components of gravity (a) and earth rate (w) on the instrument's axes",
+        description="components of gravity (a) and earth rate (w) on the instrument's axes; y_x, y_y: outputs of a "
+        "gyrowheel with the coefficients of [instrument.coefficients]",
     )
 
 
@@ -107,6 +110,11 @@ class TurntableStudyFile(Strict):
     rate_test: RateTestTable | None = Field(
         default=None, title="Rate test", description="a rate test; none if absent"
     )
+    disturbances: TableDisturbancesTable = Field(
+        default=TableDisturbancesTable(),
+        title="Disturbances",
+        description="what a simulation adds to the model",
+    )
     goal: WantedTable = Field(default=WantedTable(), title="Goal", description="wanted uncertainties")
     cost: CostsTable = Field(
         default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
@@ -135,6 +143,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         instrument=instrument,
         limits=limits,
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
+        disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
         tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,

@@ -77,9 +77,12 @@ def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
     if "noise" in changed:
         changed["noise"] = [
             row
-            | {key: row[key] / unit.factor for key in ("noise", "within_dwells") if row[key] is not None}
+            | {
+                key: None if row[key] is None else row[key] / unit.factor
+                for key in ("noise", "within_dwells")
+            }
             | {"unit": unit.symbol}
-            for row in changed["noise"]
+            for row in changed["noise"]  # of a file None where it was not known
         ]
     if "table_errors" in changed:
         changed["table_errors"] = [

@@ -26,6 +26,10 @@ class Limits:
     misfit_probability: float = 1e-4
     """Probability of a misfit by chance below which the readings contradict the stated noise and errors."""
 
+    second_order: float = 0.1
+    """Part of u by which squares and products of the table's errors may shift or blur a coefficient before they are in
+    the fit: below it they change u by half a percent."""
+
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from inercal.arrays import short_repr
 from inercal.designs.tolerances import Price
 from inercal.geometry.site import Site
-from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity
+from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity, within
 from inercal.rigs.chain import Chain
 from inercal.rigs.plans import Plan
 from inercal.units import Quantity, Unit
@@ -16,7 +18,7 @@ from inercal.units import Quantity, Unit
 
 @dataclass(frozen=True)
 class Analysis:
-    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`."""
+    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`, or ``y_x``, ``y_y``."""
 
     outputs: tuple[str, ...] = ("ax", "ay", "az", "wx", "wy")
     method: Literal["exact", "sampled", "local"] = option(
@@ -144,6 +146,45 @@ class RateTest:
     at: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Disturbances:
+    """Disturbances that a simulation adds to table and instrument, and no calibration knows; none if absent.
+
+    Those of outputs are in the SI unit of these: ``ramp`` their change over the test, ``warm_up`` their excess at its
+    begin, ``random_walk`` its standard deviation at the end, ``dead_zone`` the response below which there is none,
+    ``hysteresis`` the output after it was raised less that after it was lowered, ``magnetic`` that along a field to the
+    north and down. ``harmonics`` are errors of encoders: joint, order k, amplitude [rad], phase [rad]:
+    a sin(k phi + phase).
+    """
+
+    heading: float = quantity(
+        "turn of the base about up that nobody knows of, north towards west positive", "angle", "0 deg",
+        example="1 deg",
+    )  # fmt: skip
+    tilt_north: float = quantity("tilt of the base about north", "angle", "0 arcsec", example="20 arcsec")
+    tilt_west: float = quantity("tilt of the base about west", "angle", "0 arcsec", example="20 arcsec")
+    angle: float = quantity(
+        "standard deviation of an error of each joint that comes back at each commanded angle", "angle",
+        "0 arcsec", example="5 arcsec", bounds=within(0.0, math.inf, "an angle of 0 or more"),
+    )  # fmt: skip
+    scale_drift: float = quantity(
+        "relative change of the response to inputs from begin to end of the test",
+        "number",
+        "0",
+        example="20 ppm",
+    )
+    warm_up_time: float = quantity("in which the warm-up falls to 1/e", "time", "30 min", bounds=TIME)
+    dip: float = quantity("of the field below the horizon", "angle", "60 deg")
+    harmonics: tuple[tuple[str, int, float, float], ...] = ()
+    ramp: float = 0.0
+    warm_up: float = 0.0
+    random_walk: float = 0.0
+    dead_zone: float = 0.0
+    hysteresis: float = 0.0
+    magnetic: float = 0.0
+
+
+@short_repr
 @dataclass(frozen=True, eq=False)
 class TurntableSettings:
     """A study of a turntable, in SI.
@@ -162,6 +203,8 @@ class TurntableSettings:
         Allowed range (low, high) [rad] of a joint by its name.
     design, tolerances
         Settings of a search for positions, and of one for tolerances.
+    disturbances : Disturbances
+        Of a simulation.
     traceability, temperature, given
         As in `inercal.imu.settings.ImuSettings`.
     """
@@ -175,6 +218,7 @@ class TurntableSettings:
     instrument: Instrument = Instrument()
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rate_test: RateTest | None = None
+    disturbances: Disturbances = Disturbances()
     tolerances: Tolerances = Tolerances()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None

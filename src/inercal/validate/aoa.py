@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from inercal.aoa.flow import alpha_beta
+from inercal.aoa.angles import alpha_beta
 from inercal.aoa.layout import Layout
 from inercal.aoa.paper import lever, residuals, static
 from inercal.aoa.paper.methods import measure as measure_by

@@ -9,14 +9,15 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis
-from inercal.selfcal.before.bounds import Bounds, bounds
+from inercal.selfcal.before.bounds import PathBounds, bounds
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import KA0, KG0, NAMES, to_linear
 from inercal.selfcal.platform.plan import Plan, Rest, motion, path
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.settings import FilterKind, Noise, SelfcalSettings
+from inercal.selfcal.settings import Noise, SelfcalSettings
 from inercal.studies.load import load_selfcal_study
 from inercal.validate.case import Case
 from inercal.validate.shipped import record_of, study_of
@@ -31,7 +32,7 @@ def _study() -> SelfcalSettings:
     return load_selfcal_study(study_of("selfcal"))
 
 
-def _at_rest(noise: Noise, prior: Array) -> Bounds:
+def _at_rest(noise: Noise, prior: Array) -> PathBounds:
     """Bounds of a platform that rests for 100 s, rows every 0.5 s, on an earth that does not turn."""
     asked = replace(_study(), plan=Plan((Rest(100.0),), step=0.5), noise=noise, prior=prior)
     posed = problem(asked)

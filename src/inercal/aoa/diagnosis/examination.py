@@ -66,12 +66,7 @@ def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
     """Gross faults, each with the correction to write; empty for a sound recording.
 
     Codes are ``sign_suspect``, ``channel_swap``, ``unit_suspect`` and ``command_shift``; ``not_stated`` for a model on
-    its back, which may be right.
-
-    Raises
-    ------
-    RecordError
-        A clock that was set back.
+    its back, which may be right. Raises `RecordError` for a clock that was set back.
     """
     part = stretch(recording)
     now = fit_quality(part, settings)
@@ -176,9 +171,8 @@ def _too_fast(part: Recording, settings: AoaSettings, now: FitQuality) -> list[F
     for factor in (1e2, 1e4):
         snap = factor * settings.estimator.density
         then = fit_quality(part, _livelier(settings, snap))
-        if (then.fits or then.misfit <= LIMITS.sound_misfit) and then.misfit < (
-            1.0 - LIMITS.explained_share
-        ) * now.misfit:
+        explained = then.misfit < (1.0 - LIMITS.explained_share) * now.misfit
+        if explained and (then.fits or then.misfit <= LIMITS.sound_misfit):
             return [_of_snap(settings, snap)]
     return []
 
@@ -191,9 +185,8 @@ def _livelier(settings: AoaSettings, snap: float) -> AoaSettings:
 def _of_snap(settings: AoaSettings, snap: float) -> Finding:
     """``unmodelled``: a larger snap makes a recording fit."""
     text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
-    return Finding(
-        "unmodelled", f'{text}: write snap = "{snap:.3g} rad^2/s^7" under [estimator]', harm=EVERYTHING
-    )
+    advice = f'write snap = "{snap:.3g} rad^2/s^7" under [estimator]'
+    return Finding("unmodelled", f"{text}: {advice}", harm=EVERYTHING)
 
 
 def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:

@@ -41,7 +41,6 @@ class FitQuality:
     theta: Array
     rate: Array
     off: dict[str, float]
-    problem: FilterProblem
 
     @property
     def by_sensor(self) -> Array:
@@ -106,13 +105,8 @@ def _scatter(read: Array) -> Array:
 
 def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
     """The sensors' part of some rows."""
-    return Recording(
-        recording.t[rows],
-        recording.acc[rows],
-        recording.gyro[rows],
-        recording.turns[rows],
-        recording.zero_angle[rows],
-    )
+    t, acc, gyro, turns = recording.t[rows], recording.acc[rows], recording.gyro[rows], recording.turns[rows]
+    return Recording(t, acc, gyro, turns, recording.zero_angle[rows])
 
 
 def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19) -> FitQuality:
@@ -125,12 +119,10 @@ def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19
         off = (state.x[at] - posed.mean[at]) / np.sqrt(np.diag(posed.covariance)[at])
         off = np.nan_to_num(off, nan=1e6)
     still = rms(outputs[:, 2]) < settings.noise.gyro
-    named = {
-        name: each
-        for name, each in zip(posed.nuisances, off.tolist(), strict=True)
-        if not (still and name.startswith(_BY_MOTION))
-    }
-    return FitQuality(outputs[:, OUTPUTS:], outputs[:, 0], outputs[:, 2], named, posed)
+    named = dict(zip(posed.nuisances, off.tolist(), strict=True))
+    if still:
+        named = {name: each for name, each in named.items() if not name.startswith(_BY_MOTION)}
+    return FitQuality(outputs[:, OUTPUTS:], outputs[:, 0], outputs[:, 2], named)
 
 
 def _followed(posed: FilterProblem, t: Array, rows: Array) -> tuple[State, Array]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from inercal.aoa.diagnosis.fit_quality import Case, fit_quality, rms
 from inercal.aoa.diagnosis.noise_check import scatter
-from inercal.aoa.layout import AXES
+from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.delay import aligned, relative_delay
 from inercal.aoa.reading.recording import Recording
@@ -107,7 +107,7 @@ def _of_gyro() -> Iterator[Hypothesis[Case]]:
     """A gyro that is reversed, or of another unit."""
 
     def times(factor: float) -> Change:
-        return lambda recording, settings: (replace(recording, gyro=factor * recording.gyro), settings)
+        return lambda r, s: (replace(r, gyro=factor * r.gyro), s)
 
     text = "gyro looks reversed, it is positive nose-up: write sign = -1 for it in the map"
     yield _fault("sign_suspect", text, times(-1.0))
@@ -140,10 +140,7 @@ def _of_turns() -> Iterator[Hypothesis[Case]]:
     """Gyros for roll and yaw reversed, exchanged, or both of another unit."""
 
     def times(factors: tuple[float, float], order: tuple[int, int] = (0, 1)) -> Change:
-        return lambda recording, settings: (
-            replace(recording, turns=recording.turns[:, order] * np.array(factors)),
-            settings,
-        )
+        return lambda r, s: (replace(r, turns=r.turns[:, order] * np.array(factors)), s)
 
     for name, signs in (("gyro_roll", (-1.0, 1.0)), ("gyro_yaw", (1.0, -1.0))):
         text = f"{name} looks reversed, it is right-handed about {'x forward' if signs[0] < 0.0 else 'z up'}: write "
@@ -172,8 +169,8 @@ def _reversed(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Ca
     for k in there:
         name, angle = settings.layout.names[k], float(settings.layout.angle[k])
         axis = next((text for text, of in AXES.items() if abs(of - angle) < 1e-6), None)
-        other = f'angle = "{math.degrees(angle) + 180.0:.4g} deg"' if axis is None else f'"{opposite[axis]}"'
-        what = other if axis is None else f"axis = {other}"
+        turned = f'angle = "{math.degrees(angle) + 180.0:.4g} deg"'
+        what = turned if axis is None else f'axis = "{opposite[axis]}"'
         text = f"{name} looks reversed: write sign = -1 for it in the map, or {what} in the study"
         yield _fault("sign_suspect", text, _scaled([k], -1.0))
 
@@ -184,10 +181,8 @@ def _orders(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[Case
     if math.factorial(len(there)) <= LIMITS.tried_orders:
         orders = list(itertools.permutations(there))
     else:
-        orders = [
-            tuple(b if k == a else a if k == b else k for k in there)
-            for a, b in itertools.combinations(there, 2)
-        ]
+        pairs = itertools.combinations(there, 2)
+        orders = [tuple({a: b, b: a}.get(k, k) for k in there) for a, b in pairs]
     for order in orders:
         moved = [(a, b) for a, b in zip(there, order, strict=True) if a != b]
         if not moved:
@@ -229,25 +224,21 @@ def _positions(there: list[int], settings: AoaSettings) -> Iterator[Hypothesis[C
         return
 
     def times(factor: Array | float, of_height: float = 1.0) -> Change:
-        def change(recording: Recording, settings: AoaSettings) -> Case:
-            moved = replace(settings.layout, r=settings.layout.r * factor, z=settings.layout.z * of_height)
-            return recording, replace(settings, layout=moved)
+        def moved(of: Layout) -> Layout:
+            return replace(of, r=of.r * factor, z=of.z * of_height)
 
-        return change
+        return lambda r, s: (r, replace(s, layout=moved(s.layout)))
 
     example = int(np.argmax(np.abs(layout.r)))
+    arm = layout.r[example]
     for factor, (looks, taken) in _LENGTHS.items():
-        likely, then_likely = (
-            LIMITS.shortest_arm < abs(r) < LIMITS.longest_arm
-            for r in (layout.r[example], factor * layout.r[example])
-        )
+        likely, then_likely = (LIMITS.shortest_arm < abs(r) < LIMITS.longest_arm for r in (arm, factor * arm))
         # mm and cm are both likely
         if not then_likely or (likely and factor not in (1e-1, 1e1)):
             continue
-        now, then = f"{layout.r[example]:g} m", f"{factor * layout.r[example]:g} m"
         text = (
             f"the positions r of the accelerometers look to be in {looks}, taken for {taken}: write them with their "
-            f'unit, for {layout.names[example]} "{then}" in the place of "{now}"'
+            f'unit, for {layout.names[example]} "{factor * arm:g} m" in the place of "{arm:g} m"'
         )
         yield _fault("unit_suspect", text, times(factor, factor))
     text = "the positions r of all accelerometers look reversed, they are positive ahead of the pivot"

@@ -16,7 +16,7 @@ from inercal.units import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)
-class Scatter:
+class SensorNoise:
     """Noise of a sensor: standard deviation ``size`` [SI] from row to row, ``certain`` where it is surely noise and no
     motion; ``sparse`` the same over every fourth row."""
 
@@ -25,7 +25,7 @@ class Scatter:
     sparse: float
 
 
-def scatter(t: Array, values: Array) -> Scatter | None:
+def scatter(t: Array, values: Array) -> SensorNoise | None:
     """Noise of ``values`` (n,) at ``t`` (n,) [s]; None where hardly any come at even intervals.
 
     White noise has the same size in all orders; the square of motion below a quarter of the sample rate at least halves
@@ -37,7 +37,7 @@ def scatter(t: Array, values: Array) -> Scatter | None:
     least = 2.0 * sizes[-1] ** 2 - sizes[-2] ** 2
     certain = least > LIMITS.noise_share * sizes[-1] ** 2
     sparse = _by_order(t[:: LIMITS.sparse_rows], values[:: LIMITS.sparse_rows]) or sizes
-    return Scatter(math.sqrt(least) if certain else min(sizes), certain, min(sparse))
+    return SensorNoise(math.sqrt(least) if certain else min(sizes), certain, min(sparse))
 
 
 def _by_order(t: Array, values: Array) -> list[float] | None:
@@ -47,21 +47,16 @@ def _by_order(t: Array, values: Array) -> list[float] | None:
     """
     there = np.isfinite(values)
     differences, step = values[there], np.diff(t[there])
-    even = (
-        np.abs(step - np.median(step)) < LIMITS.even_share * np.median(step)
-        if len(step)
-        else np.zeros(0, dtype=np.bool_)
-    )
-    runs = even
+    usual = float(np.median(step)) if len(step) else 0.0
+    even = runs = np.abs(step - usual) < LIMITS.even_share * usual
     sizes = []
     for order in range(1, LIMITS.noise_order + 1):
         differences = np.diff(differences)
         runs = even if order == 1 else runs[:-1] & even[order - 1 :]
         if runs.sum() < LIMITS.noise_differences:
             return None
-        sizes.append(
-            float(np.median(np.abs(differences[runs]))) / 0.6745 / math.sqrt(math.comb(2 * order, order))
-        )
+        middle = float(np.median(np.abs(differences[runs])))
+        sizes.append(middle / 0.6745 / math.sqrt(math.comb(2 * order, order)))
     return sizes
 
 
@@ -75,15 +70,14 @@ def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding
         scatters = {name: scatter(recording.t, values) for name, values in sensors.items() if nominal > 0.0}
         seen = {name: each for name, each in scatters.items() if each is not None}
         over = {name: each.size / nominal for name, each in seen.items() if each.certain}
-        under = {
-            name: max(each.size, each.sparse) / nominal for name, each in seen.items() if each.size > 0.0
-        }
+        noisy = {name: each for name, each in seen.items() if each.size > 0.0}
+        least = max((max(each.size, each.sparse) / nominal for each in noisy.values()), default=0.0)
         if loud := [name for name, ratio in over.items() if ratio > LIMITS.loud_noise_ratio]:
             most = max(over.values())
             findings.append(_finding("excess_scatter", key, loud, most, nominal))
             settings = replace(settings, noise=replace(settings.noise, **{key: most * nominal}))
-        elif under and LIMITS.no_noise_ratio < max(under.values()) < LIMITS.low_noise_ratio:
-            findings.append(_finding("low_scatter", key, list(under), max(under.values()), nominal))
+        elif LIMITS.no_noise_ratio < least < LIMITS.low_noise_ratio:
+            findings.append(_finding("low_scatter", key, list(noisy), least, nominal))
     return findings, settings
 
 

@@ -54,12 +54,8 @@ def small_errors(case: Case) -> tuple[Fits[Case], Case]:
 
 def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
     """The fit with the least misfit, with others that have hardly more; None where it takes too little away."""
-    by_misfit = sorted(
-        (
-            (JUDGE.misfit(fit[-1].case), k, fit)
-            for k, fit in enumerate(itertools.islice(fits, LIMITS.fitted_errors))
-        )
-    )
+    likeliest = enumerate(itertools.islice(fits, LIMITS.fitted_errors))
+    by_misfit = sorted((JUDGE.misfit(fit[-1].case), k, fit) for k, fit in likeliest)
     if not by_misfit or by_misfit[0][0] > (1.0 - LIMITS.explained_share) * JUDGE.misfit(case):
         return None
     least, _, best = by_misfit[0]
@@ -90,16 +86,18 @@ def _error(
     without: Callable[[Recording, AoaSettings, float], Case],
     says: Callable[[float], str],
     step: float,
-    bounds: tuple[float, float],
+    bound: float,
+    least: float | None = None,
 ) -> Hypothesis[Case]:
-    """An error of one constant [SI]."""
-
-    def sentence(fit: Fitted[Case]) -> str:
-        return says(float(fit.values[0]))
+    """An error of one constant [SI], from ``least``, or minus the ``bound``, to the ``bound``."""
 
     def corrected(case: Case, values: Array) -> Case:
         return without(*case, float(values[0]))
 
+    def sentence(fit: Fitted[Case]) -> str:
+        return says(float(fit.values[0]))
+
+    bounds = (-bound if least is None else least, bound)
     return Hypothesis(name, code, sentence, corrected, (name,), step, bounds, harm=EVERYTHING)
 
 
@@ -116,66 +114,60 @@ def _axis(settings: AoaSettings, k: int) -> Hypothesis[Case]:
         advice = f'write angle = "{math.degrees(nominal + value):.4g} deg" under [sensors.{name}]'
         return f"the axis of {name} looks turned by {math.degrees(value):.3g} deg: {advice}"
 
-    return _error(f"axis {name}", "unmodelled", without, says, 1e-5, (-0.7, 0.7))
+    return _error(f"axis {name}", "unmodelled", without, says, 1e-5, 0.7)
 
 
 def _scale(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """A sensor whose readings are 1 + value times too large."""
     name = settings.layout.names[k]
 
-    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        acc = recording.acc.copy()
-        acc[:, k] /= 1.0 + value
-        return replace(recording, acc=acc), settings
-
     def says(value: float) -> str:
         what = f"{name} looks to read {1.0 + value:.5g} times what it should"
         return f"{what}: correct the scale under [sensors.{name}]"
 
-    return _error(f"scale {name}", "unmodelled", without, says, 1e-5, (-0.3, 0.3))
+    return _error(f"scale {name}", "unmodelled", lambda r, s, x: (_read(r, k, 1.0 + x), s), says, 1e-5, 0.3)
 
 
 def _bias(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """A sensor whose readings are too large by the value [m/s^2]."""
     name = settings.layout.names[k]
 
-    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        acc = recording.acc.copy()
-        acc[:, k] -= value
-        return replace(recording, acc=acc), settings
-
     def says(value: float) -> str:
         what = f"the bias of {name} looks to be {1e3 * value / STANDARD_GRAVITY:.3g} mg"
         return f"{what}: state a bias under [sensors.{name}], or a larger accelerometer_bias"
 
-    return _error(f"bias {name}", "prior_suspect", without, says, 1e-4, (-5.0, 5.0))
+    return _error(f"bias {name}", "prior_suspect", lambda r, s, x: (_read(r, k, bias=x), s), says, 1e-4, 5.0)
+
+
+def _read(recording: Recording, k: int, scale: float = 1.0, bias: float = 0.0) -> Recording:
+    """The recording with accelerometer ``k`` freed of a bias [m/s^2] and a scale."""
+    acc = recording.acc.copy()
+    acc[:, k] = (acc[:, k] - bias) / scale
+    return replace(recording, acc=acc)
 
 
 def _position(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     """A sensor further ahead of the pivot by the value [m]."""
     name, nominal = settings.layout.names[k], float(settings.layout.r[k])
 
-    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        return recording, _further_ahead(settings, k, value)
-
     def says(value: float) -> str:
         what = f"{name} looks to sit {1e3 * value:.3g} mm further ahead than stated"
         return f'{what}: write r = "{nominal + value:.4g} m" under [sensors.{name}]'
 
-    return _error(f"position {name}", "prior_suspect", without, says, 1e-4, (-1.0, 1.0))
+    return _error(
+        f"position {name}", "prior_suspect", lambda r, s, x: (r, _further_ahead(s, k, x)), says, 1e-4, 1.0
+    )
 
 
 def _pivot() -> Hypothesis[Case]:
     """All sensors further ahead of the pivot by the value [m]."""
 
-    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        return recording, _further_ahead(settings, slice(None), value)
-
     def says(value: float) -> str:
         what = f"the pivot looks to be {1e3 * value:.3g} mm further back than stated"
         return f"{what}: correct the positions r of all sensors"
 
-    return _error("pivot", "prior_suspect", without, says, 1e-4, (-1.0, 1.0))
+    every = slice(None)
+    return _error("pivot", "prior_suspect", lambda r, s, x: (r, _further_ahead(s, every, x)), says, 1e-4, 1.0)
 
 
 def _further_ahead(settings: AoaSettings, k: int | slice, value: float) -> AoaSettings:
@@ -197,7 +189,7 @@ def _gravity(settings: AoaSettings) -> Hypothesis[Case]:
         advice = f"stated are {nominal:.6g} m/s^2, correct gravity or latitude and height under [site]"
         return f"gravity looks to be {nominal + value:.5g} m/s^2: {advice}"
 
-    return _error("gravity", "site_suspect", without, says, 1e-4, (-0.5, 0.5))
+    return _error("gravity", "site_suspect", without, says, 1e-4, 0.5)
 
 
 def _yaw(theta: Array) -> Hypothesis[Case]:
@@ -214,20 +206,19 @@ def _yaw(theta: Array) -> Hypothesis[Case]:
         what = f"the model looks to yaw to and fro by {math.degrees(math.sqrt(value)):.2g} deg/s rms"
         return f"{what}: no sensor here sees that, record gyro_roll and gyro_yaw"
 
-    return _error("yaw", "unmodelled", without, says, 1e-4, (0.0, 100.0))
+    return _error("yaw", "unmodelled", without, says, 1e-4, 100.0, least=0.0)
 
 
 def _roll() -> Hypothesis[Case]:
     """Roll of the mean square ``value`` [rad^2], all the time or to and fro: f_z is less by its mean cosine."""
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        nominal = 0.0 if settings.attitude.roll is None else settings.attitude.roll.value
-        turned = math.acos(math.cos(nominal) * math.cos(math.sqrt(max(value, 0.0))))
-        roll = Quantity(turned, 0.0, parse_unit("rad"), "")
+        rolled = math.acos(settings.attitude.level * math.cos(math.sqrt(max(value, 0.0))))
+        roll = Quantity(rolled, 0.0, parse_unit("rad"), "")
         return recording, replace(settings, attitude=replace(settings.attitude, roll=roll))
 
     def says(value: float) -> str:
         what = f"the model looks rolled by {math.degrees(math.sqrt(value)):.2g} deg, all the time or rms"
         return f"{what}: state roll under [model], or record gyro_roll and gyro_yaw where it changes"
 
-    return _error("roll", "unmodelled", without, says, 1e-4, (0.0, 1.0))
+    return _error("roll", "unmodelled", without, says, 1e-4, 1.0, least=0.0)

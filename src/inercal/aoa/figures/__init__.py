@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.figures.innovations import consistency
-from inercal.aoa.figures.learned import coefficients, flexure, lever_arms
+from inercal.aoa.angles import gives_alpha
+from inercal.aoa.figures.learned import coefficients, consistency, flexure, lever_arms
 from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
-from inercal.aoa.flow import alpha_beta, gives_alpha
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.pauses import at_rest
-from inercal.aoa.result.display import delays, displayed
-from inercal.aoa.result.tables import answer, on_page
-from inercal.aoa.result.verification import REFERENCE_U
+from inercal.aoa.result.tables import answer, delays, displayed, on_page
 from inercal.aoa.task import in_order
 from inercal.arrays import Array
+from inercal.geometry.rotations import principal
 from inercal.report.coefficients import correlation
 from inercal.report.html import Picture, render
 from inercal.report.numbers import SETTLED, known, largest, middle, rms, settled, span
@@ -63,8 +62,7 @@ def pictures(measurement: Measurement) -> list[Picture]:
     if len(t) < 2:
         return [map_of_sensors]
     names = (*settings.layout.names, "gyro")
-    missing, masked = _lost(recording)
-    marks = _marks(seen)
+    (missing, masked), marks = _lost(recording), _marks(seen)
     gallery = [_angle(seen, marks), *_close_up(seen), map_of_sensors]
     if missing.any() or len(marks.gaps):
         gallery.append(measured(t, names, missing, masked, marks))
@@ -78,7 +76,7 @@ def pictures(measurement: Measurement) -> list[Picture]:
     gallery += of_angle(
         t,
         np.degrees(seen.angles.theta),
-        None if reference is None else np.degrees(_apart(seen.angles.theta, reference)),
+        None if reference is None else np.degrees(principal(seen.angles.theta - reference)),
         {} if filtered is None else dict(zip(names, filtered.innovations.T, strict=True)),
     )
     return gallery + ([correlation(measurement.estimate)] if len(measurement.estimate.names) > 1 else [])
@@ -108,16 +106,12 @@ def _angle(seen: Measurement, marks: Marks) -> Picture:
     """Angle, its uncertainty, and its rate."""
     angles, t = seen.angles, seen.recording.t
     theta, u, rate = np.degrees(angles.theta), np.degrees(angles.u), np.degrees(angles.rate)
-    learning = (
-        " It falls while the sensors are learned, and rises where they are saturated or silent."
-        if seen.filtered is not None
-        else ""
-    )
+    falls = " It falls while the sensors are learned, and rises where they are saturated or silent."
+    learning = "" if seen.filtered is None else falls
     title = f"u: median {middle(u):.2g}°, largest after the start {largest(u[settled(t)]):.2g}°"
+    band = theta - 2.0 * u, theta + 2.0 * u
     panels = [
-        Panel(
-            "theta [°]", {"": theta}, f"{angles.method}: {span(theta)}°", (theta - 2.0 * u, theta + 2.0 * u)
-        ),
+        Panel("theta [°]", {"": theta}, f"{angles.method}: {span(theta)}°", band),
         Panel("u of theta [°]", {"": u}, title, scale="log"),
     ]
     if np.isfinite(rate).any():
@@ -168,9 +162,9 @@ def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
         return []
     finite = np.isfinite(reference)
     moving = np.zeros(len(t), dtype=bool)
-    still, _ = at_rest(t[finite], np.unwrap(reference[finite]), np.full(int(finite.sum()), REFERENCE_U))
-    moving[finite] = ~still
-    error, half = np.degrees(_apart(angles.theta, reference)), 2.0 * np.degrees(angles.u)
+    creep = np.full(int(finite.sum()), LIMITS.reference_creep)
+    moving[finite] = ~at_rest(t[finite], np.unwrap(reference[finite]), creep)[0]
+    error, half = np.degrees(principal(angles.theta - reference)), 2.0 * np.degrees(angles.u)
     late = settled(t) & np.isfinite(error) & np.isfinite(half)
     outside = 100.0 * float(np.mean(np.abs(error[late]) > half[late])) if late.any() else 0.0
     parts = ", ".join(
@@ -197,9 +191,7 @@ def _in_the_stream(seen: Measurement, settings: AoaSettings, marks: Marks) -> li
     """Angle of attack and sideslip, where the study states how the model lies, and roll where it is tracked."""
     angles, panels = seen.angles, []
     if gives_alpha(settings.attitude):
-        flow = alpha_beta(
-            angles.theta, angles.known_u, settings.attitude, angles.roll, angles.roll_u, angles.by_roll
-        )
+        flow = angles.in_stream(settings.attitude)
         for name, value, u in (("alpha", flow.alpha, flow.u_alpha), ("beta", flow.beta, flow.u_beta)):
             panels.append(_banded(seen, name, np.degrees(value), np.degrees(u)))
     if angles.roll is not None and angles.roll_u is not None:
@@ -248,14 +240,13 @@ def _points(measurement: Measurement) -> list[Picture]:
     all_points, reference = measurement.points, measurement.recording.reference
     if not all_points:
         return []
-    theta, u, left, scatter = np.degrees(
-        [[each.theta, each.u, each.u_scatter, each.scatter] for each in all_points]
-    ).T
+    columns = np.array([[each.theta, each.u, each.u_scatter, each.scatter] for each in all_points]).T
     error = None
     if reference is not None:
         true = [known(reference[each.start : each.stop]) for each in all_points]
         means = np.array([float(x.mean()) if len(x) else math.nan for x in true])
-        error = np.degrees(_apart(np.radians(theta), means))
+        error = np.degrees(principal(columns[0] - means))
+    theta, u, left, scatter = np.degrees(columns)
     return [points(theta, u, left, scatter, error)]
 
 
@@ -269,7 +260,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     shown = {seen.angles.method: seen.angles.theta} | others if true else others
     base = reference if true and reference is not None else seen.angles.theta
     what = "error against the reference" if true else f"difference from {seen.angles.method}"
-    apart = {name: _apart(theta, base) for name, theta in shown.items()}
+    apart = {name: principal(theta - base) for name, theta in shown.items()}
     late = settled(t)
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
     panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
@@ -285,8 +276,3 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
             0.5,
         ),
     ]
-
-
-def _apart(theta: Array, other: Array) -> Array:
-    """Difference of angles [rad], within half a turn."""
-    return np.asarray(np.remainder(theta - other + math.pi, 2.0 * math.pi) - math.pi)

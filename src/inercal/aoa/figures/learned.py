@@ -1,16 +1,21 @@
-"""Pictures of lever arms, flexure of the sting, and errors of the sensors."""
+"""Pictures of what a filter saw and learned: lever arms, flexure of the sting, errors of the sensors, innovations."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.figures import sensors
-from inercal.aoa.result.outcome import unit_of
+from inercal.aoa.layout import all_weights, centrifugal_arms, tangential_arms
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.result.outcome import term_of
+from inercal.arrays import Array
 from inercal.instruments.terms import shown_unit
+from inercal.report import innovations as white_noise
 from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture
 from inercal.report.numbers import largest, middle, rms, settled
@@ -25,15 +30,18 @@ if TYPE_CHECKING:
 
 _MG = 1e-3 * STANDARD_GRAVITY
 
+_BLOCKS = 400
+"""Pieces of a record whose mean squared innovations are drawn."""
+
 _NO_FORCE = 1e-3
 """Specific force [mg] below which there is none."""
 
 
 def lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[Picture]:
     """Parts of the readings that lever arms add."""
-    t, filtered, layout, roll = seen.recording.t, seen.filtered, settings.layout, settings.attitude.roll
+    t, filtered, layout = seen.recording.t, seen.filtered, settings.layout
     rate = seen.angles.rate if np.isfinite(seen.angles.rate).any() else seen.recording.gyro
-    level = 1.0 if roll is None else math.cos(roll.value)
+    level = settings.attitude.level
     weights = all_weights(layout)
     if filtered is not None:
         acceleration = filtered.acceleration
@@ -41,16 +49,12 @@ def lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[P
         acceleration = np.full(len(t), np.nan) if weights is None else seen.recording.acc @ weights / level
     degrees, late = math.degrees(_MG / settings.site.gravity), settled(t)
     panels = []
-    for name, q, p in zip(
-        layout.names, centrifugal_arms(layout, level), tangential_arms(layout, level), strict=True
-    ):
+    arms = zip(layout.names, centrifugal_arms(layout, level), tangential_arms(layout, level), strict=True)
+    for name, q, p in arms:
         terms = {"centrifugal": -q * rate**2 / _MG, "tangential": p * acceleration / _MG}
         sizes = {word: largest(x[late]) for word, x in terms.items()}
-        most = ", ".join(
-            f"{word} {size:.3g} mg = {degrees * size:.2g}°"
-            for word, size in sizes.items()
-            if size > _NO_FORCE
-        )
+        felt = {word: size for word, size in sizes.items() if size > _NO_FORCE}
+        most = ", ".join(f"{word} {size:.3g} mg = {degrees * size:.2g}°" for word, size in felt.items())
         title = f"{name}, at most: {most}" if most else f"{name}: none"
         panels.append(Panel(f"{name} [mg]", terms, title, zero=True))
     return [
@@ -99,26 +103,17 @@ def coefficients(seen: Measurement, filtered: FilterResult) -> list[Picture]:
     problem, t = seen.problem, filtered.kept_t
     if len(t) < 2:
         return []
-    places = [*problem.nuisances.values()]
-    prior, sizes = (
-        np.sqrt(np.diag(problem.covariance)),
-        np.array([shown_unit(unit_of(name))[1] for name in problem.nuisances]),
-    )
-    units = [shown_unit(unit_of(name))[0] for name in problem.nuisances]
+    places, prior = [*problem.nuisances.values()], np.sqrt(np.diag(problem.covariance))
+    units, factors = zip(*(shown_unit(term_of(name).unit) for name in problem.nuisances), strict=True)
+    sizes = np.array(factors)
     finite = np.flatnonzero(np.isfinite(filtered.states_u[:, places]).all(axis=1))
     if not len(finite):
         return []
-    courses = [
-        Course(
-            name,
-            unit,
-            filtered.states[:, k] / size,
-            filtered.states_u[:, k] / size,
-            float(prior[k] / size),
-            centre=float(problem.mean[k] / size),
-        )
-        for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True)
-    ]
+    courses = []
+    for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True):
+        value, u = filtered.states[:, k] / size, filtered.states_u[:, k] / size
+        centre = float(problem.mean[k] / size)
+        courses.append(Course(name, unit, value, u, float(prior[k] / size), centre=centre))
     last = filtered.states[finite[-1], places] / sizes, filtered.states_u[finite[-1], places] / sizes
     at_end = sensors.learned(
         tuple(problem.nuisances), units, *last, problem.mean[places] / sizes, prior[places] / sizes
@@ -142,5 +137,52 @@ def coefficients(seen: Measurement, filtered: FilterResult) -> list[Picture]:
             "apart, and stays level while it does not: biases need a sweep of the angle, lever arms fast motion.",
             t,
             courses,
+        ),
+    ]
+
+
+def consistency(
+    t: Array, values: Array, names: Sequence[str], nis_mean: float, marks: Marks
+) -> list[Picture]:
+    """Innovations, ``values`` (n, k) of ``names`` over their standard deviations, NaN where not measured, over ``t``
+    (n,) [s].
+
+    ``nis_mean`` is the mean of their squares once settled. Nothing where there are none.
+    """
+    at = np.isfinite(values)
+    if not at.any():
+        return []
+    starts = np.unique(np.linspace(0, len(t), min(_BLOCKS, len(t)), endpoint=False).astype(np.int64))
+    squared = np.add.reduceat(np.where(at, values, 0.0) ** 2, starts, axis=0)
+    count = np.add.reduceat(at.astype(float), starts, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        each, together = squared / count, squared.sum(axis=1) / count.sum(axis=1)
+    limits = {"1, as stated": 1.0, f"{LIMITS.mean_nis:g}, inconsistent": LIMITS.mean_nis}
+    by_sensor = dict(zip(names, each.T, strict=True))
+    at_middle = 0.5 * (t[starts] + t[np.append(starts[1:], len(t)) - 1])
+    nis = over_time(
+        "Normalised innovations squared",
+        "What the sensors tell beyond what the filter expected, squared and over its variance (NIS): means over pieces "
+        f"of {(t[-1] - t[0]) / len(starts):.2g} s. Over the record, once settled, {nis_mean:.3g}. Below 1 is normal "
+        "where the filter allows for a sting that bends: about 0.25 for a rigid model, the gyro near 1, accelerometers "
+        "far below. Above 2 the model does not hold: the sensor that stands out is the one to look at. Peaks are "
+        f"spikes, knocks, or lost rows.{marks.words}",
+        at_middle,
+        [
+            Panel("all", {"": together}, "all sensors", levels=limits, scale="log"),
+            Panel("each", by_sensor, "each sensor", levels={"": 1.0}, scale="log"),
+        ],
+        replace(marks, gaps=np.empty((0, 2))),
+    )
+    white = white_noise.innovations(t, values, names)
+    return [
+        nis,
+        replace(
+            white,
+            caption="Left: reading less what the filter expected, over its standard deviation; least and greatest "
+            "value of pieces of the record; strip: ± 2. Right: correlation with itself some rows later; strip: ± two "
+            "standard deviations of white noise, red beyond. A filter that allows for flexure stays within the strip "
+            "and leaves some correlation, also of a rigid model. Suspicious is what stays off zero (a bias beyond its "
+            "prior) or swings with the motion (a lever arm, a sign, a delay).",
         ),
     ]

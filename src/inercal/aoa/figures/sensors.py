@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
+from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.rounding import rounded
 from inercal.report.coefficients import limits
 from inercal.report.html import Picture
@@ -42,9 +44,8 @@ def side_view(names: Sequence[str], angle: Array, r: Array, z: Array, gyro: bool
     ]
     for k, (name, lam, colour) in enumerate(zip(names, angle, colours, strict=True)):
         away = (0.0, -12.0) if np.sin(lam) < 0.5 else (0.0, 6.0)  # from the arrow
-        place = f"{name}   r {forward[k]:.6g} mm, z {up[k]:.6g} mm, axis {np.degrees(lam):.5g}°".replace(
-            "-", "−"
-        )
+        place = f"{name}   r {forward[k]:.6g} mm, z {up[k]:.6g} mm, axis {np.degrees(lam):.5g}°"
+        place = place.replace("-", "−")
         marks += [
             Dots(forward[k : k + 1], up[k : k + 1], "", colour, size=5.8),
             Note((forward[k], up[k]), name, colour, 7.5, "center", "bottom", away, bold=True),
@@ -63,11 +64,8 @@ def side_view(names: Sequence[str], angle: Array, r: Array, z: Array, gyro: bool
         Axis("r, ahead of the pivot [mm]", limits=(1.5 * tail, 1.9 * shown)),
         Axis("z, above it [mm]", limits=(-0.66 * shown, 0.66 * shown)),
     )
-    doubt = ""
-    if reach > 0.0 and not _USUAL[0] <= reach <= _USUAL[1]:
-        doubt = (
-            f" The outermost is {reach:.4g} m from the pivot, which no usual model has: are the units right?"
-        )
+    far = f" The outermost is {reach:.4g} m from the pivot, which no usual model has: are the units right?"
+    doubt = "" if reach == 0.0 or _USUAL[0] <= reach <= _USUAL[1] else far
     return draw(
         "Where the sensors are",
         "The model from its right side, to scale, as the study states it: each accelerometer with an arrow along "
@@ -92,7 +90,7 @@ def learned(
         "{} ± {} {}".format(*(rounded(float(value), float(own))[:2] if good else "––"), plain_unit(unit))
         for value, own, unit, good in zip(values, u, units, sound, strict=True)
     ]
-    kept = [name for name, part in zip(names, left, strict=True) if part > 0.9]
+    kept = [name for name, part in zip(names, left, strict=True) if part > UNSEEN]
     seen = f" Left at their priors: {', '.join(kept)}." if kept else ""
     return limits(
         "What was learned of the sensors",
@@ -104,7 +102,7 @@ def learned(
         2.0 * left,
         "difference from the prior / its standard deviation",
         2.0,
-        np.abs(moved) > 3.0,
+        np.abs(moved) > LIMITS.prior_sigmas,
         notes,
     )
 
@@ -148,11 +146,8 @@ def points(theta: Array, u: Array, left: Array, scatter: Array, error: Array | N
         good = np.isfinite(theta) & np.isfinite(error) & np.isfinite(u)
         off = Dots(theta[good], error[good], size=3.5, up=2.0 * u[good])
         panels.append(Panel([Level(0.0), off], across, Axis("mean less reference [°]"), grid="both"))
-    against = (
-        " Right: means less the reference, with bars of ± two standard uncertainties."
-        if error is not None
-        else ""
-    )
+    right = " Right: means less the reference, with bars of ± two standard uncertainties."
+    against = "" if error is None else right
     return draw(
         "Points",
         f"Standard uncertainty of the mean angle of each point at rest, {len(theta)} in all, and the standard "

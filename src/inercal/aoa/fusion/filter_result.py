@@ -21,13 +21,11 @@ from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, State, Trace, advance, initial
 from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.geometry.rotations import principal
-
-SETTLED = 2.0
-"""Time [s] after the first row from which innovations are judged."""
 
 KEPT = 2000
 """Number of rows, about, at which all states are kept for pictures."""
@@ -41,31 +39,15 @@ _BLOCK = 10_000
 
 @dataclass(frozen=True, eq=False)
 class FilterResult:
-    """Result of the fusion.
+    """Result of the fusion of n rows, causal or ``smoothed``; NaN in rows that were left out.
 
-    Attributes
-    ----------
-    theta, u, rate, rate_u, acceleration : (n,)
-        Angle, its standard uncertainty [rad], rate, its standard uncertainty [rad/s], and acceleration [rad/s^2], at
-        each row of the recording, causal or ``smoothed``; NaN in rows that were left out.
-    innovations : (n, N + 1)
-        Of accelerometers and gyro, of the causal filter, each over its standard deviation before the gate; NaN where
-        not measured.
-    roll, roll_u : (n,) or None
-        Roll and its standard uncertainty [rad] at each row of the causal filter, where it is estimated.
-    kept_t : (k,) s
-        Times at which all states were kept, ``states`` (k, m) and their standard deviations ``states_u`` (k, m), in the
-        order of the problem's names; causal or smoothed as the angles.
-    state : State
-        Of the causal filter at the end.
-    nis_mean : float
-        Mean of the squared innovations after the first 2 s, or in the later half of less than 4 s; NaN without any.
-    nis_count : int
-        Innovations in that mean.
-    starts : tuple of int
-        Rows at which the filter started: one, and more where the angle was lost.
-    seconds : float
-        Time of the computation alone.
+    ``theta``, ``u`` [rad], ``rate``, ``rate_u`` [rad/s] with standard uncertainties and ``acceleration`` [rad/s^2];
+    ``roll`` and ``roll_u`` [rad] of the causal filter where it is estimated. ``innovations`` (n, N + 1) of
+    accelerometers and gyro, of the causal filter, each over its standard deviation before the gate. ``states`` (k, m)
+    and their standard deviations ``states_u`` at the times ``kept_t`` (k,) [s], in the order of the problem's names.
+    ``state`` of the causal filter at the end. ``nis_mean`` is the mean of ``nis_count`` squared innovations after the
+    first 2 s, or in the later half of less than 4 s. ``starts`` are the rows at which the filter started, more than one
+    where the angle was lost; ``seconds`` the time of the computation alone.
     """
 
     theta: Array
@@ -90,13 +72,7 @@ class FilterResult:
 def estimate(
     recording: Recording, problem: FilterProblem, smoothed: bool = False, where: object = "t"
 ) -> FilterResult:
-    """Angles of a recording, causal or from all of it.
-
-    Raises
-    ------
-    RecordError
-        Time does not go on.
-    """
+    """Angles of a recording, causal or from all of it; raises `RecordError` where time does not go on."""
     clock = time.perf_counter()
     taken = later(recording.t, where=where)
     t, rows = recording.t[taken], recording.rows[taken]
@@ -118,7 +94,8 @@ def estimate(
     if rolls is not None:
         roll[taken] = rolls
     seconds = time.perf_counter() - clock
-    judged = innovations[taken][t - t[0] >= min(SETTLED, (t[-1] - t[0]) / 2.0)] if len(t) else innovations
+    settled = t - t[:1] >= (min(LIMITS.settling_time, (t[-1] - t[0]) / 2.0) if len(t) else 0.0)
+    judged = innovations[taken][settled]
     squared = np.square(judged[np.isfinite(judged)])
     m = problem.size
     return FilterResult(
@@ -205,6 +182,6 @@ def tracked_roll(
     speed = p + (np.nan_to_num(recording.gyro[taken]) * np.sin(coarse) - y * np.cos(coarse)) * tangent
     run = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
     fine = run + np.interp(t, kept, phi - np.interp(kept, t, run))
-    roll[taken] = np.remainder(fine + np.pi, 2.0 * np.pi) - np.pi
+    roll[taken] = principal(fine)
     roll_u[taken] = np.interp(t, kept, filtered.states_u[finite, k])
     return roll, roll_u

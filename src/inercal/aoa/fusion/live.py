@@ -1,6 +1,6 @@
 """The fusion while a model is measured: samples or blocks of them in, angles out, to the digits of the whole record.
 
-The first rows are held until the filter can start (`inercal.aoa.reading.clock.HELD`), and where theta is lost rows are
+The first rows are held until the filter can start (`Limits.starting_rows`), and where theta is lost rows are
 held again: their angles then come all at once. A row that is not later than those before it has no angle
 (`inercal.aoa.reading.clock`); every row is answered, in the order in which it came.
 """
@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal._jit import compiled
+from inercal.aoa.angles import Angles
 from inercal.aoa.fusion import loop
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.filter_result import roll_of
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.problem import FilterProblem
-from inercal.aoa.reading.clock import PATIENCE, later
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.errors import RecordError
@@ -39,42 +41,18 @@ class LiveState(NamedTuple):
 
 class Answers(NamedTuple):
     """Angles of k rows: their stamps ``t`` (k,) [s], and ``out`` (k, `OUTPUTS` + N + 1) as of
-    `inercal.aoa.fusion.loop.advance`, NaN in rows without an angle; ``turned`` (k, 2) roll and its standard uncertainty
-    [rad] where it is estimated."""
+    `inercal.aoa.fusion.loop.advance`, NaN in rows without an angle; ``roll`` (k, 2) with its standard uncertainty [rad]
+    where it is estimated."""
 
     t: Array
     out: Array
-    turned: Array | None = None
+    roll: Array | None = None
 
     @property
-    def theta(self) -> Array:
-        """(k,) rad."""
-        return self.out[:, 0]
-
-    @property
-    def u(self) -> Array:
-        """(k,) rad, the standard uncertainty of theta."""
-        return self.out[:, 1]
-
-    @property
-    def rate(self) -> Array:
-        """(k,) rad/s."""
-        return self.out[:, 2]
-
-    @property
-    def rate_u(self) -> Array:
-        """(k,) rad/s, the standard uncertainty of the rate."""
-        return self.out[:, 3]
-
-    @property
-    def roll(self) -> Array | None:
-        """(k,) rad."""
-        return None if self.turned is None else self.turned[:, 0]
-
-    @property
-    def roll_u(self) -> Array | None:
-        """(k,) rad, the standard uncertainty of the roll."""
-        return None if self.turned is None else self.turned[:, 1]
+    def angles(self) -> Angles:
+        """Angles (k,) with rates and their standard uncertainties, and roll."""
+        roll = () if self.roll is None else self.roll.T
+        return Angles("fusion", *self.out[:, :4].T, *roll)
 
     @property
     def innovations(self) -> Array:
@@ -83,16 +61,9 @@ class Answers(NamedTuple):
 
 
 class Live:
-    """The causal fusion, fed with samples; gives the digits of `inercal.aoa.fusion.filter_result.estimate` on all of
-    them.
+    """The causal fusion, fed with samples: the digits of `inercal.aoa.fusion.filter_result.estimate` on all of them.
 
-    Parameters
-    ----------
-    problem : FilterProblem
-    state : LiveState, optional
-        State in which an earlier `Live` of the same problem ended; the initial one if absent.
-    where : object
-        Name of the samples in errors.
+    ``state`` is that in which an earlier `Live` of the same ``problem`` ended; ``where`` names the samples in errors.
 
     Examples
     --------
@@ -128,23 +99,11 @@ class Live:
         zero_angle: float = math.nan,
         zero_angle_u: float = math.nan,
     ) -> Answers:
-        """Go on by one sample; answers for it: none while rows are held, and then those of all held rows.
+        """Go on by one sample at ``t`` [s]; answers for it: none while rows are held, then those of all held rows.
 
-        Parameters
-        ----------
-        t : float
-            Stamp [s].
-        acceleration : (N,) m/s^2
-            Accelerometers in the order of the layout; NaN where missing or saturated.
-        gyro, roll, yaw : float
-            Rates [rad/s]; nose-up, about x, about z.
-        zero_angle, zero_angle_u : float
-            Angle known from elsewhere [rad], and its standard uncertainty.
-
-        Raises
-        ------
-        RecordError
-            Time does not go on.
+        ``acceleration`` (N,) [m/s^2] in the order of the layout; ``gyro``, ``roll``, ``yaw`` [rad/s] nose-up, about x,
+        about z; ``zero_angle`` [rad] known from elsewhere, and its standard uncertainty. NaN where missing or
+        saturated. Raises `RecordError` where time does not go on.
         """
         problem, state, row, n = self._problem, self._fusion, self._row, self._problem.count
         row[0, :n] = acceleration
@@ -162,9 +121,9 @@ class Live:
         if not done:  # theta is lost
             self._fusion = state._replace(started=False, held=np.column_stack([stamp, row]))
             self._waiting = stamp
-            return Answers(stamp[:0], self._out[:0], self._turned(self._kept[:0]))
+            return Answers(stamp[:0], self._out[:0], self._roll(self._kept[:0]))
         self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held, state.since)
-        return Answers(stamp, self._out.copy(), self._turned(self._kept))
+        return Answers(stamp, self._out.copy(), self._roll(self._kept))
 
     def feed_block(self, recording: Recording) -> Answers:
         """Go on by the rows of a recording, any number of them, as `feed` does."""
@@ -192,9 +151,9 @@ class Live:
         if spatial:
             states[taken[:done]] = kept[:done]
         self._waiting = waiting[answered:]
-        return Answers(waiting[:answered], out, self._turned(states))
+        return Answers(waiting[:answered], out, self._roll(states))
 
-    def _turned(self, states: Array) -> Array | None:
+    def _roll(self, states: Array) -> Array | None:
         """Roll and its standard uncertainty (k, 2) of states (k, 2 n); None where it is not estimated."""
         return roll_of(self._problem, states) if self._problem.spatial else None
 
@@ -205,7 +164,7 @@ class Live:
             rest = len(waiting) - 1 - int(taken[-1])
         else:
             late = rest = self._late + len(waiting)
-        if late >= PATIENCE:
+        if late >= LIMITS.backward_rows:
             raise RecordError(
                 self._where,
                 f"t: {late} rows in a row are not later than {self._fusion.t:.10g} s, the last at "

@@ -30,13 +30,13 @@ from inercal.aoa.fusion.model import (
     transition,
     turning,
 )
+from inercal.aoa.limits import LIMITS
 from inercal.estimate.kalman import Row, empty_row
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
 
-LOST = 0.09
-"""Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
+LOST, PATIENCE = LIMITS.lost_variance, LIMITS.contradicting_rows  # frozen into the kernels
 
 _TURNS = 1e3
 """Angle [rad] that no model reaches."""
@@ -46,11 +46,6 @@ OUTPUTS = 5
 
 BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, a stated angle and its u, roll and yaw."""
-
-PATIENCE = 500
-"""Successive rows in which a sensor surprises by twice what the gate lets through, after which theta counts as lost:
-half a second at 1 kHz, longer than the errors of one sign by a slightly wrong model, such as 5 mm of a height at 1 Hz.
-"""
 
 _READING = 1e100
 """Size of a reading from which on it counts as missing, like NaN."""
@@ -269,8 +264,8 @@ def advance(
     ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over their standard deviations;
     ``memory`` is filled if it has room for m rows.
 
-    Ends before a row in which theta is lost: its variance is over `LOST`, it is no angle any more, or a sensor has
-    surprised `PATIENCE` times.
+    Ends before a row in which theta is lost: its variance is too large, it is no angle any more, or a sensor has
+    surprised too often.
     """
     done: int = _advance(belief, rows, model, out, kept, memory)
     return done

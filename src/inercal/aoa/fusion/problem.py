@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.aoa.fusion.model import Constants, Model, Places
 from inercal.aoa.layout import Layout
-from inercal.aoa.settings import AoaSettings, Resonance
+from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 
 START = np.array([0.1, 0.5, 20.0, 200.0])
@@ -97,7 +97,9 @@ def problem(
         common, own = prior.lever_common**2, prior.lever**2
         add("levers", common + own * np.eye(n), *(f"dr_{k}" for k in each))
     if states >= 15:
-        add("resonators", np.diag([*_stationary(prior.heave), *_stationary(prior.axial)]), *_FLEXURE)
+        # variances of s and s'
+        both = [((of.level / of.frequency) ** 2, of.level**2) for of in (prior.heave, prior.axial)]
+        add("resonators", np.diag(np.ravel(both)), *_FLEXURE)
     if states >= 19:
         add("heights", prior.height**2 * np.eye(n), *(f"zo_{k}" for k in each))
         add("scale", np.array([[prior.gyro_scale**2]]), "k_g")
@@ -125,14 +127,9 @@ def problem(
     )
 
 
-def _stationary(of: Resonance) -> tuple[float, float]:
-    """Variances of s and s'."""
-    return (of.level / of.frequency) ** 2, of.level**2
-
-
 def _constants(settings: AoaSettings) -> Constants:
     """The constants of a study."""
-    noise, timing, roll = settings.noise, settings.timing, settings.attitude.roll
+    noise, timing = settings.noise, settings.timing
     heave, axial = settings.prior.heave, settings.prior.axial
     constants = Constants(
         gravity=settings.site.gravity,
@@ -143,7 +140,7 @@ def _constants(settings: AoaSettings) -> Constants:
         gyro_delay=timing.gyro_delay or 0.0,
         common_delay=timing.common_delay,
         common_delay_u=timing.common_delay_u,
-        roll_cosine=1.0 if roll is None else math.cos(roll.value),
+        roll_cosine=settings.attitude.level,
         gate=settings.estimator.gate,
         heave_frequency=heave.frequency,
         heave_damping=heave.damping,

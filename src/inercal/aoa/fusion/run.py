@@ -2,20 +2,19 @@
 
 The first rows are held until there are enough to start from; their angles come then, all at once. Where theta is lost,
 as over a long gap, rows are held again, and the filter starts anew with the errors of the sensors that it has learned;
-with the prior where it was lost because sensors kept contradicting it. Rows must be later than those before them:
-`inercal.aoa.reading.clock` leaves out those that are not.
+with the prior where sensors kept contradicting it. Each row must be later than that before it.
 
 Fading: a row is linearised at a motion that is itself estimated, so it says a little too much about the constants,
 always in the same sense. Within a minute that is small beside u. But a combination that a motion hardly shows (under
 one sine the gyro's scale, positions and heights together, which only harmonics separate) is carried away, and the
 angle with it: in 600 s of 10 deg at 1 Hz by one standard deviation of the prior at 1 kHz, by eight at 100 Hz. So from
-`MEMORY` on the information of the data on the constants fades with that time constant, and that of the prior does not;
-in information, each `FADING_STEP`,
+`memory_time` (`inercal.aoa.limits.Limits`) on the information of the data on the constants fades with that time
+constant, and that of the prior does not; in information, each `fading_interval`,
 
     P'^-1 = (1 - e) P^-1 + e P0^-1        P'^-1 x' = (1 - e) P^-1 x + e P0^-1 x0
 
-with x0, P0 the prior. A constant that the data show well stays as sure as `MEMORY` makes it, one that they hardly show
-stays at its prior, and a bias that wanders is followed.
+with x0, P0 the prior. A constant that the data show well stays as sure as the memory makes it, one that they hardly
+show stays at its prior, and a bias that wanders is followed.
 """
 
 from __future__ import annotations
@@ -29,22 +28,11 @@ from inercal.aoa.fusion import loop
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.model import GYRO_BIAS
 from inercal.aoa.fusion.problem import START, FilterProblem
-from inercal.aoa.reading.clock import HELD
+from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 
-MEMORY = 60.0
-"""Time [s] from the first row on in which nothing fades, and the time constant after it."""
-
-FADING_STEP = 10.0
-"""Interval [s] at which constants fade."""
-
-_FIRST = math.floor(MEMORY / FADING_STEP)
-
-_ACROSS = 0.1
-"""Cosine of the roll below which the accelerometers across the body and the gyro do not show pitch."""
-
-_NO_ARM = 1e-3
-"""Lever arm [m] below which accelerometers do not show angular acceleration."""
+_STEP = LIMITS.fading_interval
+_FIRST = math.floor(LIMITS.memory_time / _STEP)
 
 
 class State(NamedTuple):
@@ -89,15 +77,8 @@ class Trace(NamedTuple):
 def initial(problem: FilterProblem) -> State:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
-    return State(
-        problem.mean.copy(),
-        problem.covariance.copy(),
-        np.zeros(problem.count + 3),
-        -math.inf,
-        False,
-        none,
-        math.nan,
-    )
+    x, P = problem.mean.copy(), problem.covariance.copy()
+    return State(x, P, np.zeros(problem.count + 3), -math.inf, False, none, math.nan)
 
 
 def advance(
@@ -127,8 +108,8 @@ def advance(
     dt, starts = np.diff(t, prepend=before), []
     while at < m:
         if not running:
-            end = min(at + HELD, m)
-            if end - at < HELD and not last:
+            end = min(at + LIMITS.starting_rows, m)
+            if end - at < LIMITS.starting_rows and not last:
                 break
             out[at:end] = np.nan
             anew = bool((turns[2:] >= loop.PATIENCE).any())
@@ -170,7 +151,7 @@ def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, ro
     new = unknown(problem)
     fresh = new[4:]
     x[fresh] = problem.mean[fresh]
-    together = t - t[0] <= 3.0 * HELD * _medians(np.diff(t, prepend=t[0])[:, None])[0]
+    together = t - t[0] <= 3.0 * LIMITS.starting_rows * _medians(np.diff(t, prepend=t[0])[:, None])[0]
     t, rows = t[together], rows[together]
     level = math.cos(x[problem.places.roll]) if spatial else problem.constants.roll_cosine
     middle = _medians(rows)
@@ -179,10 +160,9 @@ def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, ro
         return False
     cosine, sine, r, z = problem.geometry[seen].T
     axes = np.stack([cosine, -sine], axis=-1)
-    fit = np.linalg.solve(
-        axes.T @ axes, axes.T
-    )  # forward and upward specific force (2,) that fit readings along axes best
-    if math.isfinite(middle[n]) and abs(level) > _ACROSS:
+    # forward and upward specific force (2,) that fit readings along axes best
+    fit = np.linalg.solve(axes.T @ axes, axes.T)
+    if math.isfinite(middle[n]) and abs(level) > LIMITS.level_cosine:
         rate = (middle[n] - x[GYRO_BIAS]) / level
     else:
         forces = (rows[:, seen] - x[5 + seen]) @ fit.T
@@ -192,7 +172,7 @@ def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, ro
     arms = -level * (z * cosine + r * sine)
     arms = arms - axes @ (fit @ arms)
     power = float(arms @ arms)
-    acceleration = float(arms @ read) / power if power > _NO_ARM**2 else 0.0
+    acceleration = float(arms @ read) / power if power > LIMITS.pair_arm**2 else 0.0
     x[:4] = _angle(fit @ read, level, problem), rate, acceleration, 0.0
     x[0] -= 0.5 * rate * (t[-1] - t[0])
     P[new, :] = 0.0
@@ -217,7 +197,7 @@ def _medians(rows: Array) -> Array:
 def _angle(force: Array, level: float, problem: FilterProblem) -> float:
     """Theta that forward and upward specific force (2,) show at rest; NaN where they are."""
     forward, up = force.tolist()
-    if abs(level) > _ACROSS:
+    if abs(level) > LIMITS.level_cosine:
         return math.atan2(forward, up / level)
     g = problem.constants.gravity
     return math.asin(min(1.0, max(-1.0, forward / g))) if math.isfinite(forward) else math.nan
@@ -235,15 +215,15 @@ def _slope(t: Array, angles: Array) -> float:
 def fading_steps(before: float, t: float, since: float) -> int:
     """Number of steps of fading due before the row at ``t`` [s]; ``before`` [s] is the row before it, and ``since`` [s]
     the row from which the filter has learned."""
-    late, early = math.floor((t - since) / FADING_STEP), math.floor((before - since) / FADING_STEP)
+    late, early = math.floor((t - since) / _STEP), math.floor((before - since) / _STEP)
     return max(late, _FIRST) - max(early, _FIRST)
 
 
 def next_fading(t: Array, at: int, since: float) -> int:
     """The first row after ``at`` of ``t`` (m,) [s], increasing, before which constants fade; m where none is."""
-    passed = max(math.floor((t[at] - since) / FADING_STEP), _FIRST) + 1
+    passed = max(math.floor((t[at] - since) / _STEP), _FIRST) + 1
     # rounding may have it a row earlier or later
-    k = max(at + 1, int(np.searchsorted(t, since + passed * FADING_STEP)) - 1)
+    k = max(at + 1, int(np.searchsorted(t, since + passed * _STEP)) - 1)
     while k < len(t) and not fading_steps(float(t[k - 1]), float(t[k]), since):
         k += 1
     return k
@@ -254,7 +234,7 @@ def fade(x: Array, P: Array, problem: FilterProblem, steps: int) -> Array:
 
     Returns F (n, n) of x' = F x + the part of the prior. States that move do not change.
     """
-    kept = math.exp(-FADING_STEP * steps / MEMORY)
+    kept = math.exp(-_STEP * steps / LIMITS.memory_time)
     prior, F = problem.covariance, np.eye(len(x))
     at = np.array([k for k in problem.nuisances.values() if prior[k, k] > 0.0], dtype=int)
     if not len(at):

@@ -43,17 +43,9 @@ def smooth(
 ) -> Array:
     """Angles from all rows: (m, 5) theta, u [rad], rate, u [rad/s], acceleration [rad/s^2].
 
-    NaN before the first start, and where theta was lost, until the next.
-
-    Parameters
-    ----------
-    problem : FilterProblem
-    t, rows
-        As `inercal.aoa.fusion.run.advance` took them.
-    starts : tuple of Start
-        Starts of the filter: the motion is not continuous across them, the errors of the sensors are.
-    kept : (k, 2 n) or None
-        Receives states and standard deviations at each ``every``-th row.
+    ``t`` and ``rows`` as `inercal.aoa.fusion.run.advance` took them; ``starts`` of the filter, across which the motion
+    is not continuous, but the errors of the sensors are. NaN before the first start, and where theta was lost, until
+    the next. ``kept`` (k, 2 n) receives states and standard deviations at each ``every``-th row.
     """
     n = problem.size
     out = np.full((len(t), OUTPUTS), np.nan)

@@ -17,48 +17,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import all_weights, centrifugal_arms
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights, centrifugal_arms
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later, shortened, usual_step
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
-
-_REACH = 0.1
-"""Largest delay [s] that is looked for."""
 
 _STEP = 2e-4
 _SEGMENTS = 16
 _SHORTEST, _LONGEST = 2.0, 16.0
 """Length [s] of a segment."""
 
-_FEWEST = 4
-"""Segments without which there is no coherence to speak of."""
-
-_CHANCE = 1e-6
-"""Probability that a spectrum of noise alone has a frequency that counts as coherent."""
-
 _OVERLAP = 2.0 * 0.59375 / 0.5625
 """Factor by which Hann windows that overlap by half enlarge the variance over that of independent segments and
 frequencies: with W the sum of the squared windows over time, 2 mean(W^2) / mean(W)^2."""
 
-_BRIDGED = 5
-"""Samples in a row that straight lines may stand for; of more, as of a saturated gyro, the phase is not that of the
-motion."""
-
 _FIRST = 2
 """First frequency of the spectrum that counts: the mean that is taken off leaks into those before."""
-
-_FITS = 0.5
-"""Share of the sum that phases of a mere delay reach at least; those of a gyro with the wrong sign do not."""
 
 _WHOLE = 1.0 - 1e-9
 _ROUNDS = 5
 _SETTLED = 1e-2
 
 _ROUNDING = 1e-6
-
-_LONG = 3.0
-"""Interval, over the usual one, across which the gyro is not interpolated."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +65,7 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
         u^2 = k / sum of 2 n gamma^2 / (1 - gamma^2) (2 pi f)^2
 
     with k = 2.11 for windows that overlap. What else differs between both signals with a phase of its own, such as a
-    filter in one of them, counts as delay.
-
-    Raises
-    ------
-    RecordError
-        Time does not go on.
+    filter in one of them, counts as delay. Raises `RecordError` where time does not go on.
     """
     weights = all_weights(layout)
     taken = later(recording.t)
@@ -102,12 +78,13 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     if min(np.isfinite(shown).sum(), np.isfinite(gyro).sum()) < 2:
         return None
     # within a gap nothing counts, and beside it nothing of its other side
-    t = shortened(t, _REACH + 2 * (_BRIDGED + 1) * float(np.median(np.diff(t))))
+    bridged = LIMITS.bridged_samples
+    t = shortened(t, LIMITS.longest_delay + 2 * (bridged + 1) * float(np.median(np.diff(t))))
     step = usual_step(t)
     grid = np.arange(t[0], t[-1] + 0.5 * step, step)
     missing = np.interp(grid, t, (np.isnan(shown) | np.isnan(gyro)).astype(float)) > 0.5
-    missing |= np.diff(t, append=np.inf)[np.searchsorted(t, grid, side="right") - 1] > _BRIDGED * step
-    missing = np.convolve(missing, np.ones(_BRIDGED + 1), "same") > _BRIDGED + 0.5
+    missing |= np.diff(t, append=np.inf)[np.searchsorted(t, grid, side="right") - 1] > bridged * step
+    missing = np.convolve(missing, np.ones(bridged + 1), "same") > bridged + 0.5
     shown, gyro = (np.interp(grid, t[k], x[k]) for x, k in ((x, np.isfinite(x)) for x in (shown, gyro)))
     size = round(min(max((t[-1] - t[0]) / _SEGMENTS, _SHORTEST), _LONGEST) / step)
     if not 2 <= size <= len(grid):
@@ -153,9 +130,9 @@ def _spectra(a: Array, b: Array, missing: NDArray[np.bool_], size: int) -> tuple
 
 def _most_likely(coherence: Array, phase: Array, count: int, spacing: float) -> Delay | None:
     """The delay by the phases at frequencies ``spacing`` [Hz] apart, of ``count`` segments."""
-    if count < _FEWEST:
+    if count < LIMITS.delay_segments:
         return None
-    by_chance = 1.0 - (_CHANCE / len(coherence)) ** (1.0 / (count - 1))
+    by_chance = 1.0 - (LIMITS.delay_chance / len(coherence)) ** (1.0 / (count - 1))
     k = np.flatnonzero(coherence > by_chance)
     k = k[k >= _FIRST]
     if not len(k):
@@ -164,12 +141,13 @@ def _most_likely(coherence: Array, phase: Array, count: int, spacing: float) -> 
     squared = np.minimum((count * coherence[k] - 1.0) / (count - 1.0), _WHOLE)
     weight = squared / (1.0 - squared)
     omega, phase = 2.0 * math.pi * spacing * k, phase[k]
-    tries = np.arange(-_REACH, _REACH + _STEP, _STEP)
+    tries = np.arange(-LIMITS.longest_delay, LIMITS.longest_delay + _STEP, _STEP)
     tau = float(tries[np.argmax([weight @ np.cos(phase - omega * each) for each in tries])])
     for _ in range(_ROUNDS):
         apart = phase - omega * tau
         tau += float((weight * omega) @ np.sin(apart) / ((weight * omega**2) @ np.cos(apart)))
-    if abs(tau) > _REACH or weight @ np.cos(phase - omega * tau) < _FITS * weight.sum():
+    share = weight @ np.cos(phase - omega * tau) / weight.sum()
+    if abs(tau) > LIMITS.longest_delay or share < LIMITS.delay_share:
         return None
     u = math.sqrt(_OVERLAP / float(2.0 * count * weight @ omega**2))
     return Delay(tau, u, float(np.sqrt(coherence[k].max())), float(k[0] * spacing), float(k[-1] * spacing))
@@ -206,12 +184,11 @@ def _interpolated(t: Array, values: Array, at: Array) -> Array:
     x = [(t[k] - before) / gap for k in (a, j, j + 1, d)]
     cubic = np.zeros(len(at))
     inside = (a < j) & (d > j + 1)
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # at the ends two samples coincide, and the line is taken
+    # at the ends two samples coincide, and the line is taken
+    with np.errstate(divide="ignore", invalid="ignore"):
         for m, k in enumerate((a, j, j + 1, d)):
             others = [y for i, y in enumerate(x) if i != m]
             cubic += values[k] * math.prod((s - y) / (x[m] - y) for y in others)
     curve = np.where(inside & np.isfinite(cubic), cubic, line)
-    usable = (s > -_ROUNDING) & (s < 1.0 + _ROUNDING) & (gap < _LONG * np.median(np.diff(t)))
+    usable = (s > -_ROUNDING) & (s < 1.0 + _ROUNDING) & (gap < LIMITS.gyro_gap * np.median(np.diff(t)))
     return np.where(usable, curve, np.nan)

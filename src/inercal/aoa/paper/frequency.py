@@ -13,18 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import all_weights
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import shortened
 from inercal.arrays import Array
 
-WINDOW = 10.0
-"""Length [s] of the window; at the start of a recording it is as long as what there is."""
-
 _HOP = 0.5
-_PERIODS = 3.0
-"""Periods that the window holds at least: fewer do not stand apart from a drift."""
-
 _FINE = 5e-3
 """Interval [s] that samples are averaged over first."""
 
@@ -32,15 +26,6 @@ _HIGHEST = 0.4
 """Highest frequency, over that of the averaged samples."""
 
 _PADDING = 4
-_STANDS_OUT = 20.0
-"""Power of a peak over that of noise. Noise alone exceeds it in one of a million windows."""
-
-_LEAKS = 1e-2
-"""Power of a peak over that of a slower motion: a Hann window leaks a thousandth."""
-
-_AGREES = 2.0
-"""Ratio within which the amplitudes that accelerometers and gyro show must agree."""
-
 _FIRST = 1000
 """Intervals from which the usual one is found, so that what comes later changes nothing."""
 
@@ -48,30 +33,23 @@ _FIRST = 1000
 def oscillation_frequency(t: Array, acc: Array, gyro: Array, layout: Layout) -> Array:
     """(n,) Hz: frequency of the oscillation at each row, from rows up to it alone; NaN where there is none.
 
-    Parameters
-    ----------
-    t : (n,) s
-        Increasing.
-    acc : (n, N) m/s^2
-    gyro : (n,) rad/s
-        A peak must show in it too, by the same amplitude within a factor of 2, where it is high enough to be seen;
-        without a gyro the accelerometers are believed.
-    layout : Layout
-        Without axes that show angular acceleration there is no frequency.
+    ``t`` (n,) [s] increases; ``acc`` (n, N) [m/s^2]; ``gyro`` (n,) [rad/s]. A peak must show in the gyro too, by the
+    same amplitude within a factor of 2, where it is high enough to be seen; without a gyro the accelerometers are
+    believed. A ``layout`` without axes that show angular acceleration gives no frequency.
     """
     nowhere = np.full(len(t), np.nan)
     weights = all_weights(layout)
     if weights is None or len(t) < 2:
         return nowhere
     usual = round(float(np.median(np.diff(t[: _FIRST + 1]))), 9)
-    t = shortened(t, 2.0 * WINDOW)  # no window reaches over such a gap
+    t = shortened(t, 2.0 * LIMITS.oscillation_window)  # no window reaches over such a gap
     width = usual * max(1, round(_FINE / usual))
     used = np.flatnonzero(weights)
     shaking = _averaged(t, acc[:, used] @ weights[used], width)
     turning = _averaged(t, gyro, width)
     place = _places(t, width)
     hop = max(1, round(_HOP / width))
-    longest = max(1, round(WINDOW / width))
+    longest = max(1, round(LIMITS.oscillation_window / width))
     ends = range(hop, int(place[-1]) + 1, hop)
     of_window = np.array([math.nan, *(_peak(shaking, turning, max(0, e - longest), e, width) for e in ends)])
     # a row belongs to the interval that it begins or lies in: all before that one are complete
@@ -97,20 +75,22 @@ def _peak(shaking: Array, turning: Array, begin: int, end: int, width: float) ->
     size = end - begin
     padded = 1 << (_PADDING * size - 1).bit_length()
     power, gyro = (_power(each[begin:end], padded) for each in (shaking, turning))
-    low = math.ceil(_PERIODS / (size * width) * padded * width)
+    low = math.ceil(LIMITS.oscillation_periods / (size * width) * padded * width)
     high = int(_HIGHEST * padded)
     if high - low < 3 or not power.any():
         return math.nan
     k = low + int(np.argmax(power[low:high]))
-    enough = _STANDS_OUT / math.log(2.0)  # the median of an exponential distribution is ln 2 of its mean
+    # the median of an exponential distribution is ln 2 of its mean
+    enough = LIMITS.peak_power / math.log(2.0)
     drift = power[1:low].max(initial=0.0)
-    if k == low or power[k] < max(enough * np.median(power[low:high]), _LEAKS * drift):
+    if k == low or power[k] < max(enough * np.median(power[low:high]), LIMITS.leaked_power * drift):
         return math.nan
     a, b, c = np.log(power[k - 1 : k + 2])
     f = (k + 0.5 * (a - c) / (a - 2.0 * b + c)) / (padded * width)
     expected = power[k] / (2.0 * math.pi * f) ** 2
-    seen = expected > _AGREES**2 * enough * np.median(gyro[low:high])
-    if gyro.any() and seen and not 1.0 / _AGREES**2 < gyro[k] / expected < _AGREES**2:
+    agreeing = LIMITS.amplitude_ratio**2
+    seen = expected > agreeing * enough * np.median(gyro[low:high])
+    if gyro.any() and seen and not 1.0 / agreeing < gyro[k] / expected < agreeing:
         return math.nan
     return float(f)
 

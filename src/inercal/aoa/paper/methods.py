@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles, continuous
-from inercal.aoa.arms import all_weights, level_of, tangential_arms
+from inercal.aoa.layout import all_weights, tangential_arms
 from inercal.aoa.paper import lever, static
 from inercal.aoa.paper.delay import aligned, relative_delay
-from inercal.aoa.paper.lowpass import zero_phase
+from inercal.aoa.paper.lever import zero_phase
 from inercal.aoa.paper.residuals import error_terms
 from inercal.aoa.paper.static import spread
 from inercal.aoa.reading.clock import later
@@ -55,9 +55,7 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
     delay common to all sensors is made up for at the end by theta' tau. A roll is that which the study states.
 
     A row in which accelerometers are missing uses the others if the methods can; otherwise it has no angle. The
-    uncertainty is of first order, by noise, biases and the prior of positions and gyro scale
-    (`inercal.aoa.paper.residuals.error_terms`), and terms that the methods leave in count as errors of their own size.
-    Flexure of the sting is not in it.
+    uncertainty is of first order (`inercal.aoa.paper.residuals.error_terms`), without flexure of the sting.
 
     Raises
     ------
@@ -66,7 +64,8 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
     RecordError
         There is no gyro where the methods need one, or time does not go on.
     """
-    level = level_of(settings)
+    settings.attitude.check_pitch_shows()
+    level = settings.attitude.level
     _needs(recording, settings, methods, level)
     taken = later(recording.t)
     gyro_delay = settings.timing.gyro_delay
@@ -95,12 +94,8 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
             elif methods.tangential == "none" and (every := all_weights(layout)) is not None:
                 acceleration[rows] = read @ every / level
             w, al = np.nan_to_num(rate[rows]), np.nan_to_num(acceleration[rows])
-            errors = [
-                (weight, dual @ matrix @ dual.T)
-                for weight, matrix in error_terms(
-                    settings, methods.tangential, layout, level, w, al, compensated[rows], step
-                )
-            ]
+            terms = error_terms(settings, methods.tangential, layout, level, w, al, compensated[rows], step)
+            errors = [(weight, dual @ matrix @ dual.T) for weight, matrix in terms]
             still = static.angle(
                 methods.static, read @ dual.T, layout, settings.site.gravity, level, errors[0][1]
             )
@@ -164,15 +159,13 @@ def _at_stamps(
     Without a gyro the rate that makes up for it is the slope of the angle.
     """
     timing, noise = settings.timing, settings.noise
-    rate_u = np.where(
-        np.isfinite(rate), math.hypot(noise.gyro, noise.gyro_bias) / abs(level_of(settings)), np.nan
-    )
+    of_gyro = math.hypot(noise.gyro, noise.gyro_bias) / abs(settings.attitude.level)
+    rate_u = np.where(np.isfinite(rate), of_gyro, np.nan)
     tau, tau_u = timing.common_delay, timing.common_delay_u
     if tau or tau_u:
         slope = np.gradient(continuous(theta), recording.t[taken]) if len(theta) > 1 else np.zeros(len(theta))
         moving = np.where(np.isfinite(rate), rate, slope)
-        theta = theta + tau * moving + 0.5 * tau**2 * acceleration
-        theta = principal(theta)
+        theta = principal(theta + tau * moving + 0.5 * tau**2 * acceleration)
         u = np.sqrt(u**2 + (moving * tau_u) ** 2 + (tau * np.nan_to_num(rate_u)) ** 2)
         rate_u = np.hypot(rate_u, acceleration * tau_u)
         rate = rate + tau * acceleration

@@ -5,7 +5,7 @@ are the errors of an accelerometer and of the gyro, L = r_3 - r_1 the arm of the
 2021, worked out; accelerations in m/s^2, angles in rad.
 
 The covariance (`error_terms`) is of noise and biases of accelerometers and gyro, of the prior of positions and gyro
-scale, and of lever-arm terms that were left in, by the reading A - q w^2 + p al of `inercal.aoa.arms`: an error of r
+scale, and of lever-arm terms that were left in, by the reading A - q w^2 + p al of `inercal.aoa.layout`: an error of r
 enters as -(w^2 cos lambda + c al sin lambda), one of z as c^2 w^2 sin lambda - c al cos lambda, and an error e of the
 rate through compensation as 2 q w e.
 """
@@ -16,8 +16,7 @@ import math
 
 import numpy as np
 
-from inercal.aoa.arms import all_weights, centrifugal_arms, tangential_arms
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.paper.static import Errors
 from inercal.aoa.settings import AoaSettings, Tangential
 from inercal.arrays import Array
@@ -122,25 +121,12 @@ def error_terms(
     compensated: Array,
     step: float,
 ) -> Errors:
-    """Error covariances of the readings; first the one that is the same in all rows.
+    """Error covariances of the readings of a ``layout`` of N accelerometers; first that which all rows share.
 
-    Parameters
-    ----------
-    settings : AoaSettings
-        Its noise and prior.
-    tangential : "none", "differentiated" or "dual"
-        How p al was taken off.
-    layout : Layout
-        Of the N accelerometers that are used.
-    level : float
-        Cosine of the roll.
-    rate, acceleration : (n,) rad/s, rad/s^2
-        0 where not known.
-    compensated : (n,) 0 or 1
-        1 where q w^2 of the gyro was added to the readings; elsewhere the term counts as an error of its own size, as
-        does p al where it was left in.
-    step : float
-        Interval [s] of the gyro's samples, for their differences.
+    ``tangential`` is the way in which p al was taken off, ``level`` the cosine of the roll; ``rate`` (n,) [rad/s] and
+    ``acceleration`` (n,) [rad/s^2] are 0 where not known. ``compensated`` (n,) is 1 where q w^2 of the gyro was added
+    to the readings; elsewhere, 0, the term counts as an error of its own size, as does p al where it was left in.
+    ``step`` [s] is the interval of the gyro's samples, for their differences.
     """
     prior, noise, n = settings.prior, settings.noise, len(layout.names)
     q, p = centrifugal_arms(layout, level), tangential_arms(layout, level)
@@ -149,14 +135,9 @@ def error_terms(
     of_z = prior.height**2 * np.eye(n)
     r_w, r_al = np.diag(-cosine), np.diag(-level * sine)
     z_w, z_al = np.diag(level**2 * sine), np.diag(-level * cosine)
-    ww, wa, aa = (
-        first @ of_r @ second + third @ of_z @ fourth
-        for first, second, third, fourth in (
-            (r_w, r_w, z_w, z_w),
-            (r_w, r_al, z_w, z_al),
-            (r_al, r_al, z_al, z_al),
-        )
-    )
+    ww = r_w @ of_r @ r_w + z_w @ of_z @ z_w
+    wa = r_w @ of_r @ r_al + z_w @ of_z @ z_al
+    aa = r_al @ of_r @ r_al + z_al @ of_z @ z_al
     w2, gyro = rate**2, noise.gyro**2 / level**2
     both = gyro + noise.gyro_bias**2 / level**2
     qq = np.outer(q, q)

@@ -17,8 +17,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.arms import axes
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import Layout, axes
 from inercal.aoa.settings import Static
 from inercal.arrays import Array
 from inercal.errors import StudyError
@@ -92,10 +91,8 @@ def complementary(acc: Array, layout: Layout, gravity: float, level: float = 1.0
 
     Error sqrt(2) dA sin(theta - lambda_2 + 45 deg) / g where both err by dA. Parameters and what is raised as of `gls`.
     """
-    pairs = _pairs(layout, level)
-    if not len(pairs):
-        raise StudyError("sensors", "found no two axes at a right angle, which complementary needs")
-    return _by_two(acc, pairs[:1], np.zeros(len(acc), dtype=np.intp), gravity)
+    first = _pairs(layout, level, "complementary")[:1]
+    return _by_two(acc, first, np.zeros(len(acc), dtype=np.intp), gravity)
 
 
 def improved(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
@@ -105,9 +102,7 @@ def improved(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> 
     theta = 0, the last two above. Error <= dA/g where both err by dA. With one pair it is complementary. Parameters
     and what is raised as of `gls`.
     """
-    pairs = _pairs(layout, level)
-    if not len(pairs):
-        raise StudyError("sensors", "found no two axes at a right angle, which improved needs")
+    pairs = _pairs(layout, level, "improved")
     coarse = acc @ np.linalg.pinv(_axes(layout, level)).T
     alike = pairs.sum(axis=2)
     suffering = np.abs(coarse[:, 1:] * alike[:, 0] - coarse[:, :1] * alike[:, 1])
@@ -146,22 +141,9 @@ def gls(
     Gauss and Newton's rounds from plain least squares on. Weights are the pseudo-inverse of the covariance: directions
     without errors, as where the readings of two axes were made equal, tell nothing of the angle.
 
-    Parameters
-    ----------
-    acc : (n, N) m/s^2
-        Readings freed of lever-arm terms, none missing.
-    layout : Layout
-    gravity : float
-        [m/s^2].
-    level : float
-        Cosine of the roll.
-    covariance : (N, N) (m/s^2)^2
-        Of the errors of the readings; equal and independent without one.
-
-    Raises
-    ------
-    StudyError
-        The layout lacks the axes that the way needs.
+    ``acc`` (n, N) [m/s^2] are readings freed of lever-arm terms, none missing; ``gravity`` [m/s^2]; ``level`` the
+    cosine of the roll; ``covariance`` (N, N) [(m/s^2)^2] of the errors of the readings, equal and independent without
+    one. Raises `StudyError` where the layout lacks the axes that the way needs.
     """
     h = _axes(layout, level)
     if covariance is None:
@@ -219,9 +201,11 @@ def _axes(layout: Layout, level: float) -> Array:
     return axes(layout, level)
 
 
-def _pairs(layout: Layout, level: float) -> Array:
+def _pairs(layout: Layout, level: float, way: Static) -> Array:
     """(K, 2, N): for each pair of square axes the matrix from readings over g to (sin theta, cos theta)."""
     h, square = axes(layout, level), layout.square()
+    if not square:
+        raise StudyError("sensors", f"found no two axes at a right angle, which {way} needs")
     made = np.zeros((len(square), 2, len(h)))
     for matrix, (i, j) in zip(made, square, strict=True):
         matrix[:, [i, j]] = np.linalg.inv(h[[i, j]])

@@ -7,32 +7,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.errors import RecordError
-
-PATIENCE = 1000
-"""Successive rows without a later stamp that are left out; more are no accident."""
-
-HELD = 20
-"""Rows from which the filter starts."""
-
-
-_FINEST = 1.0 / 16.0
-"""Step of an even grid over the mean interval, at least."""
 
 
 def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.int64]:
     """Rows of ``t`` (n,) [s] that are later than all before them and than ``last``.
 
-    Raises
-    ------
-    RecordError
-        `PATIENCE` successive rows are not later: the clock was set back.
+    Raises `RecordError` where so many successive rows are not later that the clock was set back.
     """
     before = np.maximum.accumulate(np.append(last, np.where(np.isnan(t), -np.inf, t)))
     taken = np.flatnonzero(t > before[:-1])
     left = np.diff(np.concatenate([[-1], taken, [len(t)]])) - 1
-    if left.size and left.max() >= PATIENCE:
+    if left.size and left.max() >= LIMITS.backward_rows:
         row = int(np.concatenate([[-1], taken])[int(np.argmax(left))]) + 1
         raise RecordError(
             where,
@@ -52,4 +40,4 @@ def shortened(t: Array, longest: float) -> Array:
 def usual_step(t: Array) -> float:
     """Median interval [s] of ``t`` (n,); where rows come in bursts it is at least a sixteenth of the mean one, so that
     an even grid has no more than 16 n points."""
-    return max(float(np.median(np.diff(t))), _FINEST * float(t[-1] - t[0]) / len(t))
+    return max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / len(t) / 16.0)

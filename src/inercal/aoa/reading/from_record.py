@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import continuous
-from inercal.aoa.reading.calibrated import at_range, check_axes, check_unit, indication
-from inercal.aoa.reading.clock import HELD, later
+from inercal.aoa.layout import Layout
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.arrays import Array
@@ -17,36 +20,22 @@ from inercal.records.checks.samples import plateaus
 from inercal.records.checks.values import is_dead, saturated
 from inercal.records.clocks import usable_interval
 from inercal.records.column import Column
-from inercal.records.places import counted, places
+from inercal.records.places import counted, counted_names, places
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 
 Flags = NDArray[np.bool_]
 
-_STUCK = 50
-"""Successive equal samples, which noise of the size of the steps makes with a probability below 1e-7."""
-
-_APART = 2.5
-"""Intervals of another clock over which its samples are interpolated."""
+_PER = {"voltage": "V", "count": "count"}
 
 
 def recording_of(record: Record, settings: AoaSettings) -> Recording:
     """The recording in a record, its sensors calibrated as the study states, with findings on them.
 
-    Parameters
-    ----------
-    record : Record
-        ``t``, the accelerometers of the study's layout on one clock, and where present ``gyro``, ``gyro_roll`` and
-        ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; columns on other clocks are
-        interpolated to that of the accelerometers.
-    settings : AoaSettings
-        Calibrations (indications, counts or volts, times scale less bias) and ranges by sensor.
-
-    Returns
-    -------
-    Recording
-        One row for each row of the accelerometers. Samples that are missing, saturated (at or beyond the stated
-        range, or flat at an extreme) or stuck are NaN, and so are absent sensors; findings name them.
+    The record has ``t``, the accelerometers of the study's layout on one clock, and where present ``gyro``,
+    ``gyro_roll`` and ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; columns on other clocks
+    are interpolated. There is one row for each of the accelerometers; samples that are missing, saturated (at or beyond
+    the stated range, or flat at an extreme) or stuck are NaN, and so are absent sensors; findings name them.
 
     Raises
     ------
@@ -66,10 +55,11 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
                 f"{name} has another clock than {there[0]}, expected one row for all accelerometers at each time",
             )
     taken = later(t, where=where)
-    if len(taken) < HELD:
-        raise RecordError(
-            where, f"found {counted(len(taken), 'row')} that go on in time, expected {HELD} or more"
+    if len(taken) < LIMITS.starting_rows:
+        text = (
+            f"found {counted(len(taken), 'row')} that go on in time, expected {LIMITS.starting_rows} or more"
         )
+        raise RecordError(where, text)
     usable_interval(float(np.median(np.diff(t[taken]))), where)
     rows = _Rows(record, settings, t, where)
     gyros = [name for name in GYROS if name in record and _speaks(record[name], settings)]
@@ -155,7 +145,8 @@ class _Rows:
         self.findings.append(Finding("other_clock", text))
         there = np.searchsorted(theirs, self.t).clip(1, len(theirs) - 1)
         out = np.interp(self.t, theirs, values, left=np.nan, right=np.nan)
-        out[(theirs[there] - theirs[there - 1] > _APART * interval) | np.isnan(self.t)] = np.nan
+        apart = theirs[there] - theirs[there - 1] > LIMITS.other_clock_gap * interval
+        out[apart | np.isnan(self.t)] = np.nan
         if 2 * len(taken) < len(self.t):
             mine = later(self.t, where=self.where)
             nearest = np.searchsorted(self.t[mine], theirs).clip(1, len(mine) - 1)
@@ -202,7 +193,7 @@ def _stuck(read: Array, noise: float, others: list[Array]) -> Flags:
     if not moving.any() or noise < step[moving].min():
         return stuck
     starts, ends = plateaus(step)
-    long = ends - starts + 1 >= _STUCK
+    long = ends - starts + 1 >= LIMITS.stuck_samples
     for start, end in zip(starts[long], ends[long], strict=True):
         if any(np.any(np.diff(other[start : end + 1]) != 0.0) for other in others):
             stuck[start : end + 1] = True
@@ -222,17 +213,16 @@ def _findings_of(record: Record, lost: dict[str, tuple[Flags, Flags]]) -> list[F
 
 def _left_out(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding]:
     """Findings on the samples of a sensor that are left out."""
-    findings = []
-    if rows := np.flatnonzero(out).tolist():
-        where = "flat at an extreme" if how.range is None else "at or beyond the range, or flat at an extreme"
-        text = f"{name}: {counted(len(rows), 'sample')} {where}, left out"
-        findings.append(Finding("saturation", text, places("row", np.array(rows) + 1), harm=()))
-    if rows := np.flatnonzero(stuck).tolist():
-        text = (
-            f"{name}: {counted(len(rows), 'sample')} of one number while the others go on, left out as stuck"
-        )
-        findings.append(Finding("dead_channel", text, places("row", np.array(rows) + 1), harm=()))
-    return findings
+    at_end = "flat at an extreme" if how.range is None else "at or beyond the range, or flat at an extreme"
+    groups = (
+        ("saturation", out, f"{at_end}, left out"),
+        ("dead_channel", stuck, "of one number while the others go on, left out as stuck"),
+    )
+    return [
+        Finding(code, f"{name}: {counted(rows.size, 'sample')} {words}", places("row", rows + 1), harm=())
+        for code, flags, words in groups
+        if (rows := np.flatnonzero(flags)).size
+    ]
 
 
 def _of_time(record: Record, t: Array, taken: NDArray[np.int64]) -> list[Finding]:
@@ -263,10 +253,10 @@ def of_sensors(there: list[str], gyros: list[str], record: Record, settings: Aoa
     findings = [Finding("bad_verdict", f"{name}: {caution}") for name, caution in cautions if caution]
     for name in settings.layout.names:
         if name not in there:
-            why = "holds no number" if name in record else "is not in the record"
             if name in record and np.isfinite(record[name].values).any():
-                why = "never changes"
-            code = "dead_channel" if why == "never changes" else "nan"
+                code, why = "dead_channel", "never changes"
+            else:
+                code, why = "nan", "holds no number" if name in record else "is not in the record"
             findings.append(Finding(code, f"{name} {why}: angles are found without it", harm=()))
     if GYROS[0] not in gyros:
         why = "is not in the record" if GYROS[0] not in record else "never changes or holds no number"
@@ -280,3 +270,51 @@ def of_sensors(there: list[str], gyros: list[str], record: Record, settings: Aoa
         text = f"{', '.join(unknown)}: not under [sensors] of the study, not used"
         findings.append(Finding("not_stated", text, harm=()))
     return findings
+
+
+def check_unit(column: Column, how: Calibration, where: object) -> None:
+    """Raise `RecordError` for a column in volts or counts without a scale for these, or such a scale for another."""
+    holds = _PER.get(column.unit.dimension, "1")
+    if holds == how.per:
+        return
+    name, symbol = column.name, column.unit.symbol
+    if holds == "1":
+        raise RecordError(where, f"{name} is in {symbol}, expected {how.per} as the study's scale is for")
+    example = f"{'1 deg/s' if name in GYROS else '1e-3 g'}/{holds}"
+    raise RecordError(
+        where,
+        f'{name} is in {symbol}, expected a scale under [sensors.{name}] of the study, such as "{example}"',
+    )
+
+
+def indication(column: Column, values: Array) -> Array:
+    """``values`` (m,) of a column in SI, volts or counts."""
+    return values * column.unit.factor + column.unit.zero
+
+
+def at_range(indicated: Array, measured: Array, how: Calibration) -> Flags:
+    """Mask (m,) of samples at or beyond the range, ``measured`` or, in a column of physical units, ``indicated``.
+
+    An output in physical units ends at its range before its bias is taken off; either way it is at an end. With a zero
+    point of some volts or counts the range is that of the measured value alone.
+    """
+    if how.range is None:
+        return np.zeros(np.shape(indicated), dtype=np.bool_)
+    limit = (1.0 - LIMITS.range_rounding) * how.range
+    at: Flags = np.abs(measured) >= limit
+    return at | (np.abs(indicated * how.scale) >= limit) if how.per == "1" else at
+
+
+def check_axes(there: Collection[str], columns: Iterable[str], layout: Layout, where: object) -> None:
+    """Raise `RecordError` where accelerometers ``there`` among ``columns`` are none, or have parallel axes."""
+    if not there:
+        names = counted_names([*columns], 12) or "no columns"
+        raise RecordError(
+            where, f"found no accelerometer among {names}, expected t, {', '.join(layout.names)} and gyro"
+        )
+    if not layout.of(*(layout.names.index(name) for name in there)).spans:
+        lacking = ", ".join(name for name in layout.names if name not in there) or "one of another axis"
+        raise RecordError(
+            where,
+            f"found {', '.join(there)} alone with varying numbers, whose axes are parallel, expected {lacking} too",
+        )

@@ -1,41 +1,22 @@
 """Pauses of a model, in which its angle stands still but for noise and buffet.
 
-In a window of half a second the angle is a line and its scatter. The model rests where the line changes,
-over the window, by less than three times that scatter and the angle's own uncertainty together: oscillations slower
-than some 2 Hz are motion, and a creep within the uncertainty counts as rest.
+In a window of half a second the angle is a line and its scatter. The model rests where the line changes, over the
+window, by less than three times that scatter and the angle's own uncertainty together: oscillations slower than some
+2 Hz are motion, and a creep within the uncertainty counts as rest.
 
-Faster ones are the buffet of a model at rest while they are small beside the moves of the record: as long as it is
-quiet, the scatter may be, root mean square, a twentieth of the range of the angle, but no less than 0.1 deg and no more
-than 0.5 deg, or three times the uncertainty where that is more. So an oscillation that is forced, as of a sine, a chirp
-or a buffet of some tenths of a degree without moves, is no rest, whatever its frequency. Nothing is to be set.
+Faster oscillations are the buffet of a model at rest while their root mean square is at most a twentieth of the range
+of the angle (no less than 0.1 deg, no more than 0.5 deg), or three times the uncertainty. So one that is forced, as a
+sine, a chirp or a buffet of some tenths of a degree without moves, is no rest, whatever its frequency.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.records.dwells import Dwell, breaks, static_intervals
-
-WINDOW = 0.5
-"""Length of the window [s]: some periods of a buffet, and short beside a pause."""
-
-SHORTEST = 1.0
-"""Shortest pause [s]."""
-
-_FEWEST = 8
-"""Rows of the shortest window."""
-
-_TIMES = 3.0
-
-_OF_RANGE = 1.0 / 20.0
-"""Largest scatter of a model at rest, over the range of the angle in the record; whatever that range,"""
-
-_SWING = (math.radians(0.1), math.radians(0.5))
-"""at least and at most [rad]."""
 
 
 def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
@@ -44,12 +25,12 @@ def pauses(t: Array, theta: Array, u: Array) -> tuple[Dwell, ...]:
     Half a window beside a move is left out, and after a move, while the sting rings down, the part of the pause that
     scatters more than twice its median.
     """
-    if len(t) < 2 * _FEWEST:
+    if len(t) < 2 * LIMITS.pause_window_rows:
         return ()
     still, scatter = at_rest(t, theta, u)
     half = _rows(t) // 2
-    shortest = max(1, round(SHORTEST / _step(t)))
-    cuts = breaks(t, WINDOW)
+    shortest = max(1, round(LIMITS.shortest_pause / _step(t)))
+    cuts = breaks(t, LIMITS.pause_window)
     bounds = {0, len(t), *cuts.tolist()}
     dwells = []
     for run in static_intervals(still, cuts, shortest):
@@ -87,8 +68,9 @@ def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]
     centred = np.clip(np.arange(n) - w // 2, 0, n - w)
     change, scatter = np.abs(slope + overall)[centred] * w, scatter[centred]
     reach = float(np.ptp(s0 / w + overall * middle))
-    allowed = np.maximum(_TIMES * u, np.clip(_OF_RANGE * reach, *_SWING))
-    still = (change < _TIMES * np.hypot(scatter, u)) & (scatter < 2.0 * allowed)
+    buffet = np.clip(LIMITS.resting_share * reach, LIMITS.least_resting_scatter, LIMITS.most_resting_scatter)
+    allowed = np.maximum(LIMITS.resting_sigmas * u, buffet)
+    still = (change < LIMITS.resting_sigmas * np.hypot(scatter, u)) & (scatter < 2.0 * allowed)
     # a buffet comes and goes: its size is that over all of a quiet stretch
     starts = np.flatnonzero(np.diff(still, prepend=not still[0]))
     power, most = (np.add.reduceat(np.square(each), starts) for each in (scatter, allowed))
@@ -102,4 +84,4 @@ def _step(t: Array) -> float:
 
 def _rows(t: Array) -> int:
     """Rows of a window."""
-    return max(_FEWEST, round(WINDOW / _step(t)))
+    return max(LIMITS.pause_window_rows, round(LIMITS.pause_window / _step(t)))

@@ -15,27 +15,14 @@ from inercal.units import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Samples of the sensors of a model, one row for each row of the record.
+    """Samples of the sensors of a model, one row for each of n rows of the record; NaN where missing or saturated.
 
-    Attributes
-    ----------
-    t : (n,) s
-        As recorded. Time may stand still or run backward; estimators leave these rows out.
-    acc : (n, N) m/s^2
-        Calibrated accelerometers, in the order of the layout. Samples that are missing or saturated are NaN.
-    gyro : (n,) rad/s
-        Nose-up; all NaN where there is none.
-    turns : (n, 2) rad/s
-        Roll gyro (about x) and yaw gyro (about z), right-handed; all NaN where there are none.
-    zero_angle : (n, 2) rad
-        Angle known from elsewhere, as at wind-off, and its standard uncertainty; NaN in other rows.
-    point, trigger, reference : (n,) or None
-        Numbers of test points and triggers, to be handed on; the reference angle ``theta_ref`` [rad], without jumps
-        of a turn.
-    masked : (n, N + 1) bool or None
-        Samples of accelerometers and gyro that were saturated.
-    temperature : Quantity or None
-        Mean and standard deviation of the recorded temperature.
+    ``t`` [s] as recorded: rows in which time stands still or runs backward are left out by estimators. ``acc`` (n, N)
+    [m/s^2] calibrated, in the order of the layout; ``gyro`` [rad/s] nose-up; ``turns`` (n, 2) [rad/s] of the gyros for
+    roll (about x) and yaw (about z), right-handed. ``zero_angle`` (n, 2) [rad]: angle known from elsewhere, as at
+    wind-off, and its standard uncertainty. ``point`` and ``trigger`` are numbers to be handed on; ``reference`` is the
+    angle ``theta_ref`` [rad], without jumps of a turn; ``masked`` (n, N + 1) marks saturated samples of accelerometers
+    and gyro; ``temperature`` is the mean of that recorded, with its standard deviation.
     """
 
     t: Array

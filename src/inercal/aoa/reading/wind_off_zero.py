@@ -14,6 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.layout import axes
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Zero
@@ -25,16 +27,11 @@ Indices = NDArray[np.int64]
 _PARTS = 8
 """Parts of the stretch whose angles are compared."""
 
-_FEWEST = 10 * _PARTS
-
 
 def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
     """The recording with the angle of the study's zero; unchanged where the study has none.
 
-    Raises
-    ------
-    RecordError
-        The stretch is not in the record, has no accelerometers, or the model moves there.
+    Raises `RecordError` where the stretch is not in the record, has no accelerometers, or the model moves in it.
     """
     if settings.zero is None:
         return recording
@@ -62,13 +59,7 @@ def angle_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
 
 
 def tare(recording: Recording, settings: AoaSettings) -> Recording:
-    """The recording less the biases of its sensors at the study's zero; unchanged where the study has none.
-
-    Raises
-    ------
-    RecordError
-        As of `with_zero`.
-    """
+    """The recording less the biases of its sensors at the study's zero; refused and unchanged as by `with_zero`."""
     if settings.zero is None:
         return recording
     rows = _stretch(recording, settings, settings.zero)
@@ -82,9 +73,8 @@ def tare(recording: Recording, settings: AoaSettings) -> Recording:
 
 def at_rest(settings: AoaSettings, theta: float) -> Array:
     """(N,) m/s^2: readings of perfect accelerometers at rest, at the stated roll."""
-    level = _level(settings)
-    cosine, sine, *_ = settings.layout.geometry.T
-    return np.asarray(settings.site.gravity * (math.sin(theta) * cosine - level * math.cos(theta) * sine))
+    direction = [math.sin(theta), math.cos(theta)]
+    return np.asarray(settings.site.gravity * (axes(settings.layout, settings.attitude.level) @ direction))
 
 
 def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices:
@@ -97,11 +87,9 @@ def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices
         span = f"from {t[0]:g} s to {t[-1]:g} s" if len(t) else "without rows"
         raise RecordError(where, f"found a record {span}, expected the stretch at rest within it")
     rows = inside[np.isfinite(recording.acc[inside]).all(axis=1)]
-    if len(rows) < _FEWEST:
-        raise RecordError(
-            where,
-            f"found {len(rows)} rows with all accelerometers in the stretch at rest, expected {_FEWEST} or more",
-        )
+    if (count := len(rows)) < (least := LIMITS.zero_rows):
+        text = f"found {count} rows with all accelerometers in the stretch at rest, expected {least} or more"
+        raise RecordError(where, text)
     moved, allowed = _moved(recording, settings, rows, zero.u)
     if not moved <= allowed:
         raise RecordError(
@@ -118,37 +106,24 @@ def _moved(recording: Recording, settings: AoaSettings, rows: Indices, u: float)
     One compares the accelerometers from part to part of the stretch; the other takes the gyro's angle about its line,
     which also shows motion to and fro. Three times the stated uncertainty and the observed noise are allowed.
     """
-    parts = np.array_split(rows, _PARTS)
-    forward, up = np.array([_force(settings, recording.acc[each].mean(axis=0)) for each in parts]).T
-    angles = np.unwrap(np.arctan2(forward, up))
+    level, parts = settings.attitude.level, np.array_split(rows, _PARTS)
+    means = np.array([recording.acc[each].mean(axis=0) for each in parts])
+    # forward and upward specific force, the latter as of a level model
+    forward, up = np.linalg.lstsq(axes(settings.layout), means.T, rcond=None)[0]
+    angles = np.unwrap(np.arctan2(forward, up / (level if abs(level) > LIMITS.level_cosine else 1.0)))
     noise = max(float((recording.acc[each].std(axis=0) / math.sqrt(len(each))).max()) for each in parts)
-    g = settings.site.gravity * min(1.0, max(abs(_level(settings)), 0.1))
-    looks = [(float(np.ptp(angles)), 3.0 * u + 6.0 * noise / g)]
+    g = settings.site.gravity * min(1.0, max(abs(level), LIMITS.level_cosine))
+    looks = [(float(np.ptp(angles)), LIMITS.zero_sigmas * (u + 2.0 * noise / g))]
     gyro, t = recording.gyro[rows], recording.t[rows]
     seen = np.isfinite(gyro)
-    if seen.sum() >= _FEWEST:
+    if seen.sum() >= LIMITS.zero_rows:
         gyro, dt = gyro[seen], np.diff(t[seen], prepend=t[seen][0])
         swing = np.cumsum((gyro - gyro.mean()) * dt)
         # a random walk tied at its ends has the mean variance n/6 of its steps
         noise = float(np.diff(gyro).std()) / math.sqrt(2.0)
         walk = noise * math.sqrt(float(dt @ dt) / 6.0)
-        looks.append((float(swing.std()), 3.0 * math.hypot(u, walk)))
+        looks.append((float(swing.std()), LIMITS.zero_sigmas * math.hypot(u, walk)))
     return max(looks, key=lambda look: look[0] / look[1] if look[1] > 0.0 else math.inf)
-
-
-def _force(settings: AoaSettings, read: Array) -> Array:
-    """(2,) specific force forward, and upward as of a level model, that fits what accelerometers read best."""
-    cosine, sine, *_ = settings.layout.geometry.T
-    axes = np.stack([cosine, -sine], axis=-1)
-    forward, up = np.linalg.lstsq(axes, read, rcond=None)[0]
-    level = _level(settings)
-    return np.array([forward, up / (level if abs(level) > 0.1 else 1.0)])
-
-
-def _level(settings: AoaSettings) -> float:
-    """Cosine of the stated roll."""
-    roll = settings.attitude.roll
-    return 1.0 if roll is None else math.cos(roll.value)
 
 
 def _means(x: Array) -> Array:

@@ -98,8 +98,10 @@ def prior_of(earlier: Estimate, settings: AoaSettings) -> tuple[tuple[str, ...],
     """
     fit = earlier.result["verified"]
     names = [each["name"] for each in fit["parameters"]]
-    values = np.array([0.0 if n.startswith(("S_", "dlambda_")) else float(p["value"])
-                       for n, p in zip(names, fit["parameters"], strict=True)])  # fmt: skip
+    in_study = ("S_", "dlambda_")
+    values = np.array(
+        [0.0 if each["name"].startswith(in_study) else float(each["value"]) for each in fit["parameters"]]
+    )
     information = _inverse(np.array(fit["covariance"], dtype=float))
     usual = problem(
         replace(settings, estimator=Estimator(19), timing=replace(settings.timing, gyro_delay=None))

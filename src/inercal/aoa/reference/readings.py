@@ -16,6 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.errors import RecordError
@@ -33,17 +34,9 @@ samples as lie between two: the smoothing is a cubic B-spline, and these are the
 _EDGE = 10
 """Rows at breaks and ends at which the spline's derivatives are not to be trusted."""
 
-_FEWEST = 50
-
-_ABOVE = 10.0
-"""Power of a derivative over that of its noise from which it counts as motion: noise would pass for knowledge."""
-
-_GAP = 3.0
-"""Steps of time that make a break between rows."""
-
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class ReferenceMotion:
     """The reference motion of a recording.
 
     ``rows`` (n,) of the recording that are used, ``t`` (n,) [s] their times, ``whole`` (n,) False at breaks; ``span``
@@ -82,14 +75,8 @@ class Reference:
         return np.asarray(windows[:: self.span] @ self.kernel)
 
 
-def reference(recording: Recording) -> Reference:
-    """The reference motion of a recording.
-
-    Raises
-    ------
-    RecordError
-        There is none, or too little of it.
-    """
+def reference(recording: Recording) -> ReferenceMotion:
+    """The reference motion of a recording; raises `RecordError` where there is none, or too little of it."""
     from scipy.interpolate import make_interp_spline
 
     if recording.reference is None:
@@ -99,25 +86,28 @@ def reference(recording: Recording) -> Reference:
     t = recording.t[rows]
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     span = max(1, round(SPAN / step))
-    if len(rows) < _FEWEST * span:
-        raise RecordError(
-            "theta_ref",
-            f"found {len(rows)} rows with a reference angle, expected {_FEWEST * span} or more to fit sensors to",
+    if len(rows) < LIMITS.reference_spans * span:
+        text = (
+            f"found {len(rows)} rows with a reference angle, expected {LIMITS.reference_spans * span} or more"
         )
+        raise RecordError("theta_ref", f"{text} to fit sensors to")
     theta = np.unwrap(recording.reference[rows])
     whole = np.ones(len(t), dtype=bool)
-    for cut in [0, *breaks(t, _GAP * step).tolist(), len(t)]:
+    for cut in [0, *breaks(t, LIMITS.reference_gap * step).tolist(), len(t)]:
         whole[max(cut - _EDGE, 0) : cut + _EDGE] = False
     # differences of the eighth order leave nothing of a motion; their noise is the root of 16! / 8!^2 times larger
     noise = float(np.median(np.abs(np.diff(theta, 8)))) / 0.6745 / np.sqrt(12870.0)
     spline = make_interp_spline(t, theta, k=5)
-    measured = Reference(rows, t, whole, span, noise, (spline, *(spline.derivative(k) for k in (1, 2, 3))))
+    measured = ReferenceMotion(
+        rows, t, whole, span, noise, (spline, *(spline.derivative(k) for k in (1, 2, 3)))
+    )
     shown = [measured.derivatives[0]]
     for order in (1, 2, 3):
         derivative = measured.smoothed(measured.derivatives[order](t))
         power = float(np.nanmean(derivative**2)) if np.isfinite(derivative).any() else 0.0
         of_noise = (noise / step**order) ** 2 * _gain(order, measured.kernel)
-        shown.append(measured.derivatives[order] if power > _ABOVE * of_noise else np.zeros_like)
+        moves = power > LIMITS.derivative_power * of_noise
+        shown.append(measured.derivatives[order] if moves else np.zeros_like)
     return replace(measured, derivatives=tuple(shown))
 
 

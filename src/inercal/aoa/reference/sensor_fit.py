@@ -22,8 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.reference.readings import OVERLAP, Reference, reference
+from inercal.aoa.reference.readings import OVERLAP, ReferenceMotion, reference
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.errors import RecordError
@@ -31,14 +32,8 @@ from inercal.estimate.identifiability import Learned, learned
 from inercal.estimate.result import Parameter
 
 KINDS = ("S", "b", "dlambda", "dr", "zo")
-_WIDER = 10.0
-"""Factor by which the study's prior is widened."""
-
 _USUAL = 1e-3
 """Usual error of a scale, and of an axis [rad]."""
-
-_SPIKE = 6.0
-"""Standard deviations from which a row of a sensor is left out."""
 
 _NEAR = 6
 """Distance in rows from which on residuals are not correlated; the smoothing reaches over four."""
@@ -50,27 +45,16 @@ _SMALL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """Sensors as fitted to a turntable.
+    """Sensors as fitted to a turntable: ``values`` (p,) and their ``covariance`` (p, p).
 
-    Attributes
-    ----------
-    names, units : (p,)
-        ``S_1``.. scale, ``b_1``.. bias [m/s^2], ``dlambda_1``.. error of the axis angle [rad], ``dr_1``.., ``zo_1``..
-        errors of positions [m], ``tau`` delay of all sensors against the reference [s], ``b_g`` [rad/s], ``k_g``, and
-        ``tau_g`` delay of the gyro against the accelerometers [s].
-    values : (p,)
-    covariance : (p, p)
-    learned : Learned
-        Information of the record beyond the prior; its condition and weakest combinations.
-    unseen : tuple of str
-        Names of coefficients no better known than by the study's prior.
-    noise : (N + 1,) m/s^2, rad/s
-        Of one sample of accelerometers and gyro, from the residuals below some 5 Hz; NaN where there is no sensor.
-    reference_noise : float
-        rad, of one sample of the reference.
-    rows : int
-        Rows of the recording that were used.
-    converged : bool
+    ``names``: ``S_1``.. scale, ``b_1``.. bias [m/s^2], ``dlambda_1``.. error of the axis angle [rad], ``dr_1``..,
+    ``zo_1``.. errors of positions [m], ``tau`` delay of all sensors against the reference [s], ``b_g`` [rad/s],
+    ``k_g``, and ``tau_g`` delay of the gyro against the accelerometers [s].
+
+    ``learned`` is the information of the record beyond the prior, ``unseen`` the names of coefficients no better known
+    than by the study's prior. ``noise`` (N + 1,) [m/s^2, rad/s] of one sample of accelerometers and gyro, from the
+    residuals below some 5 Hz, NaN where there is no sensor; ``reference_noise`` [rad] of one sample of the reference;
+    ``rows`` of the recording that were used.
     """
 
     names: tuple[str, ...]
@@ -96,18 +80,13 @@ class Verified:
 
 
 def fit(recording: Recording, settings: AoaSettings) -> Verified:
-    """Fit the sensors to the recording's reference angle.
+    """Fit the sensors to the recording's reference angle; roll and yaw are those that the study states.
 
-    Roll and yaw are taken as the study states them: gyros for them are not used.
-
-    Raises
-    ------
-    RecordError
-        There is no reference angle, too little of it, or none that a sensor follows.
+    Raises `RecordError` where there is no reference angle, too little of it, or none that a sensor follows.
     """
     truth = reference(recording)
     names, units, usual, start = _terms(settings)
-    wide = np.where([name == "tau" for name in names], usual, _WIDER * usual)
+    wide = np.where([name == "tau" for name in names], usual, LIMITS.widened_prior * usual)
     x, weights = start.copy(), np.full(len(settings.layout.names) + 1, np.nan)
     converged = False
     for _ in range(_ITERATIONS):
@@ -125,9 +104,8 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
             inner = np.linalg.inv(np.linalg.cholesky(information * scale + np.eye(len(x))))
             outer = np.linalg.cholesky(_spread(scores) * scale + np.eye(len(x)))
         except np.linalg.LinAlgError as error:
-            raise RecordError(
-                "theta_ref", "found angles that no sensor follows, expected those of the model"
-            ) from error
+            text = "found angles that no sensor follows, expected those of the model"
+            raise RecordError("theta_ref", text) from error
         pull = np.einsum("kip,i,ki->p", jacobian, weights, residuals, optimize=True)
         bread = inner.T @ inner
         step = wide * (bread @ (wide * pull - (x - start) / wide))
@@ -139,10 +117,8 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
             break
     more = learned(covariance, wide, names)
     noise = np.sqrt(power / OVERLAP[0] * truth.span) * np.where(count > 0, 1.0, np.nan)
-    return Verified(
-        names, units, x, covariance, more, more.at_prior(1.0 / _WIDER), noise, truth.noise, len(truth.rows),
-        converged,
-    )  # fmt: skip
+    unseen = more.at_prior(1.0 / LIMITS.widened_prior)
+    return Verified(names, units, x, covariance, more, unseen, noise, truth.noise, len(truth.rows), converged)
 
 
 def _terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
@@ -169,15 +145,14 @@ def _terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Arr
 
 
 def _linearised(
-    recording: Recording, settings: AoaSettings, truth: Reference, x: Array
+    recording: Recording, settings: AoaSettings, truth: ReferenceMotion, x: Array
 ) -> tuple[Array, Array]:
     """Smoothed residuals (k, N + 1) and derivatives (k, N + 1, p) of the model; NaN without readings."""
     layout, g = settings.layout, settings.site.gravity
     n = len(layout.names)
     S, b, dlambda, dr, zo = x[: 5 * n].reshape(5, n)
     tau, b_g, k_g, tau_g = x[5 * n :]
-    roll = settings.attitude.roll
-    c = 1.0 if roll is None else math.cos(roll.value)
+    c = settings.attitude.level
     theta, w, w2, al, jerk = truth.motion(tau)
     sine, cosine = np.sin(theta), np.cos(theta)
     ones = truth.smoothed(np.ones(len(theta)))
@@ -230,5 +205,5 @@ def _sound(residuals: Array) -> NDArray[np.bool_]:
         if sound[:, i].any():
             middle = np.median(column[sound[:, i]])
             scatter = np.median(np.abs(column[sound[:, i]] - middle)) / 0.6745
-            sound[:, i] &= ~(np.abs(column - middle) > _SPIKE * scatter)
+            sound[:, i] &= ~(np.abs(column - middle) > LIMITS.spike_sigmas * scatter)
     return sound

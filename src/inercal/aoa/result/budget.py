@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.fusion.filter_result import SETTLED
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as stated_problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.systematic import leaning, leans, uncertain_roll
@@ -41,12 +41,9 @@ _STEP = 1e-3
 MOST = 20_000
 """Rows that are examined, from the first with an angle on; half of them where they are smoothed."""
 
-_NOTHING = 1e-5
-"""Share of a variance below which a source is left out."""
-
 
 @dataclass(frozen=True)
-class Source:
+class BudgetSource:
     """One source, ``u`` in ``unit``, and its places in a problem: ``constants`` of the model that are variances or, in
     ``levels``, standard deviations; ``states`` by their prior; the angle of the ``zero``."""
 
@@ -61,17 +58,13 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class VarianceParts:
     """Variances by source.
 
-    Attributes
-    ----------
-    budget : tuple of BudgetItem
-        With the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first 2 s.
-    common : (p, p)
-        Covariance of the coefficients by stated gravity and roll, which runs at the same site and mounting share.
-    by_gravity : (p,) or None
-        Change of the coefficients per change of gravity [m/s^2]; None where gravity is known well enough.
+    ``budget`` has the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first
+    2 s. ``common`` (p, p) is the covariance of the coefficients by stated gravity and roll, which runs at the same site
+    and mounting share; ``by_gravity`` (p,) their change per change of gravity [m/s^2], None where gravity is known well
+    enough.
     """
 
     budget: tuple[BudgetItem, ...]
@@ -81,7 +74,7 @@ class Parts:
 
 def parts(
     recording: Recording, problem: FilterProblem, settings: AoaSettings, smoothed: bool, answered: Mask
-) -> Parts:
+) -> VarianceParts:
     """Split the uncertainty of the fusion by source.
 
     ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``answered`` (n,) marks
@@ -90,7 +83,7 @@ def parts(
     taken = later(recording.t)
     taken = taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.rows[taken]
-    settled = answered[taken] & (t - t[:1] >= SETTLED)
+    settled = answered[taken] & (t - t[:1] >= LIMITS.settling_time)
     judged = settled if settled.any() else answered[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
@@ -99,15 +92,14 @@ def parts(
     changes = leans(settings, problem.spatial)
     moved = [(leaning(problem, each, settings), rows) for each in changes]
     with ThreadPoolExecutor() as pool:
-        runs = pool.map(
-            lambda run: _run(run[0], t, run[1], smoothed, judged), [(problem, rows), *changed, *moved]
-        )
+        cases = [(problem, rows), *changed, *moved]
+        runs = pool.map(lambda case: _run(case[0], t, case[1], smoothed, judged), cases)
         (angle, P, x, theta), *others = runs
-    variances: list[tuple[Source, Array]] = []
+    variances: list[tuple[BudgetSource, Array]] = []
     for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
         slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
         variances.append((source, np.maximum(slope, 0.0)))
-    shifts: list[tuple[Source, Array]] = []
+    shifts: list[tuple[BudgetSource, Array]] = []
     by_gravity: Array | None = None
     for lean, (_, _, state, turned) in zip(changes, others[len(of) :], strict=True):
         apart = (turned - theta)[np.isfinite(turned - theta)]
@@ -115,20 +107,20 @@ def parts(
         if lean.name == "gravity":
             by_gravity = slope[1:]
             shifts += [
-                (Source(each.source, "B", each.u, each.unit), slope * each.sensitivity * each.u)
+                (BudgetSource(each.source, "B", each.u, each.unit), slope * each.sensitivity * each.u)
                 for each in settings.site.inputs
             ]
         else:
             of_roll = uncertain_roll(settings, problem.spatial)
-            shifts.append((Source("stated roll", "B", of_roll, "rad"), slope * of_roll))
+            shifts.append((BudgetSource("stated roll", "B", of_roll, "rad"), slope * of_roll))
     variances += [(source, np.square(shift)) for source, shift in shifts]
     common = np.zeros((len(at), len(at)))
     for _, shift in shifts:
         common += np.outer(shift[1:], shift[1:])
-    return Parts(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
+    return VarianceParts(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
 
 
-def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]:
+def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource, ...]:
     """All sources that a problem has, but for gravity and a stated roll."""
     noise, prior, timing = settings.noise, settings.prior, settings.timing
     before = _known_before(problem, settings)
@@ -137,10 +129,10 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]
     flexure = max(prior.heave.level, prior.axial.level)
     accelerometers = tuple(f"b_{k + 1}" for k in range(problem.count))
 
-    def of_prior(name: str, u: float, unit: str, *begin: str) -> Source:
+    def of_prior(name: str, u: float, unit: str, *begin: str) -> BudgetSource:
         states = tuple(each for each in problem.names if each.startswith(begin) and each not in before)
         levels = ("heave_level", "axial_level") if begin == ("s_", "flexure_") else ()
-        return Source(name, "B", u, unit, levels=levels, states=states)
+        return BudgetSource(name, "B", u, unit, levels=levels, states=states)
 
     of_states = (
         of_prior("accelerometer bias", noise.accelerometer_bias, "m/s^2", *accelerometers),
@@ -151,17 +143,22 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[Source, ...]
         of_prior("gyro delay", prior.gyro_delay, "s", "tau_g"),
         of_prior("roll", 0.0 if roll is None else roll.u, "rad", "phi"),
         of_prior("flexure of the sting", flexure, "m/s^2", "s_", "flexure_"),
-        Source("earlier run", "B", 1.0, "1", states=before),
+        BudgetSource("earlier run", "B", 1.0, "1", states=before),
     )
-    delay, motion = ("common_delay_u",), ("snap",)
+    of_inputs = []
+    if timing.common_delay_u:
+        of_inputs.append(
+            BudgetSource("common delay", "B", timing.common_delay_u, "s", levels=("common_delay_u",))
+        )
+    if zero is not None:
+        of_inputs.append(BudgetSource("stated zero", "B", zero.u, "rad", zero=True))
     return (
-        Source("accelerometer noise", "A", noise.accelerometer, "m/s^2", ("accelerometer_noise",)),
-        Source("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
+        BudgetSource("accelerometer noise", "A", noise.accelerometer, "m/s^2", ("accelerometer_noise",)),
+        BudgetSource("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
         *(each for each in of_states if each.states),
-        *([Source("common delay", "B", timing.common_delay_u, "s", levels=delay)] if timing.common_delay_u else []),
-        *([Source("stated zero", "B", zero.u, "rad", zero=True)] if zero is not None else []),
-        Source("motion between samples", "B", 1.0, "1", motion),
-    )  # fmt: skip
+        *of_inputs,
+        BudgetSource("motion between samples", "B", 1.0, "1", ("snap",)),
+    )
 
 
 def _known_before(problem: FilterProblem, settings: AoaSettings) -> tuple[str, ...]:
@@ -184,7 +181,7 @@ def _run(
     return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
 
 
-def _enlarged(problem: FilterProblem, rows: Array, source: Source) -> tuple[FilterProblem, Array]:
+def _enlarged(problem: FilterProblem, rows: Array, source: BudgetSource) -> tuple[FilterProblem, Array]:
     """The problem and its rows with the variance of a source larger by `_STEP`."""
     by = 1.0 + _STEP
     constants, covariance = problem.constants, problem.covariance.copy()
@@ -198,20 +195,12 @@ def _enlarged(problem: FilterProblem, rows: Array, source: Source) -> tuple[Filt
     return replace(problem, constants=constants, covariance=covariance), rows
 
 
-def _items(variances: list[tuple[Source, Array]], names: tuple[str, ...]) -> tuple[BudgetItem, ...]:
+def _items(variances: list[tuple[BudgetSource, Array]], names: tuple[str, ...]) -> tuple[BudgetItem, ...]:
     """Lines of a budget from parts (1 + p,) of variances."""
     whole = np.sum([part for _, part in variances], axis=0)
-    return tuple(
-        BudgetItem(
-            source.name,
-            source.type,
-            source.u,
-            source.unit,
-            {
-                name: float(own / total)
-                for name, own, total in zip(names, part, whole, strict=True)
-                if own > _NOTHING * total
-            },
-        )
-        for source, part in variances
-    )
+    items = []
+    for of, part in variances:
+        own = zip(names, part, whole, strict=True)
+        share = {name: float(x / total) for name, x, total in own if x > LIMITS.budget_share * total}
+        items.append(BudgetItem(of.name, of.type, of.u, of.unit, share))
+    return tuple(items)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reference.corrections import corrected as put_right
 from inercal.aoa.reference.corrections import is_verified, prior_of
 from inercal.aoa.result.outcome import COMMAND, geometry
@@ -22,9 +23,6 @@ from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
 
 WHERE = "estimator.prior"
-
-_SAME = 1e-6
-"""Change [m, rad, parts] below which a sensor counts as unchanged."""
 
 _USUAL = {"scale": 1.0, "bias_si": 0.0}
 """Calibration of a sensor without a stated one."""
@@ -41,9 +39,8 @@ _IN_WORDS = {
 def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
     """Coefficients by name, and their covariances by pairs of names, for `inercal.aoa.fusion.problem.problem`.
 
-    They are errors of the sensors as the earlier study stated them, so this study must state the same: a position that
-    was measured anew, or a sensor that was moved, makes them meaningless. The coefficients of a result with a reference
-    angle are those fitted to it, and belong to the study as `corrected` gives it.
+    They are errors of the sensors as the earlier study stated them, so this study must state the same. The coefficients
+    of a result with a reference angle are those fitted to it, and belong to the study as `corrected` gives it.
 
     Raises
     ------
@@ -54,11 +51,10 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
     """
     with _in_form(path):
         earlier = _usable(path, settings)
-        names, x, P = (
-            prior_of(earlier, settings)
-            if is_verified(earlier)
-            else (earlier.names, earlier.values, _own(earlier, settings))
-        )
+        if is_verified(earlier):
+            names, x, P = prior_of(earlier, settings)
+        else:
+            names, x, P = earlier.names, earlier.values, _own(earlier, settings)
     if not (np.isfinite(x).all() and np.isfinite(P).all()):
         raise StudyError(WHERE, f"{path} holds coefficients without numbers, expected all of them")
     if not is_covariance(P):
@@ -79,10 +75,7 @@ def _own(earlier: Estimate, settings: AoaSettings) -> Array:
 def corrected(path: str | Path, settings: AoaSettings) -> AoaSettings:
     """The study with scales and axes corrected as the earlier run, or those before it, found them on a turntable.
 
-    Raises
-    ------
-    InputError
-        As of `load`.
+    Raises `InputError` as `load` does.
     """
     with _in_form(path):
         return put_right(_usable(path, settings), settings)
@@ -105,15 +98,11 @@ def _usable(path: str | Path, settings: AoaSettings) -> Estimate:
         raise StudyError(WHERE, f"{path} is a result of {earlier.command}, expected one of {COMMAND}")
     if not is_verified(earlier):
         if not earlier.status.done:
-            raise StudyError(
-                WHERE,
-                f"{path} ended {earlier.status.value} ({earlier.message}), expected a run that ended ok",
-            )
+            text = f"ended {earlier.status.value} ({earlier.message}), expected a run that ended ok"
+            raise StudyError(WHERE, f"{path} {text}")
         if not earlier.names:
-            method = earlier.result.get("method", "its method")
-            raise StudyError(
-                WHERE, f"{path} holds no coefficients ({method}), expected a result of the fusion"
-            )
+            text = f"holds no coefficients ({earlier.result.get('method', 'its method')})"
+            raise StudyError(WHERE, f"{path} {text}, expected a result of the fusion")
     _same_sensors(earlier, settings, path)
     return earlier
 
@@ -130,8 +119,8 @@ def _same_sensors(earlier: Estimate, settings: AoaSettings, path: str | Path) ->
     for name in dict.fromkeys((*now, *then)):
         before, current = (_USUAL | dict(all.get(name, {})) for all in (then, now))
         for key, value in current.items():
-            tolerance = 0.0 if key == "scale" else _SAME
-            if not math.isclose(value, before[key], rel_tol=_SAME, abs_tol=tolerance):
+            tolerance = 0.0 if key == "scale" else LIMITS.same_sensor
+            if not math.isclose(value, before[key], rel_tol=LIMITS.same_sensor, abs_tol=tolerance):
                 words = _IN_WORDS[key]
                 raise StudyError(
                     WHERE,

@@ -16,8 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.flow import alpha_beta, gives_alpha, theta_u
+from inercal.aoa.angles import Angles, gives_alpha, stated_roll
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings, Attitude
@@ -29,16 +28,8 @@ from inercal.units import parse_unit
 
 _PITCH = (("theta", "deg"), ("u_theta", "deg"), ("rate", "deg/s"))
 _FLOW = (("alpha", "deg"), ("u_alpha", "deg"), ("beta", "deg"), ("u_beta", "deg"))
-_POINT = (
-    ("point", "1"),
-    ("trigger", "1"),
-    ("last_trigger", "1"),
-    ("begin", "s"),
-    ("end", "s"),
-    ("rows", "1"),
-    *_PITCH,
-    ("scatter", "deg"),
-)
+_NUMBERS = (("point", "1"), ("trigger", "1"), ("last_trigger", "1"))
+_POINT = (*_NUMBERS, ("begin", "s"), ("end", "s"), ("rows", "1"), *_PITCH, ("scatter", "deg"))
 
 
 def columns(attitude: Attitude) -> tuple[tuple[str, str], ...]:
@@ -46,40 +37,19 @@ def columns(attitude: Attitude) -> tuple[tuple[str, str], ...]:
     return _PITCH + (_FLOW if gives_alpha(attitude) else ())
 
 
-def rows(
-    theta: Array,
-    u: Array,
-    rate: Array,
-    attitude: Attitude,
-    roll: Array | None = None,
-    u_roll: Array | None = None,
-    by_roll: Array | None = None,
-) -> Array:
-    """The columns (n, 3 or 7), in their units, of ``theta``, ``u`` [rad] and ``rate`` [rad/s], (n,) each.
-
-    ``u`` is that of theta for an exact stated roll; the column adds the part of the roll, unless ``roll`` is given.
-    ``roll``, ``u_roll``, ``by_roll`` as in `inercal.aoa.flow.alpha_beta`.
-    """
-    values = [theta, theta_u(theta, u, attitude, by_roll) if roll is None else u, rate]
+def rows(angles: Angles, attitude: Attitude) -> Array:
+    """The columns (n, 3 or 7), in their units, of angles (n,); the uncertainty of a stated roll is in theirs."""
+    values = [angles.theta, stated_roll(angles, attitude).u, angles.rate]
     if gives_alpha(attitude):
-        flow = alpha_beta(theta, u, attitude, roll, u_roll, by_roll)
+        flow = angles.in_stream(attitude)
         values += [flow.alpha, flow.u_alpha, flow.beta, flow.u_beta]
     return np.degrees(np.column_stack(values))
 
 
 def angles_record(recording: Recording, angles: Angles, settings: AoaSettings) -> Record:
     """Angles with the time stamps of the recording, row by row."""
-    values = rows(
-        angles.theta,
-        angles.known_u,
-        angles.rate,
-        settings.attitude,
-        angles.roll,
-        angles.roll_u,
-        angles.by_roll,
-    )
-    source = Source(f"angles of {angles.method}", "")
-    return _record(columns(settings.attitude), values, recording.t, recording, source)
+    names, values = columns(settings.attitude), rows(angles, settings.attitude)
+    return _record(names, values, recording.t, recording, Source(f"angles of {angles.method}", ""))
 
 
 def points_record(points: Iterable[Point], recording: Recording, settings: AoaSettings) -> Record:

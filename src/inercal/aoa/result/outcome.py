@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reference.corrections import as_stated, report_of
@@ -25,27 +26,17 @@ from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
+from inercal.geometry.rotations import principal
+from inercal.instruments.terms import Term, term
 
 if TYPE_CHECKING:
     from inercal.aoa.paper.delay import Delay
     from inercal.aoa.reference.sensor_fit import Verified
     from inercal.aoa.result.points import Point
-    from inercal.aoa.result.verification import Error, Errors
+    from inercal.aoa.result.verification import AngleError, Errors
 
 
 COMMAND = "aoa"
-
-#: beginnings of names -> unit
-_UNITS = {
-    "b_g": "rad/s",
-    "b_roll": "rad/s",
-    "b_yaw": "rad/s",
-    "b_": "m/s^2",
-    "dr_": "m",
-    "zo_": "m",
-    "k_g": "1",
-    "tau_g": "s",
-}
 
 FLAT = (
     "; theta is the angle of attack only without roll, yaw and flow angularity; gyros for roll and yaw are not used: "
@@ -89,33 +80,11 @@ def assemble(
     verified: Verified | None = None,
     angles: Angles | None = None,
 ) -> Estimate:
-    """The estimate by the fusion.
+    """The estimate by the fusion: the coefficients of the sensors at the end of a recording, as it was filtered.
 
-    Parameters
-    ----------
-    recording : Recording
-        As it was filtered.
-    settings : AoaSettings
-    problem : FilterProblem
-    filtered : FilterResult
-    findings : sequence of Finding
-        Of the diagnosis, beside those of the recording.
-    delay : Delay or None
-        Of the gyro against the accelerometers, by the spectra.
-    points : iterable of Point
-    errors : mapping
-        Against the reference angle, by method.
-    compared : mapping
-        Angles of other methods, by name.
-    verified : Verified or None
-        The sensors as fitted to the reference angle.
-    angles : Angles or None
-        Of the fusion, where they are known already (`inercal.aoa.result.systematic.by_fusion`).
-
-    Returns
-    -------
-    Estimate
-        Its parameters are the coefficients of the sensors, at the end of the recording.
+    ``findings`` are those of the diagnosis, beside those of the recording; ``delay`` that of the gyro by the spectra;
+    ``errors`` against the reference angle, by method; ``compared`` the angles of other methods, by name; ``verified``
+    the sensors as fitted to the reference angle; ``angles`` those of the fusion, where they are there already.
     """
     angles = by_fusion(recording, settings, problem, filtered) if angles is None else angles
     names, at = tuple(problem.nuisances), list(problem.nuisances.values())
@@ -127,10 +96,11 @@ def assemble(
     result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
     model = SPATIAL if problem.spatial else MODEL + FLAT
     basis = _basis(recording, settings, angles, model, REFERENCES + _OF_FUSION)
+    rms = _of(_rms, filtered.innovations[np.isfinite(filtered.innovations)])
     dof = float(max(int(np.isfinite(filtered.innovations).sum()) - len(names), 1))
     statistics = _statistics(recording, angles) | {
         "dof": dof,
-        "residual_rms": _rms(filtered.innovations),
+        "residual_rms": math.nan if rms is None else rms,
         "nis_mean": filtered.nis_mean,
         "starts": float(len(filtered.starts)),
     }
@@ -149,9 +119,7 @@ def assemble(
     covariance = P + split.common
     u = np.sqrt(np.diag(covariance))
     rows = zip(names, values.tolist(), u.tolist(), before.tolist(), strict=True)
-    result["posterior"] = {
-        name: {"value": value, "u": own, "prior": prior} for name, value, own, prior in rows
-    }
+    result["posterior"] = {name: {"value": x, "u": own, "prior": prior} for name, x, own, prior in rows}
     if split.by_gravity is not None:
         slopes = dict(zip(names, split.by_gravity.tolist(), strict=True))
         result["gravity"] = {"value": settings.site.gravity, "u": gravity_u(settings), "slopes": slopes}
@@ -160,7 +128,7 @@ def assemble(
     return Estimate.of(
         basis,
         names,
-        [unit_of(name) for name in names],
+        [term_of(name).unit for name in names],
         values,
         Uncertainty(covariance, np.full(len(names), dof), split.budget, split.common),
         (status, message),
@@ -204,9 +172,12 @@ def _all_findings(recording: Recording, findings: Sequence[Finding]) -> tuple[Fi
     return tuple(dict.fromkeys([*recording.findings, *findings]))
 
 
-def unit_of(name: str) -> str:
-    """SI unit of a coefficient by its name: ``b_1``, ``dr_2``, ``tau_g``."""
-    return next(unit for begun, unit in _UNITS.items() if name.startswith(begun))
+def term_of(name: str) -> Term:
+    """Term of a coefficient by its name: ``b_1``, ``dr_2``, ``tau_g``; `KeyError` for another."""
+    of = term(name)
+    if of is None:
+        raise KeyError(name)
+    return of
 
 
 def geometry(settings: AoaSettings) -> dict[str, dict[str, float]]:
@@ -216,10 +187,9 @@ def geometry(settings: AoaSettings) -> dict[str, dict[str, float]]:
     each = zip(layout.names, layout.angle.tolist(), layout.r.tolist(), layout.z.tolist(), strict=True)
     sensors = {name: {"angle_rad": angle, "r_m": r, "z_m": z} for name, angle, r, z in each}
     for name in (*layout.names, *GYROS):
-        calibration = settings.calibration(name)
-        if (calibration.scale, calibration.bias) != (1.0, 0.0):
-            of = {"scale": calibration.scale, "bias_si": calibration.bias}
-            sensors[name] = sensors.get(name, {}) | of
+        of = settings.calibration(name)
+        if (of.scale, of.bias) != (1.0, 0.0):
+            sensors[name] = sensors.get(name, {}) | {"scale": of.scale, "bias_si": of.bias}
     return sensors
 
 
@@ -286,7 +256,7 @@ def _result(
 def _timing(settings: AoaSettings, angles: Angles, delay: Delay | None) -> dict[str, Any]:
     """Delays [s], and the effect of a common one on the angle [rad]: its rate times the delay."""
     rate = np.abs(angles.rate[np.isfinite(angles.rate)])
-    largest, rms = _of(np.max, rate), _of(lambda w: np.sqrt(np.mean(np.square(w))), rate)
+    largest, rms = _of(np.max, rate), _of(_rms, rate)
     timing = settings.timing
     delays: dict[str, Any] = {
         "gyro_delay": {"stated": timing.gyro_delay, "spectra": None if delay is None else asdict(delay)},
@@ -302,14 +272,11 @@ def _timing(settings: AoaSettings, angles: Angles, delay: Delay | None) -> dict[
 
 def _beside(other: Angles, angles: Angles, judged: Errors | None) -> dict[str, Any]:
     """A method in a comparison: its difference from the chosen one, and its error."""
-    apart = np.remainder(other.theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
-    apart = apart[np.isfinite(apart)]
+    apart = np.degrees(principal(other.theta - angles.theta))
+    apart, u = apart[np.isfinite(apart)], np.degrees(other.u[np.isfinite(other.u)])
     return {
-        "difference": {
-            "max_abs_deg": _of(lambda x: np.degrees(np.abs(x).max()), apart),
-            "rms_deg": _of(lambda x: np.degrees(np.sqrt(np.mean(np.square(x)))), apart),
-        },
-        "u_median_deg": _of(lambda x: np.degrees(np.median(x)), other.u[np.isfinite(other.u)]),
+        "difference": {"max_abs_deg": _of(np.max, np.abs(apart)), "rms_deg": _of(_rms, apart)},
+        "u_median_deg": _of(np.median, u),
         **({} if judged is None else {"reference": _reference(judged)}),
     }
 
@@ -319,7 +286,7 @@ def _reference(errors: Errors) -> dict[str, Any]:
     return _error(errors.all) | {"static": _error(errors.static), "moving": _error(errors.moving)}
 
 
-def _error(error: Error) -> dict[str, Any]:
+def _error(error: AngleError) -> dict[str, Any]:
     """Errors of some rows."""
     return {
         "max_abs_deg": math.degrees(error.max_abs),
@@ -332,7 +299,7 @@ def _error(error: Error) -> dict[str, Any]:
 
 def _settled(recording: Recording) -> NDArray[np.bool_]:
     """Rows after the first 2 s; all of a recording that is shorter."""
-    later_rows = recording.t - recording.t[:1] >= SETTLED
+    later_rows = recording.t - recording.t[:1] >= LIMITS.settling_time
     return later_rows if later_rows.any() else np.ones(len(recording.t), dtype=np.bool_)
 
 
@@ -346,7 +313,6 @@ def _of(of: Any, values: Array) -> float | None:
     return float(of(values)) if len(values) else None
 
 
-def _rms(innovations: Array) -> float:
-    """Root mean square of normalised innovations; NaN without any."""
-    finite = innovations[np.isfinite(innovations)]
-    return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else math.nan
+def _rms(values: Array) -> float:
+    """Root mean square."""
+    return math.sqrt(float(np.mean(np.square(values))))

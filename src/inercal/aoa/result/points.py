@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.flow import alpha_beta
+from inercal.aoa.angles import Angles, alpha_beta
 from inercal.aoa.reading.pauses import pauses
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
@@ -37,22 +36,14 @@ COSINES = 8
 class Point:
     """One test point.
 
-    Attributes
-    ----------
-    number : float
-        Of the record's ``point`` column; counted from 1 where there is none.
-    trigger, last_trigger : float
-        First and last number of the record's ``trigger`` column in the point; NaN without any.
-    begin, end : float
-        s, of the first and last row with an angle, ``start`` the first row of the recording and ``stop`` the one after
-        the last; ``rows`` of them have an angle.
-    theta, u : float
-        rad, mean and its standard uncertainty: ``u_angle`` common to all rows and ``u_scatter`` of noise and buffet,
-        not to be counted where another quantity is averaged over the same rows.
-    scatter, rate : float
-        rad, standard deviation about the mean; rad/s, slope of the line through the point.
-    alpha, u_alpha, beta, u_beta : float
-        rad, at the mean angle, and the mean roll where it is tracked.
+    ``number`` of the record's ``point`` column, or counted from 1; ``trigger`` and ``last_trigger`` the first and last
+    number of its ``trigger`` column, NaN without any. ``begin`` and ``end`` [s] of the first and last row with an
+    angle, from row ``start`` of the recording up to ``stop``; ``rows`` of them have an angle.
+
+    ``theta`` [rad] is the mean and ``u`` its standard uncertainty: ``u_angle`` common to all rows and ``u_scatter`` of
+    noise and buffet, not to be counted where another quantity is averaged over the same rows. ``scatter`` [rad] is the
+    standard deviation about the mean, ``rate`` [rad/s] the slope of the line through the point; ``alpha`` and ``beta``
+    [rad] are at the mean angle, and the mean roll where it is tracked.
     """
 
     number: float
@@ -114,17 +105,15 @@ def _point(
 ) -> Point:
     """The point of some ``rows``, at which the angle is ``theta``, without jumps."""
     t = recording.t[rows]
-    mean = float(theta.mean())
+    mean = math.remainder(float(theta.mean()), 2.0 * math.pi)
     common, left = float(angles.u[rows].mean()), mean_u(theta)
-    u = math.hypot(common, left)
     own = math.hypot(float(angles.known_u[rows].mean()), left)
-    mean = math.remainder(mean, 2.0 * math.pi)
     roll, roll_u, by_roll = (
         None if each is None else each[rows].mean(keepdims=True)
         for each in (angles.roll, angles.roll_u, angles.by_roll)
     )
     flow = alpha_beta(np.array([mean]), np.array([own]), settings.attitude, roll, roll_u, by_roll)
-    triggers = np.full(1, np.nan) if recording.trigger is None else recording.trigger[rows]
+    triggers = np.empty(0) if recording.trigger is None else recording.trigger[rows]
     triggers = triggers[np.isfinite(triggers)] if np.isfinite(triggers).any() else np.full(1, np.nan)
     since = t - t.mean()
     power = float(since @ since)
@@ -138,7 +127,7 @@ def _point(
         stop=int(rows[-1]) + 1,
         rows=len(rows),
         theta=mean,
-        u=u,
+        u=math.hypot(common, left),
         u_angle=common,
         u_scatter=left,
         scatter=float(theta.std()),

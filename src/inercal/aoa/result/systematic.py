@@ -18,6 +18,7 @@ import numpy as np
 from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import tare
@@ -26,15 +27,13 @@ from inercal.aoa.settings import AoaSettings, Methods
 from inercal.arrays import Array
 from inercal.estimate.files import load as load_estimate
 from inercal.estimate.result import Estimate
+from inercal.geometry.rotations import principal
 
 ROLL_STEP = 1e-4
 """Change of the roll [rad] for a slope."""
 
 GRAVITY_STEP = 1e-5
 """Relative change of gravity."""
-
-_KNOWN = 1e-6
-"""Relative uncertainty of gravity, 0.00006 deg at most, from which it counts."""
 
 
 class Lean(NamedTuple):
@@ -51,7 +50,7 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     """A change of each input that is stated with an uncertainty; a roll that gyros track is a state instead."""
     g, roll = settings.site.gravity, settings.attitude.roll
     level, inputs = 0.0 if roll is None else roll.value, []
-    if gravity_u(settings) > _KNOWN * g:
+    if gravity_u(settings) > LIMITS.sure_gravity * g:
         inputs.append(Lean("gravity", g * GRAVITY_STEP, g * (1.0 + GRAVITY_STEP), level))
     if uncertain_roll(settings, tracked):
         inputs.append(Lean("roll", ROLL_STEP, g, level + ROLL_STEP))
@@ -87,17 +86,14 @@ def by_fusion(
     recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
 ) -> Angles:
     """The angles of the fusion, with the roll where gyros track it; stated inputs count in their uncertainty."""
-    angles, turned = (
-        of_fusion(filtered, settings.estimator.states),
-        tracked_roll(recording, problem, filtered),
-    )
-    if turned is not None:
-        angles = replace(angles, roll=turned[0], roll_u=turned[1])
-    return _with_stated(
-        angles,
-        settings,
-        lambda lean: estimate(recording, leaning(problem, lean, settings), filtered.smoothed).theta,
-    )
+    angles = of_fusion(filtered, settings.estimator.states)
+    if (tracked := tracked_roll(recording, problem, filtered)) is not None:
+        angles = replace(angles, roll=tracked[0], roll_u=tracked[1])
+
+    def run(lean: Lean) -> Array:
+        return estimate(recording, leaning(problem, lean, settings), filtered.smoothed).theta
+
+    return _with_stated(angles, settings, run)
 
 
 def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
@@ -131,7 +127,7 @@ def widened(
     Rows without a changed theta keep their uncertainty.
     """
     for lean, theta in zip(changes, turned, strict=True):
-        off = np.remainder(theta - angles.theta + math.pi, 2.0 * math.pi) - math.pi
+        off = principal(theta - angles.theta)
         slope = np.where(np.isnan(off) & np.isfinite(angles.theta), 0.0, off) / lean.step
         if lean.name == "roll":
             angles = stated_roll(replace(angles, by_roll=slope), settings.attitude)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED, FilterResult
+from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
@@ -19,21 +20,6 @@ from inercal.estimate.identifiability import UNSEEN
 from inercal.findings import CODES, Finding, Status, causes
 from inercal.records.places import counted, counted_names
 from inercal.units import STANDARD_GRAVITY
-
-NIS_LIMIT = 2.0
-"""Mean squared innovation, over its variance, above which a recording contradicts the model."""
-
-NIS_CHANCE = 1e-5
-"""Chance of a sound recording above the limit, where few innovations scatter."""
-
-SHAKING = 5.0
-"""Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
-
-_LOSSES = 3
-"""Losses of the angle without a gap from which on a filter counts as lost."""
-
-_BLIND = 0.1
-"""Time [s] without accelerometers after which no filter has the angle."""
 
 
 def of_fusion(
@@ -64,14 +50,14 @@ def of_fusion(
 
 
 def nis_limit(count: int) -> float:
-    """Limit of the mean of ``count`` squared innovations: `NIS_LIMIT`, and more where they are few.
+    """Limit of the mean of ``count`` squared innovations: `Limits.mean_nis`, and more where they are few.
 
     A sound filter's squares are chi-square with one degree of freedom each (Bar-Shalom et al., Estimation with
     Applications to Tracking and Navigation, 2001, section 5.4).
     """
     from scipy.special import chdtri
 
-    return max(NIS_LIMIT, float(chdtri(count, NIS_CHANCE)) / count) if count else NIS_LIMIT
+    return max(LIMITS.mean_nis, float(chdtri(count, LIMITS.nis_chance)) / count) if count else LIMITS.mean_nis
 
 
 def of_method(angles: Angles, findings: Sequence[Finding]) -> tuple[Status, str]:
@@ -96,17 +82,12 @@ def is_covariance(P: Array) -> bool:
 def _lost(recording: Recording, filtered: FilterResult) -> str | None:
     """A sentence on a filter that lost the angle too often; None otherwise."""
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
-    losses = [
-        row
-        for row in filtered.starts[1:]
-        if np.searchsorted(seen, recording.t[row] - _BLIND) < np.searchsorted(seen, recording.t[row])
-    ]
-    if len(losses) < _LOSSES:
+    starts = recording.t[list(filtered.starts[1:])]
+    losses = starts[np.searchsorted(seen, starts - LIMITS.blind_time) < np.searchsorted(seen, starts)]
+    if len(losses) < LIMITS.losses:
         return None
-    return (
-        f"the filter lost the angle {counted(len(losses), 'time')} though there were accelerometers, first at "
-        f"{recording.t[losses[0]]:.6g} s"
-    )
+    often = counted(len(losses), "time")
+    return f"the filter lost the angle {often} though there were accelerometers, first at {losses[0]:.6g} s"
 
 
 def _missing(answered: NDArray[np.bool_]) -> str:
@@ -131,13 +112,13 @@ def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings
     at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
     if not at or not len(filtered.kept_t):
         return None
-    rows = filtered.states[filtered.kept_t - filtered.kept_t[0] >= SETTLED][:, at]
+    rows = filtered.states[filtered.kept_t - filtered.kept_t[0] >= LIMITS.settling_time][:, at]
     rows = rows[np.isfinite(rows).all(axis=1)]
     if not len(rows):
         return None
     rms = float(np.sqrt(np.mean(np.square(rows), axis=0)).max())
     noise = settings.noise.accelerometer
-    if not rms > SHAKING * noise:
+    if not rms > LIMITS.flexure_ratio * noise:
         return None
     text = (
         f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms, {rms / noise:.2g} times their noise: u "

@@ -6,21 +6,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import SETTLED
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.errors import RecordError
-
-REFERENCE_U = 1e-5
-"""Angle [rad], some seconds of arc, by which a reference may creep in half a second and stand still."""
+from inercal.geometry.rotations import principal
 
 
 @dataclass(frozen=True)
-class Error:
+class AngleError:
     """Angle less reference over some ``rows`` [rad]: largest magnitude, root mean square and mean; NaN without rows.
 
     ``ratio`` is the root mean square of the error over its standard uncertainty: about 1, or below, where u is right.
@@ -38,44 +35,32 @@ class Errors:
     """Errors of a ``method`` over ``all`` rows, and where the reference stands still or moves."""
 
     method: str
-    all: Error
-    static: Error
-    moving: Error
+    all: AngleError
+    static: AngleError
+    moving: AngleError
 
 
-def errors(recording: Recording, angles: Angles, after: float = SETTLED) -> Errors:
+def errors(recording: Recording, angles: Angles, after: float = LIMITS.settling_time) -> Errors:
     """Errors of angles against the recording's reference from ``after`` [s] on, while a filter settles before.
 
-    The reference stands still in the windows of `inercal.aoa.reading.pauses.at_rest`.
-
-    Raises
-    ------
-    RecordError
-        There is no reference angle.
+    The reference stands still in the windows of `inercal.aoa.reading.pauses.at_rest`. Raises `RecordError` without one.
     """
     if recording.reference is None or not np.isfinite(recording.reference).any():
         raise RecordError("theta_ref", "missing, expected a reference angle to verify angles against")
     rows = np.flatnonzero(np.isfinite(recording.reference) & np.isfinite(recording.t))
     t, reference = recording.t[rows], np.unwrap(recording.reference[rows])
-    off = np.remainder(angles.theta[rows] - reference + math.pi, 2.0 * math.pi) - math.pi
-    u = angles.u[rows]
-    still, _ = at_rest(t, reference, np.full(len(t), REFERENCE_U))
+    off, u = principal(angles.theta[rows] - reference), angles.u[rows]
+    still, _ = at_rest(t, reference, np.full(len(t), LIMITS.reference_creep))
     taken = np.isfinite(off) & (t >= t[0] + after)
-    return Errors(
-        angles.method,
-        _error(off, u, taken),
-        _error(off, u, taken & still),
-        _error(off, u, taken & ~still),
-    )
+    parts = (_error(off[chosen], u[chosen]) for chosen in (taken, taken & still, taken & ~still))
+    return Errors(angles.method, *parts)
 
 
-def _error(off: Array, u: Array, taken: NDArray[np.bool_]) -> Error:
-    """Error over the taken rows."""
-    off, u = off[taken], u[taken]
+def _error(off: Array, u: Array) -> AngleError:
+    """Error of some rows."""
     if len(off) == 0:
-        return Error(math.nan, math.nan, math.nan, math.nan, 0)
+        return AngleError(math.nan, math.nan, math.nan, math.nan, 0)
     usable = np.isfinite(u) & (u > 0.0)
     ratio = math.sqrt(float(np.mean((off[usable] / u[usable]) ** 2))) if usable.any() else math.nan
-    return Error(
-        float(np.abs(off).max()), math.sqrt(float(np.mean(off**2))), float(off.mean()), ratio, len(off)
-    )
+    rms = math.sqrt(float(np.mean(off**2)))
+    return AngleError(float(np.abs(off).max()), rms, float(off.mean()), ratio, len(off))

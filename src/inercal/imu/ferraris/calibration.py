@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inercal.arrays import short_repr
 from inercal.errors import RecordError, StudyError
 from inercal.estimate.result import Estimate, timed
 from inercal.imu.ferraris.method import Matrices, matrices
@@ -29,6 +30,7 @@ from inercal.records.column import Triad
 from inercal.records.record import Record
 
 
+@short_repr
 @dataclass(frozen=True)
 class FerrarisCalibration:
     """An ``estimate`` and the evidence behind it: the triads, the sections found, and where all nine were there the

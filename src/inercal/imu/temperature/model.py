@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate
@@ -72,6 +72,7 @@ class Curve:
         return float(np.ptp(self.cubic.value(grid)))
 
 
+@short_repr
 @dataclass(frozen=True)
 class TemperatureModel:
     """An ``estimate`` and the ``curves`` behind it; without curves it says why."""

@@ -21,8 +21,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.selfcal.filters.gaps import anew
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
@@ -39,7 +38,7 @@ from inercal.selfcal.platform.model import (
     simulate_truth,
     specific_force,
 )
-from inercal.selfcal.platform.plan import Motion
+from inercal.selfcal.platform.plan import CommandedMotion
 from inercal.selfcal.platform.recording import Recording
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -51,7 +50,7 @@ BAYESIAN_BOUNDS: Final = (
 """The publication behind these bounds."""
 
 SOURCES: Final = ("angle random walk", "accelerometer", "encoder", "prior")
-"""Sources of the errors of an estimate, in the order of `Bounds.contributions`."""
+"""Sources of the errors of an estimate, in the order of `PathBounds.contributions`."""
 
 
 #: parts of accelerometer and encoder; an array, for numba compiles a kernel anew for each literal number
@@ -59,7 +58,7 @@ _PARTS: Final = np.array([2, 3])
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class PathBounds:
     """Cramer-Rao bounds of the coefficients along a path.
 
     Attributes
@@ -95,18 +94,18 @@ class Bounds:
 
 
 def bounds(
-    motion: Motion,
+    motion: CommandedMotion,
     problem: FilterProblem,
     truth: Array | None = None,
     measured: Mask | None = None,
     history: bool = False,
     contributions: bool = False,
-) -> Bounds:
+) -> PathBounds:
     """Bounds along a commanded motion.
 
     Parameters
     ----------
-    motion : Motion
+    motion : CommandedMotion
     problem : FilterProblem
         Noise, prior and near-level gating; the other settings of its filter play no part.
     truth : (p,) or longer, optional
@@ -135,7 +134,7 @@ def recorded_bounds(
     history: bool = False,
     contributions: bool = False,
     restarts: Sequence[int] = (),
-) -> Bounds:
+) -> PathBounds:
     """Bounds along a path as it was estimated, with the measurements that a recording has.
 
     Parameters
@@ -167,7 +166,7 @@ def _along(
     history: bool,
     contributions: bool,
     restarts: Sequence[int] = (),
-) -> Bounds:
+) -> PathBounds:
     """Bounds along attitudes (n, 4) with coefficients (p,), linear form."""
     p, noise = len(c), problem.noise
     u = np.empty((len(q) if history else 0, p))
@@ -190,7 +189,7 @@ def _along(
     slope = product_slope(c)
     whole, *parts = (slope @ each[3:, 3:] @ slope.T for each in P)
     split = dict(zip(SOURCES, parts, strict=True)) if contributions else {}
-    return Bounds(names(p), whole, problem.prior, u, split)
+    return PathBounds(names(p), whole, problem.prior, u, split)
 
 
 @kernel
@@ -232,7 +231,7 @@ class Path(NamedTuple):
 
 
 @kernel
-def riccati(P: Array, path: Path, c: Array, model: Model, u: Array) -> None:
+def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> None:
     """Covariance of the error state along a path, in place.
 
     Parameters
@@ -240,7 +239,7 @@ def riccati(P: Array, path: Path, c: Array, model: Model, u: Array) -> None:
     P : (1 or 1 + sources, 3 + p, 3 + p) at the first row; the whole, then its parts
     path : Path
     c : (p,) coefficients, linear form
-    model : Model
+    model : FilterModel
     u : (n or 0, p) receives standard uncertainties
     """
     q, th, dt, w, seen = path

@@ -11,19 +11,19 @@ from inercal.arrays import Array
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
 from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
-from inercal.selfcal.before.bounds import Bounds
+from inercal.selfcal.before.bounds import PathBounds
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import shown_units
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Observability:
     """A path judged by its bounds.
 
     ``learned`` against the prior; ``to_goal`` u over the wanted u, by name, of those coefficients that have a goal.
     """
 
-    bounds: Bounds
+    bounds: PathBounds
     learned: Learned
     to_goal: Mapping[str, float]
 
@@ -85,15 +85,15 @@ class Seen:
         return list(zip(self.bounds.names, texts, unit, strict=True))
 
 
-def seen(bounds: Bounds, goal: Mapping[str, float]) -> Seen:
+def observability(bounds: PathBounds, goal: Mapping[str, float]) -> Observability:
     """Judge a path; ``goal`` wanted standard uncertainty [SI] by name of coefficient."""
     to_goal = {
         name: float(u / goal[name]) for name, u in zip(bounds.names, bounds.u, strict=True) if name in goal
     }
-    return Seen(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
+    return Observability(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
 
 
-def useless(filtered: FilterResult, bounds: Bounds, by_filter: Array) -> tuple[Status, str] | None:
+def useless(filtered: FilterResult, bounds: PathBounds, by_filter: Array) -> tuple[Status, str] | None:
     """Status and sentence of numbers that must not be used, else None: ``by_filter`` (p, p), product form, and the
     bounds must be covariances."""
     if not filtered.converged:

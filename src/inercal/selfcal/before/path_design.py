@@ -10,11 +10,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.arrays import short_repr
 from inercal.findings import Finding
-from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, Bounds, bounds
-from inercal.selfcal.before.observability import Seen, seen
-from inercal.selfcal.before.path_search import LOCK, criterion, search
+from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
+from inercal.selfcal.before.observability import Observability, observability
+from inercal.selfcal.before.path_search import criterion, search
 from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import SelfcalSettings
 
@@ -25,23 +27,24 @@ REFERENCES = (BAYESIAN_BOUNDS,)
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class ComparedPath:
     """A plan judged by its bounds and its ``criterion``, and the joints it takes ``beyond`` their limits."""
 
     name: str
     plan: Plan
-    seen: Seen
+    observability: Observability
     criterion: float
     beyond: tuple[str, ...]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Designed:
     """A path that was searched for.
 
     Attributes
     ----------
-    compare : tuple of Judged
+    compare : tuple of ComparedPath
         The path found first, then those it is compared with: the study's own, and the named ones that take no more
         than the time; each has a rest at the end where it takes less.
     message : str
@@ -50,7 +53,7 @@ class Designed:
         Coefficients that the path found cannot see, and gimbal lock where it comes close.
     """
 
-    compare: tuple[Judged, ...]
+    compare: tuple[ComparedPath, ...]
     message: str
     findings: tuple[Finding, ...]
 
@@ -60,9 +63,9 @@ class Designed:
         return self.compare[0].plan
 
     @property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> PathBounds:
         """Bounds along it."""
-        return self.compare[0].seen.bounds
+        return self.compare[0].observability.bounds
 
     @property
     def result(self) -> dict[str, Any]:
@@ -79,14 +82,14 @@ class Designed:
         wide = max(len(each.name) for each in self.compare)
         lines = [f"{'path':<{wide}}  {'time [s]':>8}  {'criterion':>9}  {'worst u of prior':>23}  at prior"]
         for each in self.compare:
-            learned = each.seen.learned
+            learned = each.observability.learned
             k = int(np.argmax(learned.ratio))
             worst = f"{100 * learned.ratio[k]:.3g} % {learned.names[k]}"
-            remark = ", ".join(each.seen.at_prior) or "none"
+            remark = ", ".join(each.observability.at_prior) or "none"
             beyond = f"; beyond the limits of {', '.join(each.beyond)}" if each.beyond else ""
             figures = f"{each.plan.duration:8.6g}  {each.criterion:9.3g}  {worst:>23}"
             lines.append(f"{each.name:<{wide}}  {figures}  {remark}{beyond}")
-        return "\n".join(["   #  move", *moves, "", first.seen.table(), "", *lines])
+        return "\n".join(["   #  move", *moves, "", first.observability.table(), "", *lines])
 
 
 def design(
@@ -128,7 +131,7 @@ def design(
                 harm=(),
             )
         ]
-        if lock < LOCK
+        if lock < LIMITS.path_cosine
         else []
     )
     by = {"worst": "largest u", "mean": "geometric mean of u"}[asked.criterion]
@@ -136,7 +139,7 @@ def design(
         judged,
         f"up to {asked.turns} turns of multiples of {math.degrees(asked.angle):g} deg in {best.duration:g} s, by the "
         f"{by} over {'goal or prior' if settings.goal else 'prior'}: {best.words()}",
-        (*judged[0].seen.findings(), *near),
+        (*judged[0].observability.findings(), *near),
     )
 
 
@@ -190,31 +193,35 @@ def _stated(move: Move) -> list[str]:
     return [move.joint, f"{math.degrees(move.angle):.10g} deg", *rate]
 
 
-def _judged(name: str, plan: Plan, settings: SelfcalSettings) -> Judged:
+def _judged(name: str, plan: Plan, settings: SelfcalSettings) -> ComparedPath:
     """A plan judged by its bounds."""
     along = bounds(motion(plan, settings.world), problem(settings))
     value = criterion(along, settings.goal, settings.search.criterion)
-    return Judged(name, plan, seen(along, settings.goal), value, tuple(plan.beyond(settings.limits)))
+    return ComparedPath(
+        name, plan, observability(along, settings.goal), value, tuple(plan.beyond(settings.limits))
+    )
 
 
-def _log_volume(judged: Judged) -> float:
+def _log_volume(judged: ComparedPath) -> float:
     """Mean logarithm of the share of its prior that is left of each combination."""
-    return float(np.mean(np.log(judged.seen.learned.left)))
+    return float(np.mean(np.log(judged.observability.learned.left)))
 
 
-def _entry(judged: Judged, least: float) -> dict[str, Any]:
+def _entry(judged: ComparedPath, least: float) -> dict[str, Any]:
     """A path for JSON; ``d_efficiency`` is 1 for the one of the comparison with the smallest confidence ellipsoid."""
-    learned = judged.seen.learned
+    learned = judged.observability.learned
     return {
         "name": judged.name,
         "turns": stated_moves(judged.plan.moves),
         "time": judged.plan.duration,
-        "rank": judged.seen.rank,
+        "rank": judged.observability.rank,
         "condition": learned.condition,
         "d_efficiency": math.exp(least - _log_volume(judged)),
         "criterion": judged.criterion,
-        "predicted": dict(zip(judged.seen.bounds.names, judged.seen.bounds.u.tolist(), strict=True)),
-        "at_prior": list(judged.seen.at_prior),
-        "worst_combinations": judged.seen.worst(),
+        "predicted": dict(
+            zip(judged.observability.bounds.names, judged.observability.bounds.u.tolist(), strict=True)
+        ),
+        "at_prior": list(judged.observability.at_prior),
+        "worst_combinations": judged.observability.worst(),
         "beyond": list(judged.beyond),
     }

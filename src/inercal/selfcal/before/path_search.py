@@ -16,32 +16,21 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
-from inercal.selfcal.before.bounds import Bounds, bounds
+from inercal.selfcal.before.bounds import PathBounds, bounds
 from inercal.selfcal.filters.problem import FilterProblem, problem
-from inercal.selfcal.platform.plan import MOST_ROWS, Plan, Rest, Turn, motion
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.settings import Search, SelfcalSettings
 
 Sequence: TypeAlias = tuple[tuple[int, int], ...]
 """Turns as joint 0, 1, 2 and signed number of angles."""
 
-STARTS: Final = 24
-"""Random starts; on the 540 s of the paper ten times as many gain less than 1 %."""
-
-LOCK: Final = 0.2
-"""Least |cos| of the inner gimbal angle where its limits are not stated: nearer, two joints are almost one."""
-
-MOST: Final = 5000
-"""Angles within the time that a search can go through: it tries one change for each, again and again."""
-
-_GRAIN: Final = math.radians(3.0)
-"""Largest turn between two rows while searching."""
-
 _EVEN: Final = 1e-6
 """Part of a row that is rounding."""
 
 
-def criterion(bounds: Bounds, goal: Mapping[str, float], kind: str) -> float:
+def criterion(bounds: PathBounds, goal: Mapping[str, float], kind: str) -> float:
     """Largest (``worst``) or geometric mean (``mean``) ratio of each u to its goal, or to its prior without one."""
     wanted = [goal.get(name, prior) for name, prior in zip(bounds.names, bounds.prior, strict=True)]
     ratio = bounds.u / wanted
@@ -54,7 +43,7 @@ def search(
     """The best path that the search finds within rate, time, number of turns, and limits of the gimbals.
 
     Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan. Where the study
-    does not limit the inner gimbal, it keeps a distance to gimbal lock (`LOCK`).
+    does not limit the inner gimbal, it keeps a distance to gimbal lock (`LIMITS.path_cosine`).
 
     Parameters
     ----------
@@ -70,10 +59,10 @@ def search(
     ground = _ground(settings)
     rng = np.random.default_rng(settings.search.seed)
     criteria: dict[Sequence, float] = {}
-    progress(0, STARTS)
-    for start in range(STARTS):
+    progress(0, LIMITS.path_starts)
+    for start in range(LIMITS.path_starts):
         _improve(ground, _random(ground, rng), criteria, rng)
-        progress(start + 1, STARTS)
+        progress(start + 1, LIMITS.path_starts)
     return ground.plan(min(criteria, key=lambda turns: criteria[turns]))
 
 
@@ -131,14 +120,16 @@ def _ground(settings: SelfcalSettings) -> _Ground:
     if asked.time is None and settings.plan is None:
         raise StudyError("design.time", "missing, expected a time or a plan that is as long")
     time = settings.plan.duration if asked.time is None and settings.plan else float(asked.time or 0.0)
-    if time / model.step > MOST_ROWS:
+    if time / model.step > LIMITS.most_rows:
         text = f"found {time / model.step:.6g} steps of {model.step:g} s"
-        raise StudyError("design.time", f"{text}, expected at most {MOST_ROWS:,}")
+        raise StudyError("design.time", f"{text}, expected at most {LIMITS.most_rows:,}")
     unit = asked.angle / model.rate
     number = math.floor(time / unit + 1e-9)
-    if number > MOST:
+    if number > LIMITS.path_angles:
         text = f"found {number} turns of {math.degrees(asked.angle):g} deg within {time:g} s"
-        raise StudyError("design.angle", f"{text}, expected at most {MOST}: a larger angle, or less time")
+        raise StudyError(
+            "design.angle", f"{text}, expected at most {LIMITS.path_angles}: a larger angle, or less time"
+        )
     low, high = _limits(settings, model)
     made = _Ground(asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal)
     if not any(made.fits(((joint, sign),)) for joint in range(3) for sign in (1, -1)):
@@ -152,7 +143,9 @@ def _ground(settings: SelfcalSettings) -> _Ground:
 
 def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float, FilterProblem]:
     """Coarse step [s] for turns of ``unit`` [s], and the problem with the noise of a mean over such a step."""
-    rows = min(max(1, round(unit / model.step)), max(1, math.ceil(settings.search.angle / _GRAIN)))
+    rows = min(
+        max(1, round(unit / model.step)), max(1, math.ceil(settings.search.angle / LIMITS.search_turn))
+    )
     coarse, exact = unit / rows, problem(settings)
     less = math.sqrt(model.step / coarse)
     noise = replace(
@@ -164,7 +157,7 @@ def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float,
 def _limits(settings: SelfcalSettings, model: Plan) -> tuple[Array, Array]:
     """Limits (3,), (3,) of the angles from the start, in angles of the search."""
     level = math.pi * round(model.start[1] / math.pi)
-    reach = math.acos(LOCK)
+    reach = math.acos(LIMITS.path_cosine)
     limits = {"th_y": (level - reach, level + reach)} | dict(settings.limits)
     free = (-math.inf, math.inf)
     ends = np.array([limits.get(joint, free) for joint in JOINTS]) - np.array(model.start)[:, None]

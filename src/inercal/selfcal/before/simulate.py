@@ -13,7 +13,7 @@ from inercal.records.record import Record
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import all_angles, attitude
 from inercal.selfcal.platform.model import Truth, simulate_truth
-from inercal.selfcal.platform.plan import Motion, motion
+from inercal.selfcal.platform.plan import CommandedMotion, motion
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.settings import Disturbances, Noise, SelfcalSettings
@@ -30,7 +30,7 @@ class Experiment:
 
     world: World
     noise: Noise
-    motion: Motion
+    motion: CommandedMotion
     fine: Array
     truth: Array
     disturbances: Disturbances

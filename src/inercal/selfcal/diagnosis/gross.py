@@ -23,7 +23,16 @@ from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.estimate.hypotheses import Hypothesis, tried
 from inercal.findings import EVERYTHING, Finding
-from inercal.geometry.rotations import Axis, attitude_difference, conjugate, log, multiply, rotate
+from inercal.geometry.rotations import (
+    Axis,
+    attitude_difference,
+    boxminus,
+    conjugate,
+    log,
+    multiply,
+    rotate,
+)
+from inercal.records.checks.values import saturated
 from inercal.selfcal.diagnosis.fit_quality import Case
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
@@ -43,7 +52,7 @@ _EXCHANGED = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Motion:
+class _Stretches:
     """Motion in each of m steps between rows whose angles are known.
 
     ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
@@ -100,7 +109,7 @@ def implausible(recording: Recording, settings: SelfcalSettings, where: object) 
     return findings
 
 
-def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
+def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Stretches:
     """Motion between the rows with ``complete`` angles."""
     t = recording.t
     gained = np.vstack([np.zeros(3), np.cumsum(recording.rate * recording.dt[:, None], axis=0)])
@@ -109,7 +118,7 @@ def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
     held = np.zeros(len(t), dtype=np.int64)
     held[np.array(recording.held, dtype=np.int64) + 1] = 1
     recorded = np.diff(np.cumsum(held)[complete]) == 0
-    return _Motion(
+    return _Stretches(
         recording.th[complete], np.diff(t[complete]), np.diff(gained[complete], axis=0), numbered, recorded
     )
 
@@ -117,14 +126,21 @@ def _motion(recording: Recording, complete: NDArray[np.int64]) -> _Motion:
 def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
     """Refuse rates that turn the platform many times as fast as the angles do, or the reverse."""
     turned = np.linalg.norm(commanded, axis=1)
-    moving = (turned > 0.3 * turned.max()) & (moved > noise)
+    moving = (turned > LIMITS.moving_share * turned.max()) & (moved > noise)
     if not moving.any():
         return
     ratio = float(np.median(turned[moving] / moved[moving]))
     factor = max(ratio, 1.0 / ratio)
     if factor < LIMITS.unit_ratio:
         return
-    words = next((units for of, units in _EXCHANGED.items() if 0.8 < factor / of < 1.25), "units")
+    words = next(
+        (
+            units
+            for of, units in _EXCHANGED.items()
+            if 1.0 / LIMITS.unit_window < factor / of < LIMITS.unit_window
+        ),
+        "units",
+    )
     raise RecordError(
         where,
         f"the rates turn the platform {ratio:.4g} times as far as the angles say, expected the same: {words} look "
@@ -132,7 +148,7 @@ def _units(commanded: Array, moved: Array, noise: float, where: object) -> None:
     )
 
 
-def _rig(motion: _Motion, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
+def _rig(motion: _Stretches, commanded: Array, settings: SelfcalSettings, sensor: str) -> list[Finding]:
     """Rates against angles: gimbals of another order or with other signs, exchanged or reversed rates."""
     noise = 2.0 * settings.noise.encoder
     turned = motion.turned(settings.world)
@@ -175,12 +191,12 @@ def _fitting(pair: _Pair, hypotheses: Iterable[Hypothesis[_Pair]]) -> Finding | 
     return next((fit.finding for fit in fits if fit.case.misfit < LIMITS.rough_fit), None)
 
 
-def _other_angles(motion: _Motion, settings: SelfcalSettings) -> Iterator[Hypothesis[_Pair]]:
+def _other_angles(motion: _Stretches, settings: SelfcalSettings) -> Iterator[Hypothesis[_Pair]]:
     """Gimbals of another order or with other signs, the fewest changes first; exchanged angles."""
     of_study, world = settings.gimbals, settings.world
     now = (*of_study.axes, *of_study.signs)
 
-    def hypothesis(code: str, text: str, moved: _Motion, rig: World) -> Hypothesis[_Pair]:
+    def hypothesis(code: str, text: str, moved: _Stretches, rig: World) -> Hypothesis[_Pair]:
         text = f"th: {text}"
         return Hypothesis(
             text, code, text, lambda pair, _: replace(pair, seen=moved.turned(rig)), harm=EVERYTHING
@@ -264,6 +280,30 @@ def _accelerometers(
     ]
 
 
+def clipped(recording: Recording, settings: SelfcalSettings, channel: str) -> bool:
+    """True for a channel (``acc_x``, ``gyro_z``) beyond whose extremes the encoders say that the motion goes on.
+
+    A quiet gyro sits at an extreme through each turn of constant rate, and is sound. A loss below
+    `LIMITS.clipped_share` is left to the innovations. True also where the encoders are silent.
+    """
+    world, noise, k = settings.world, settings.noise, "xyz".index(channel[-1])
+    q, _ = gimbals(recording.th, world)
+    if channel.startswith("acc"):
+        level = read = recording.acc[:, k]
+        expected, spread = rotate(conjugate(q), world.up)[:, k], noise.accelerometer
+    else:
+        level, read = recording.rate[:, k], recording.rate[:, k] * recording.dt
+        of_earth = rotate(conjugate(q[:-1]), world.earth) * recording.dt[:, None]
+        expected, spread = (boxminus(q[1:], q[:-1]) + of_earth)[:, k], math.sqrt(2.0) * noise.encoder
+    rows = saturated(level)
+    for run in filter(len, np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)):
+        outward = 1.0 if level[run[0]] == np.nanmax(level) else -1.0
+        lost, slack = outward * (expected[run] - read[run]).sum(), LIMITS.noise_sigmas * spread
+        if not lost <= slack * math.sqrt(len(run)) + LIMITS.clipped_share * abs(read[run].sum()):
+            return True
+    return False
+
+
 def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
     """Accelerometers exchanged or reversed: the signed permutation that agrees best with the encoders."""
     recording, problem = case
@@ -308,7 +348,7 @@ def off_the_path(
     """
     t = recording.t - began
     findings = []
-    if t[-1] < plan.duration - 1.5 * plan.step:
+    if t[-1] < plan.duration - LIMITS.missing_steps * plan.step:
         text = f"the recording ends after {t[-1]:.6g} s, the study's path takes {plan.duration:.6g} s"
         findings.append(Finding("truncated", text))
     nominal = plan.angles()

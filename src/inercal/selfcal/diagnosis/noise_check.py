@@ -91,7 +91,7 @@ def _explained_by_walk(case: Case, factor: float) -> bool:
     tried = (recording, replace(problem, noise=noise))
     now = filtered(tried)
     # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
-    return white(tried, now) and float(np.nanmean(np.square(now.innovations[:, 3:]))) > 0.5
+    return white(tried, now) and float(np.nanmean(np.square(now.innovations[:, 3:]))) > LIMITS.walk_square
 
 
 def _unexplained(z: Array) -> Finding:

@@ -36,6 +36,7 @@ from inercal.selfcal.result.tables import weak_combinations
 from inercal.selfcal.task import compared
 
 if TYPE_CHECKING:
+    from inercal.selfcal.estimators import FilterKind
     from inercal.selfcal.filters.filter_result import FilterResult, History
     from inercal.selfcal.task import Calibration
 
@@ -111,7 +112,7 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     if len(filters) < 2:
         return []
     values, u = product_form(calibration.filtered)
-    apart = {
+    apart: dict[str, Array] = {
         kind: (product_form(each)[0] - values) / u
         for kind, each in filters.items()
         if kind != calibration.filtered.kind
@@ -194,7 +195,7 @@ def _attitude(calibration: Calibration, history: History, truth: Array | None) -
     """The attitude against the truth where that is known, else against the encoders."""
     t = calibration.recording.t
     if truth is not None:
-        courses = {
+        courses: dict[str, Array] = {
             kind: each.history.attitude
             for kind, each in _all(calibration).items()
             if each.history is not None and kind in (calibration.filtered.kind, "svd-qukf", "gimbal-ukf")
@@ -219,6 +220,6 @@ def _bounds(calibration: Calibration) -> Picture:
     )
 
 
-def _all(calibration: Calibration) -> Mapping[str, FilterResult]:
+def _all(calibration: Calibration) -> Mapping[FilterKind, FilterResult]:
     """Every filter that ran, the one that counts first."""
     return {calibration.filtered.kind: calibration.filtered} | dict(calibration.compared)

@@ -46,7 +46,7 @@ def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> s
             f"the stated noise and prior; further left is better.{' Bar: the goal.' if settings.goal else ''}",
             bounds.names,
             units,
-            {each.name: each.seen.bounds.u / size for each in designed.compare},
+            {each.name: each.observability.bounds.u / size for each in designed.compare},
             np.array([settings.goal.get(name, np.nan) for name in bounds.names]) / size
             if settings.goal
             else None,

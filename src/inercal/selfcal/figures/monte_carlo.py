@@ -14,8 +14,8 @@ from inercal.report.html import page as framed
 from inercal.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel, Strips
 from inercal.report.panels import draw
 from inercal.report.style import ALARM, COLOURS, INK, QUIET
+from inercal.selfcal.estimators import ESTIMATORS
 from inercal.selfcal.figures.facts import facts
-from inercal.selfcal.result.comparison import FILTERS
 from inercal.selfcal.result.tables import campaign_table
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> s
         "selfcal.html",
         estimate,
         "Self-calibration simulated many times",
-        [*facts(settings), ("filter", "", f"{FILTERS.get(campaign.kind, campaign.kind)} ({campaign.kind})")],
+        [*facts(settings), ("filter", "", f"{ESTIMATORS[campaign.kind].words} ({campaign.kind})")],
         tables=[campaign_table(campaign)],
         pictures=pictures,
         details=[],

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,15 +33,15 @@ from inercal.geometry.rotations import (
     right_jacobian,
     to_matrix,
 )
-from inercal.selfcal.filters.filter_result import FilterResult, History
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import broken
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.residuals import (
-    Readings,
+    Measurements,
     Sensed,
+    batch_result,
     first_reading,
     followed,
-    least_cosine,
     normalised,
     on_base,
     readings,
@@ -62,27 +63,15 @@ ITERATIONS = 30
 def estimate_map(
     recording: Recording, problem: FilterProblem, start: Start | None = None, history: bool = True
 ) -> FilterResult:
-    """Maximum a posteriori over all attitudes and coefficients.
+    """Maximum a posteriori over all attitudes and coefficients; measurements missing or stopped by the gate left out.
 
-    Parameters
-    ----------
-    recording : Recording
-        Missing measurements (NaN) are left out, and those that the near-level gate stops.
-    problem : FilterProblem
-    start : Start, optional
-        Of the first attitude; its encoder reading if absent. The iteration begins at the encoders all the same; where
-        these never read it begins at the estimate of ``lm``.
-    history : bool
-        Return attitudes with standard deviations, given all measurements, and innovations.
+    ``start`` is that of the first attitude, its encoder reading if absent; the iteration begins at the encoders all the
+    same, or where these never read at the estimate of ``lm``. With ``history`` attitudes are given all measurements.
 
-    Returns
-    -------
-    FilterResult
-        ``nis`` of a row: squared normalised residuals of its measurements and of the steps since the row measured
-        before, and an equal share of those of the prior. All rows sum up to the minimum of the sum of squares,
-        chi-square with as many degrees of freedom as there are scalar measurements (unknowns and terms of prior and
-        steps are as many); so the mean is 6 where six are measured, as for a filter. ``innovations`` are residuals
-        over the standard deviations of their noise. Not ``converged`` where the iteration did not end.
+    ``nis`` of a row: squared normalised residuals of its measurements and of the steps since the row measured before,
+    and an equal share of those of the prior. Their sum over all rows is the minimum, chi-square with as many degrees of
+    freedom as there are scalar measurements (unknowns and terms of prior and steps are as many). ``innovations`` are
+    residuals over the standard deviations of their noise. Not ``converged`` where the iteration did not end.
     """
     import scipy.linalg  # noqa: F401  as the kernels, loaded before time is taken
 
@@ -111,26 +100,14 @@ def estimate_map(
             message = ""
             break
     covariance = covariance * np.outer(problem.prior, problem.prior)
-    rows = [np.tile(a, (len(q), 1)) for a in (c, np.sqrt(np.diag(covariance)))]
-    return FilterResult(
-        kind="map",
-        coefficients=c,
-        covariance=covariance,
-        attitude=q[-1],
-        nis=_per_row(terms, measured),
-        dims=measured.dims,
-        innovations=normalised(terms.sensed.residual, measured) if history else np.empty((0, 6)),
-        history=History(q, u, *rows) if history else None,
-        seconds=time.perf_counter() - began,
-        converged=not message,
-        message=message,
-        gimbal_cosine=least_cosine(recording),
-        restarts=tuple(k + 1 for k in loose),
-    )
+    innovations = normalised(terms.sensed.residual, measured) if history else None
+    nis = _per_row(terms, measured)
+    result = batch_result("map", recording, measured, (q, u), (c, covariance), nis, innovations, message)
+    return replace(result, seconds=time.perf_counter() - began, restarts=tuple(k + 1 for k in loose))
 
 
 def _first_guess(
-    recording: Recording, problem: FilterProblem, measured: Readings, start: Start | None
+    recording: Recording, problem: FilterProblem, measured: Measurements, start: Start | None
 ) -> tuple[Array, Array]:
     """Attitudes (n, 4) and coefficients (p,) to begin with: the encoders', carried by the commands where silent."""
     seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
@@ -170,7 +147,7 @@ def _terms(
     c: Array,
     recording: Recording,
     problem: FilterProblem,
-    measured: Readings,
+    measured: Measurements,
     start: Start,
     loose: Sequence[int] = (),
 ) -> _Terms:
@@ -202,7 +179,7 @@ def _terms(
     )
 
 
-class _Step(NamedTuple):
+class _GaussNewtonStep(NamedTuple):
     """A step of Gauss-Newton: of ``attitudes`` (n, 3) [rad] and ``coefficients`` (p,), over their prior; with the
     ``covariance`` (p, p) of these and standard deviations ``attitude_u`` (n, 3) [rad], or (0, 3)."""
 
@@ -212,7 +189,7 @@ class _Step(NamedTuple):
     attitude_u: Array
 
 
-def _step(terms: _Terms, attitude_u: bool) -> _Step:
+def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     """Solve the normal equations of all terms."""
     from scipy.linalg import cho_solve_banded, cholesky_banded
 
@@ -255,10 +232,12 @@ def _step(terms: _Terms, attitude_u: bool) -> _Step:
         variance = np.empty(3 * n)
         inverse_diagonal(factor, variance)
         variance += np.einsum("ki,ij,kj->k", by_coefficients, covariance, by_coefficients, optimize=True)
-    return _Step(attitudes.reshape(n, 3), coefficients, covariance, np.sqrt(variance).reshape(-1, 3))
+    return _GaussNewtonStep(
+        attitudes.reshape(n, 3), coefficients, covariance, np.sqrt(variance).reshape(-1, 3)
+    )
 
 
-def _per_row(terms: _Terms, measured: Readings) -> Array:
+def _per_row(terms: _Terms, measured: Measurements) -> Array:
     """Squared residuals of each measured row, of the steps since the one before, and a share of those of the prior."""
     total = np.cumsum(np.sum(terms.sensed.residual**2, axis=1) + np.sum(terms.process**2, axis=1))
     nis, rows = np.full(len(total), np.nan), np.flatnonzero(measured.dims)

@@ -17,9 +17,8 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import empty_row, innovation_variance, scalar_update
 from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
-from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model, Start
+from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.selfcal.platform.linearised import (
     WIDEST,
@@ -60,7 +59,7 @@ def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = 
 
 
 @kernel
-def _corrected(q: Quaternion, c: Array, x: Array) -> Quaternion:
+def corrected(q: Quaternion, c: Array, x: Array) -> Quaternion:
     """The attitude with the error state ``x`` put in, and the coefficients ``c`` too, in place; x is then 0."""
     for j in range(len(c)):
         c[j] += x[3 + j]
@@ -70,12 +69,12 @@ def _corrected(q: Quaternion, c: Array, x: Array) -> Quaternion:
 
 
 @kernel
-def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
+def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> float:
     """The loop; returns the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate = model
     intervals, rates, acc, th = steps
-    n, p = len(P), len(c)
+    n = len(P)
     top, x, work = np.empty((6, n)), np.empty(n), np.empty(n)
     row = empty_row(WIDEST)
     variance = noise.accelerometer * noise.accelerometer
@@ -114,7 +113,7 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
                 z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
                 total += scalar_update(P, x, row, i + 1, z, 1.0, work)
                 count += 1
-            q = _corrected(q, c, x)
+            q = corrected(q, c, x)
         if take:
             up_e = on_the_base(world.up, c)
             f = specific_force(q, up_e)
@@ -130,17 +129,11 @@ def _advance(state: State, model: Model, steps: Steps, out: Estimates) -> float:
                     size = accelerometer_row(i, f, c, up_e, q, row)
                     total += scalar_update(P, x, row, size, acc[k, i] - read[i], variance, work)
                     count += 1
-            q = _corrected(q, c, x)
+            q = corrected(q, c, x)
         out.nis[k] = total if count > 0 else math.nan
         out.dims[k] = count
         if history:
-            for i in range(4):
-                out.attitude[k, i] = q[i]
-            for i in range(3):
-                out.attitude_u[k, i] = math.sqrt(P[i, i])
-            for j in range(p):
-                out.coefficients[k, j] = c[j]
-                out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
+            remember(out, k, q, c, P)
     for i in range(4):
         state.attitude[i] = q[i]
     return cosine

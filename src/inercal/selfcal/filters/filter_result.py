@@ -9,8 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal._jit import kernel
 from inercal.arrays import Array
+from inercal.geometry.kernels import Quaternion
 from inercal.geometry.rotations import multiply
+from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.kinematics import attitude
@@ -60,6 +63,19 @@ def empty_estimates(m: int, p: int, history: bool) -> Estimates:
     )
 
 
+@kernel
+def remember(out: Estimates, k: int, q: Quaternion, c: Array, P: Array) -> None:
+    """Write row ``k`` of a history: attitude and coefficients (p,), and their standard deviations by the covariance
+    (3 + p, 3 + p)."""
+    for i in range(4):
+        out.attitude[k, i] = q[i]
+    for i in range(3):
+        out.attitude_u[k, i] = math.sqrt(P[i, i])
+    for j in range(len(c)):
+        out.coefficients[k, j] = c[j]
+        out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
+
+
 class Trace(NamedTuple):
     """Estimates of a recursive filter after each of m steps, and its health over all of them, as in `FilterResult`.
 
@@ -98,12 +114,8 @@ def estimate_of(state: State, problem: FilterProblem) -> History:
         across = multiply(q, np.eye(4)[1:])
         with np.errstate(invalid="ignore"):
             of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
-    return History(
-        q[None],
-        of_attitude[None],
-        state.coefficients[None].copy(),
-        u[-len(problem.prior) :][None],
-    )
+    of_coefficients = u[-len(problem.prior) :]
+    return History(q[None], of_attitude[None], state.coefficients[None].copy(), of_coefficients[None])
 
 
 def attitude_of(state: State, problem: FilterProblem) -> Array:
@@ -150,7 +162,7 @@ class FilterResult:
         Of a recursive filter, at the end, with the joint covariance of attitude and coefficients.
     """
 
-    kind: str
+    kind: FilterKind
     coefficients: Array
     covariance: Array
     attitude: Array

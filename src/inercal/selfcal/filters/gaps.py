@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.geometry.rotations import boxminus, conjugate, exp, log, multiply, rotate
-from inercal.records.places import counted
+from inercal.records.places import counted, counted_names
 from inercal.selfcal.filters import error_state
 from inercal.selfcal.filters.filter_result import (
     Estimates,
@@ -33,21 +33,10 @@ from inercal.selfcal.filters.filter_result import (
     estimate_of,
 )
 from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.selfcal.platform.recording import Recording, Steps
 from inercal.selfcal.platform.rig import World
-
-LONG = 1.5
-"""Ratio to the usual interval beyond which an interval is a gap: the rate was not meant for so long."""
-
-RECENT = 9
-"""Intervals, with the one in question, of which the middle one is the usual one."""
-
-CONTRADICTION = 5.0
-"""Standard deviations about an axis beyond which the encoders contradict a turn that was held: by chance once in a
-million gaps, while a turn that ended a hundredth of a second before the gap did is off by more."""
-
-_SHOWN = 5
 
 
 def usual(recent: Array) -> Array:
@@ -60,17 +49,9 @@ def usual(recent: Array) -> Array:
 def held_rate(w: Array, th: Array, world: World, middle: float, since: float, dt: float) -> Array:
     """Rate (3,) [rad/s] against inertial space, constant over a step, that turns the platform on over the base.
 
-    Parameters
-    ----------
-    w : (3,) rad/s
-        The last known rate, against inertial space, in p.
-    th : (3,) rad
-        The last known gimbal angles; times are counted from then.
-    world : World
-    middle : float
-        Time [s] at which the platform turned at ``w``.
-    since, dt : float
-        Begin and length of the step [s].
+    ``w`` (3,) [rad/s] is the last known rate, against inertial space, in p, ``th`` (3,) [rad] are the last known
+    gimbal angles. Times [s] count from these: ``middle`` when it turned at ``w``, ``since`` when the step of ``dt``
+    begins.
     """
     q = np.array(attitude(th, world.axes, world.signs))
     turn = w
@@ -87,36 +68,26 @@ def held_rate(w: Array, th: Array, world: World, middle: float, since: float, dt
 
 
 def with_held(t: Array, rate: Array, th: Array, world: World, gained: bool) -> tuple[Array, tuple[int, ...]]:
-    """Rates (n - 1, 3) without gaps, and the steps whose rates are held.
+    """Rates (n - 1, 3) [rad/s] without gaps, and the steps whose rates are held.
 
-    Parameters
-    ----------
-    t : (n,) s
-    rate : (n - 1, 3) rad/s
-        NaN where not recorded; the first row is complete.
-    th : (n, 3) rad
-        NaN where not measured; the first row is complete.
-    world : World
-    gained : bool
-        True for rates just before the next row, false for those just after theirs.
+    ``t`` (n,) [s]; ``rate`` (n - 1, 3) NaN where not recorded, ``th`` (n, 3) [rad] NaN where not measured, the first
+    rows complete. ``gained``: rates are those just before the next row, and not just after theirs.
     """
     dt = np.diff(t)
-    before = np.append(np.full(RECENT - 1, np.nan), dt)
-    step = usual(np.lib.stride_tricks.sliding_window_view(before, RECENT))
-    long = dt > LONG * step
+    before = np.append(np.full(LIMITS.recent_intervals - 1, np.nan), dt)
+    step = usual(np.lib.stride_tricks.sliding_window_view(before, LIMITS.recent_intervals))
+    long = dt > LIMITS.gap_ratio * step
     rated = np.all(np.isfinite(rate), axis=1)
     held = np.flatnonzero(long | ~rated)
     of_rate, of_angles = _last(rated), _last(np.all(np.isfinite(th), axis=1))
-    rate = rate.copy()
-    filled = []
+    filled = rate.copy()
     for k in held:
         i, j = of_rate[k], of_angles[k]
         half = 0.5 * step[k]
         middle = t[i + 1] - half if gained else t[i] + half
-        filled.append(held_rate(rate[i], th[j], world, middle - t[j], t[k] - t[j], dt[k]))
-    for k, each in zip(held, filled, strict=True):
-        rate[k] = np.where(long[k] | ~np.isfinite(rate[k]), each, rate[k])
-    return rate, tuple(held.tolist())
+        turning = held_rate(rate[i], th[j], world, middle - t[j], t[k] - t[j], dt[k])
+        filled[k] = np.where(long[k] | ~np.isfinite(rate[k]), turning, rate[k])
+    return filled, tuple(held.tolist())
 
 
 def _last(complete: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -149,7 +120,8 @@ def advance(
             state, trace = module.advance(state, problem, steps.part(slice(done, k)), history)
             parts.append(trace)
         unmeasured = step._replace(acc=nothing, th=nothing)
-        propagated, trace = module.advance(_copy(state), problem, unmeasured, history)
+        own = State._make(each.copy() for each in state)  # as a filter uses up the arrays that it is given
+        propagated, trace = module.advance(own, problem, unmeasured, history)
         if not seen[k]:
             state = propagated
         elif _contradicted(propagated, problem, steps.th[k]):
@@ -194,15 +166,13 @@ def taken_anew(recording: Recording, result: FilterResult) -> list[Finding]:
         f"the platform did not turn on as before where no rate was recorded: {counted(len(rows), 'time')} the encoders "
         "contradict that, and the attitude is taken anew from them"
     )
-    shown = ", ".join(f"{each:.10g}" for each in recording.t[rows[:_SHOWN]])
-    more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
-    return [Finding("gap", text, f"t = {shown} s{more}")]
+    return [Finding("gap", text, f"t = {counted_names([f'{each:.10g} s' for each in recording.t[rows]])}")]
 
 
 def _contradicted(state: State, problem: FilterProblem, th: Array) -> bool:
     """True where encoder readings (3,) [rad] are far from the attitude of a state that has not seen them."""
     expected, read = estimate_of(state, problem), anew(problem, th)
-    limit = CONTRADICTION * np.hypot(expected.attitude_u[0], read.sigma)
+    limit = LIMITS.held_sigmas * np.hypot(expected.attitude_u[0], read.sigma)
     return bool((np.abs(boxminus(read.attitude, expected.attitude[0])) > limit).any())
 
 
@@ -232,11 +202,6 @@ def _anew(
         for name, row in vars(estimate_of(state, problem)).items():
             getattr(out, name)[:] = row
     return state, Trace(out, gimbal_cosine=abs(math.cos(on_turn[1])))
-
-
-def _copy(state: State) -> State:
-    """A state of its own, as a filter uses up the arrays that it is given."""
-    return State._make(each.copy() for each in state)
 
 
 def _joined(parts: Sequence[Trace]) -> Trace:

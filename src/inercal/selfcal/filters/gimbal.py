@@ -25,14 +25,13 @@ from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Vector
-from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model, Start
+from inercal.selfcal.estimators import FACTOR_OF
+from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import Axes, angles, attitude, nearest_turn, parity
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.settings import FACTOR_OF
 
 Cosines: TypeAlias = tuple[float, float, float, float, float, float]
 
@@ -142,7 +141,7 @@ def hat(th: Vector | Array, e: float, signs: Array) -> Vector:
     return e * signs[0] * th[0], e * signs[1] * th[1], e * signs[2] * th[2]
 
 
-class Turn(NamedTuple):
+class GimbalStep(NamedTuple):
     """A step of the platform: its ``commanded`` rate (3,) [rad/s], ``dt`` [s], and true for ``euler`` integration."""
 
     commanded: Vector
@@ -151,7 +150,9 @@ class Turn(NamedTuple):
 
 
 @kernel
-def _predict(th: Array, c: Array, turn: Turn, world: World, columns: Array, shifted: Array, z: Array) -> None:
+def _predict(
+    th: Array, c: Array, turn: GimbalStep, world: World, columns: Array, shifted: Array, z: Array
+) -> None:
     """Put into ``z`` (2 n + 1, 3) the angles of all points after a step, against ``th``.
 
     ``columns`` (n, n) of the points before the step; ``shifted`` (p,) used up.
@@ -207,7 +208,7 @@ def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: 
 
 @kernel
 def _advance(
-    state: State, model: Model, factor: int, euler: bool, steps: Steps, out: Estimates
+    state: State, model: FilterModel, factor: int, euler: bool, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
@@ -223,7 +224,7 @@ def _advance(
     for k in range(len(intervals)):
         dt, w = intervals[k], (rate[k, 0], rate[k, 1], rate[k, 2])
         draw(P, factor, spread, points)
-        _predict(th, c, Turn(w, dt, euler), world, points.columns, shifted, moved)
+        _predict(th, c, GimbalStep(w, dt, euler), world, points.columns, shifted, moved)
         moments(moved, points.columns, other, moves)
         for i in range(3):
             th[i] += moves.mean[i]
@@ -263,14 +264,7 @@ def _advance(
         for j in range(p):
             c[j] += x[3 + j]
         if history:
-            q = attitude(th, world.axes, world.signs)
-            for i in range(4):
-                out.attitude[k, i] = q[i]
-            for i in range(3):
-                out.attitude_u[k, i] = math.sqrt(P[i, i])
-            for j in range(p):
-                out.coefficients[k, j] = c[j]
-                out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
+            remember(out, k, attitude(th, world.axes, world.signs), c, P)
     return points.health[0], int(points.health[1]), cosine
 
 

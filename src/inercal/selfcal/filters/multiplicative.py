@@ -22,10 +22,11 @@ from inercal.estimate.factor import FACTORS
 from inercal.estimate.kalman import Row, scalar_update
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize, rotate
+from inercal.selfcal.estimators import FACTOR_OF
+from inercal.selfcal.filters.error_state import corrected
 from inercal.selfcal.filters.error_state import initial as initial
-from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model
+from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.selfcal.platform.linearised import encoder_roots
 from inercal.selfcal.platform.model import (
@@ -37,7 +38,6 @@ from inercal.selfcal.platform.model import (
 )
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.settings import FACTOR_OF
 
 WIDE = 3.0
 """Length [rad] beyond which a deviation may be more than half a turn, where a logarithm is not what it came from."""
@@ -116,16 +116,8 @@ def _read(q: Quaternion, c: Array, up: Array, columns: Array, shifted: Array, z:
 
 
 @kernel
-def _correct(q: Quaternion, c: Array, x: Array) -> Quaternion:
-    """Put a correction (n,) into attitude, which is returned, and coefficients."""
-    for j in range(len(c)):
-        c[j] += x[3 + j]
-    return normalize(multiply(q, exp((x[0], x[1], x[2]))))
-
-
-@kernel
 def _advance(
-    state: State, model: Model, factor: int, steps: Steps, out: Estimates
+    state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
@@ -179,7 +171,7 @@ def _advance(
                 count += 1
             # The covariance is not turned with the corrected attitude. Small corrections turn it by nothing; after a
             # large one it is that of the encoders, which is stated about the measured attitude as it is.
-            q = _correct(q, c, x)
+            q = corrected(q, c, x)
         for i in range(3):
             r[i] = acc[k, i] if take and admitted(i, gate, near) else math.nan
         if not (math.isnan(r[0]) and math.isnan(r[1]) and math.isnan(r[2])):
@@ -193,17 +185,11 @@ def _advance(
                     out.innovations[k, i] = r[i] / math.sqrt(of_points.covariance[i, i])
             of_acc, used = update(r, of_points.cross, of_points.covariance, L, P, x)
             total, count = total + of_acc, count + used
-            q = _correct(q, c, x)
+            q = corrected(q, c, x)
         out.nis[k] = total if count > 0 else math.nan
         out.dims[k] = count
         if history:
-            for i in range(4):
-                out.attitude[k, i] = q[i]
-            for i in range(3):
-                out.attitude_u[k, i] = math.sqrt(P[i, i])
-            for j in range(p):
-                out.coefficients[k, j] = c[j]
-                out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
+            remember(out, k, q, c, P)
     for i in range(4):
         state.attitude[i] = q[i]
     return points.health[0], int(points.health[1]), cosine

@@ -1,15 +1,79 @@
-"""The problem of every estimator of self-calibration: the platform, its noise, the prior, the filter."""
+"""The problem of every estimator of self-calibration: the platform, its noise, the prior, the near-level gate.
+
+An accelerometer near level reads close to zero; a gate stops it within a first angle of that, and takes it up again
+beyond a second, larger one. Off unless asked for: it only loses information, as the comparison of bounds shows.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal._jit import kernel
 from inercal.arrays import Array
-from inercal.selfcal.filters.gating import Gate, gate_of
+from inercal.geometry.kernels import Vector
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.settings import Filter, Noise, SelfcalSettings
+from inercal.selfcal.settings import Filter, Gating, Noise, SelfcalSettings
+
+OFF, ANY, TWO, CHANNEL = range(4)
+"""Rules of a gate."""
+
+_RULES: Final = {"any": ANY, "two": TWO, "channel": CHANNEL}
+
+
+class Gate(NamedTuple):
+    """The gate as kernels take it: its ``rule``; true if the ``whole_step`` of update stops; sines of the angles within
+    which an accelerometer is ``near`` level, and beyond which it is ``far`` from it."""
+
+    rule: int
+    whole_step: bool
+    near: float
+    far: float
+
+
+def gate_of(gating: Gating | None) -> Gate:
+    """The gate of the settings, off where there is none."""
+    if gating is None:
+        return Gate(OFF, False, 0.0, 0.0)
+    return Gate(_RULES[gating.rule], gating.stops == "step", math.sin(gating.near), math.sin(gating.far))
+
+
+@kernel
+def watch(f: Vector, gate: Gate, near: NDArray[np.int64]) -> None:
+    """Update which accelerometers are ``near`` (3,) level, from the specific force of the encoders' attitude."""
+    if gate.rule == OFF:
+        return
+    g = math.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    for i in range(3):
+        if abs(f[i]) < gate.near * g:
+            near[i] = 1
+        elif abs(f[i]) > gate.far * g:
+            near[i] = 0
+
+
+@kernel
+def admitted(i: int, gate: Gate, near: NDArray[np.int64]) -> bool:
+    """True if accelerometer ``i`` takes part."""
+    count = near[0] + near[1] + near[2]
+    if gate.rule == ANY:
+        return bool(count == 0)
+    if gate.rule == TWO:
+        return bool(count < 2)
+    return bool(gate.rule == OFF or near[i] == 0)
+
+
+@kernel
+def updating(gate: Gate, near: NDArray[np.int64]) -> bool:
+    """False where the whole step of update stops, encoders too: with rule ``channel`` as soon as one is near level."""
+    if gate.rule == OFF or not gate.whole_step:
+        return True
+    count = near[0] + near[1] + near[2]
+    return bool(count < 2) if gate.rule == TWO else bool(count == 0)
 
 
 class NoiseLevels(NamedTuple):
@@ -21,7 +85,7 @@ class NoiseLevels(NamedTuple):
     encoder: float
 
 
-class Model(NamedTuple):
+class FilterModel(NamedTuple):
     """The platform as kernels take it."""
 
     world: World
@@ -39,11 +103,11 @@ class FilterProblem:
     filter: Filter = field(default_factory=Filter)
 
     @cached_property
-    def model(self) -> Model:
+    def model(self) -> FilterModel:
         """World, noise and near-level gate, for kernels."""
         noise = self.noise
         levels = NoiseLevels(float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder))
-        return Model(self.world, levels, gate_of(self.filter.gating))
+        return FilterModel(self.world, levels, gate_of(self.filter.gating))
 
 
 def problem(settings: SelfcalSettings) -> FilterProblem:

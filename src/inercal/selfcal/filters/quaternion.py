@@ -25,14 +25,13 @@ from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import covariance, cross, draw, empty_points, mean, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
+from inercal.selfcal.estimators import FACTOR_OF
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Model, Start
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, joint_axes, nearest_turn
 from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.settings import FACTOR_OF
 
 Columns: TypeAlias = tuple[Quaternion, Quaternion, Quaternion]
 
@@ -109,7 +108,7 @@ def _noise_of_encoders(q: Quaternion, th: Array, world: World, sigma: float, S: 
                 S[i, k] += half * j[i] * j[k]
 
 
-class Turn(NamedTuple):
+class QuaternionStep(NamedTuple):
     """A step of the platform: its ``commanded`` rate (3,) [rad/s], ``dt`` [s], and ``walk``, the deviation of the
     points of the process noise, half of an angle [rad]."""
 
@@ -118,7 +117,7 @@ class Turn(NamedTuple):
     walk: float
 
 
-class Readings(NamedTuple):
+class PointReadings(NamedTuple):
     """Attitudes and accelerometers of all points: ``centre`` (7,) those of the centre; ``z`` (1 + 2 n + 6, 7) those of
     all less those of the centre: centre, + and - by turns, noise; ``odd`` (n, 7) + less - of each pair."""
 
@@ -129,7 +128,7 @@ class Readings(NamedTuple):
 
 @kernel
 def _propagate(
-    q: Quaternion, c: Array, columns: Array, turn: Turn, world: World, ck: Array, out: Readings
+    q: Quaternion, c: Array, columns: Array, turn: QuaternionStep, world: World, ck: Array, out: PointReadings
 ) -> None:
     """Take all points through a step and read the accelerometers there.
 
@@ -175,7 +174,7 @@ def _propagate(
 
 @kernel
 def _advance(
-    state: State, model: Model, factor: int, steps: Steps, out: Estimates
+    state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
@@ -194,7 +193,9 @@ def _advance(
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         draw(P, factor, spread, points)
         walk = spread * 0.5 * noise.angle_random_walk * math.sqrt(dt)
-        _propagate(q, c, points.columns, Turn(w, dt, walk), world, ck, Readings(centre, z, odd))
+        _propagate(
+            q, c, points.columns, QuaternionStep(w, dt, walk), world, ck, PointReadings(centre, z, odd)
+        )
 
         # moments: the centre has no weight, and all points that were not written lie there
         mean(z, 0.0, other, shift)

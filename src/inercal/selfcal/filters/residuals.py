@@ -6,6 +6,7 @@ linear form. Derivatives are those of the model, so that a residual changes by m
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,16 +26,17 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.selfcal.filters.gating import admitted, updating, watch
-from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.estimators import FilterKind
+from inercal.selfcal.filters.filter_result import FilterResult, History
+from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, updating, watch
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
-from inercal.selfcal.platform.linearised import FLOOR
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class Measurements:
     """Measurements of m rows, of which those missing or stopped by the near-level gate weigh nothing.
 
     Attributes
@@ -61,7 +63,7 @@ class Readings:
         return np.asarray(np.count_nonzero(self.used, axis=1))
 
 
-def readings(recording: Recording, problem: FilterProblem) -> Readings:
+def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     """The measurements of all rows but the first."""
     acc, th = recording.acc[1:], recording.th[1:]
     seen = np.all(np.isfinite(th), axis=1)
@@ -69,9 +71,9 @@ def readings(recording: Recording, problem: FilterProblem) -> Readings:
     used = np.column_stack([np.isfinite(acc), np.repeat(seen[:, None], 3, axis=1)])
     if problem.filter.gating is not None:
         used &= _gate(attitude, seen, problem)
-    covariance = joints @ np.swapaxes(joints, 1, 2) + FLOOR**2 * np.eye(3)
+    covariance = joints @ np.swapaxes(joints, 1, 2) + LIMITS.encoder_floor**2 * np.eye(3)
     root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
-    return Readings(
+    return Measurements(
         np.where(used[:, :3], acc, 0.0),
         used[:, :3] / problem.noise.accelerometer,
         attitude,
@@ -107,7 +109,7 @@ def _gate(attitude: Array, seen: NDArray[np.bool_], problem: FilterProblem) -> N
     return passed
 
 
-def normalised(residual: Array, measured: Readings, attitude_variance: Array | float = 0.0) -> Array:
+def normalised(residual: Array, measured: Measurements, attitude_variance: Array | float = 0.0) -> Array:
     """Residuals (m, 6), whitened, each over its own standard deviation instead; NaN where not measured.
 
     ``attitude_variance`` (m, 1) [rad^2] is added to that of the encoders' attitude about each axis.
@@ -117,10 +119,40 @@ def normalised(residual: Array, measured: Readings, attitude_variance: Array | f
     return np.where(measured.used, np.hstack([residual[:, :3], encoders / np.sqrt(variance)]), np.nan)
 
 
-def least_cosine(recording: Recording) -> float:
-    """Least |cos thy| that the encoders read."""
+def batch_result(
+    kind: FilterKind,
+    recording: Recording,
+    measured: Measurements,
+    path: tuple[Array, Array],
+    coefficients: tuple[Array, Array],
+    nis: Array,
+    innovations: Array | None,
+    message: str,
+) -> FilterResult:
+    """Result of an estimator of whole recordings, but its time.
+
+    ``path``: attitudes (n, 4) and standard deviations (n, 3) [rad]; ``coefficients`` (p,) and their covariance (p, p);
+    ``innovations`` (m, 6), None where no history is wanted; ``message`` says why it did not converge.
+    """
+    (c, covariance), rows = coefficients, len(recording.t)
+    history = None
+    if innovations is not None:
+        history = History(*path, np.tile(c, (rows, 1)), np.tile(np.sqrt(np.diag(covariance)), (rows, 1)))
     cosine = np.abs(np.cos(recording.th[:, 1]))
-    return float(np.min(cosine, where=np.isfinite(cosine), initial=1.0))
+    return FilterResult(
+        kind=kind,
+        coefficients=c,
+        covariance=covariance,
+        attitude=path[0][-1],
+        nis=nis,
+        dims=measured.dims,
+        innovations=np.empty((0, 6)) if innovations is None else innovations,
+        history=history,
+        seconds=math.nan,
+        converged=not message,
+        message=message,
+        gimbal_cosine=float(np.min(cosine, where=np.isfinite(cosine), initial=1.0)),
+    )
 
 
 def first_reading(recording: Recording, problem: FilterProblem) -> Start:
@@ -157,7 +189,7 @@ class Sensed(NamedTuple):
     by_coefficients: Array
 
 
-def sensed(q: Array, c: Array, measured: Readings, world: World) -> Sensed:
+def sensed(q: Array, c: Array, measured: Measurements, world: World) -> Sensed:
     """Compare measurements with attitudes (m, 4) and coefficients (p,)."""
     base = on_base(c, world)
     back = conjugate(q)

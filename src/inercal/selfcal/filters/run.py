@@ -10,6 +10,9 @@ from types import ModuleType
 import numpy as np
 
 from inercal.estimate.factor import NEGATIVE
+from inercal.selfcal.estimators import FilterKind
+from inercal.selfcal.filters import error_state, gimbal, multiplicative, quaternion
+from inercal.selfcal.filters.batch import estimate_map
 from inercal.selfcal.filters.filter_result import (
     FilterResult,
     History,
@@ -20,11 +23,9 @@ from inercal.selfcal.filters.filter_result import (
 )
 from inercal.selfcal.filters.gaps import advance
 from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.filters.start import estimate_lm
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording, Steps
-from inercal.selfcal.settings import FilterKind
-
-LOCK = 0.01
-"""Least |cos thy| at which the gimbal angles of a model can still be used."""
 
 _LOADED = set[FilterKind]()
 """Recursive filters whose kernels this process has; their types do not depend on the problem."""
@@ -32,23 +33,10 @@ _LOADED = set[FilterKind]()
 
 def recursive(kind: FilterKind) -> ModuleType | None:
     """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
-    if kind == "error-state":
-        from inercal.selfcal.filters import error_state
-
-        return error_state
-    if kind == "svd-qukf":
-        from inercal.selfcal.filters import quaternion
-
-        return quaternion
-    if kind == "mukf":
-        from inercal.selfcal.filters import multiplicative
-
-        return multiplicative
-    if kind == "gimbal-ukf":
-        from inercal.selfcal.filters import gimbal
-
-        return gimbal
-    return None
+    return {
+        "error-state": error_state, "mukf": multiplicative, "svd-qukf": quaternion, "gimbal-ukf": gimbal,
+        "map": None, "lm": None,
+    }[kind]  # fmt: skip
 
 
 def estimate(
@@ -58,25 +46,14 @@ def estimate(
     start: Start | None = None,
     history: bool = True,
 ) -> FilterResult:
-    """Estimate the coefficients from a recording.
+    """Estimate the coefficients from a recording, by the estimator of the problem or another ``kind``.
 
-    Parameters
-    ----------
-    recording : Recording
-    problem : FilterProblem
-    kind : str, optional
-        Of the estimator; that of the problem if absent.
-    start : Start, optional
-        Of the attitude; the first encoder reading if absent.
-    history : bool
-        Keep the estimates after each row.
+    ``start`` of the attitude is the first encoder reading if absent; with ``history`` the estimates after each row are
+    kept.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
     if module is None:
-        from inercal.selfcal.filters.batch import estimate_map
-        from inercal.selfcal.filters.start import estimate_lm
-
         whole = estimate_map if kind == "map" else estimate_lm
         return whole(recording, problem, start, history)
     load_kernels(kind, problem)
@@ -117,13 +94,8 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
 
 def _history(first: History, trace: Trace) -> History:
     """The estimates of the start and of all steps."""
-    out = trace.estimates
-    return History(
-        np.concatenate([first.attitude, out.attitude]),
-        np.concatenate([first.attitude_u, out.attitude_u]),
-        np.concatenate([first.coefficients, out.coefficients]),
-        np.concatenate([first.u, out.u]),
-    )
+    of_steps = trace.estimates._asdict()
+    return History(**{name: np.concatenate([row, of_steps[name]]) for name, row in vars(first).items()})
 
 
 def _fault(result: FilterResult) -> str:
@@ -131,14 +103,14 @@ def _fault(result: FilterResult) -> str:
     variances = np.diag(result.covariance)
     numbers = (result.coefficients, result.covariance, result.attitude)
     if not all(np.isfinite(each).all() for each in numbers):
-        at = " where the gimbals lock" if result.gimbal_cosine < LOCK else ""
+        at = " where the gimbals lock" if result.gimbal_cosine < LIMITS.singular_cosine else ""
         return f"the filter diverged{at}: coefficients or covariance are not finite"
     if not (variances > 0.0).all() or result.lowest_eigenvalue < NEGATIVE:
         return (
             "the covariance lost its positive sign (lowest eigenvalue of the correlation matrix "
             f"{result.lowest_eigenvalue:.1e}): use another filter or factor"
         )
-    if result.kind == "gimbal-ukf" and result.gimbal_cosine < LOCK:
+    if result.kind == "gimbal-ukf" and result.gimbal_cosine < LIMITS.singular_cosine:
         angle = math.degrees(math.acos(result.gimbal_cosine))
         return (
             f"the inner gimbal came to {angle:.2f} deg, where outer and platform axis coincide and the gimbal-angle "

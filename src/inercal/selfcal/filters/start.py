@@ -17,6 +17,7 @@ observations and the singular value decomposition", J. Astronautical Sciences 36
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,15 +36,15 @@ from inercal.geometry.rotations import (
     rotate,
     to_matrix,
 )
-from inercal.selfcal.filters.filter_result import FilterResult, History
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import broken
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.residuals import (
-    Readings,
+    Measurements,
     Sensed,
+    batch_result,
     first_reading,
     followed,
-    least_cosine,
     normalised,
     on_base,
     readings,
@@ -59,24 +60,10 @@ def estimate_lm(
 ) -> FilterResult:
     """Least squares over the first attitude and the coefficients, without gyro noise in the dynamics.
 
-    Parameters
-    ----------
-    recording : Recording
-        Accelerometers alone are enough. Missing measurements (NaN) are left out, and those that the near-level gate
-        stops.
-    problem : FilterProblem
-    start : Start, optional
-        Of the first attitude; its encoder reading if absent.
-    history : bool
-        Return attitudes, their standard deviations, and innovations.
-
-    Returns
-    -------
-    FilterResult
-        Uncertainties include the wander that gyro noise causes, though estimates are not weighted for it: they are
-        wider than the bound. ``nis`` of a row: squared residuals over the covariance of noise and of the wander up to
-        the row, and an equal share of those of the prior; its mean is somewhat below 6, as the fit takes part of the
-        wander up. ``innovations`` likewise.
+    Accelerometers alone are enough; arguments as of `inercal.selfcal.filters.batch.estimate_map`. Uncertainties include
+    the wander that gyro noise causes, though estimates are not weighted for it: they are wider than the bound. ``nis``
+    of a row: squared residuals over the covariance of noise and of the wander up to it, and an equal share of those of
+    the prior; its mean is somewhat below 6, as the fit takes part of the wander up. ``innovations`` likewise.
     """
     import scipy.optimize  # noqa: F401  as the kernel, loaded before time is taken
 
@@ -104,27 +91,13 @@ def estimate_lm(
     nis = np.einsum("ki,ki->k", residual, weighted)
     of_prior = fit.residuals[: 3 + len(problem.prior)]
     nis += of_prior @ of_prior / max(int(np.count_nonzero(measured.dims)), 1)
-    past, innovations = None, np.empty((0, 6))
+    nis, innovations = np.where(measured.dims > 0, nis, np.nan), None
     if history:
-        rows = [np.tile(a, (len(u), 1)) for a in (at.c, np.sqrt(np.diag(covariance)))]
-        past = History(at.q, u, *rows)
         over = residual.copy()
         over[:, :3] /= np.sqrt(np.diagonal(spread, axis1=1, axis2=2)[:, :3])
         innovations = normalised(over, measured, wander[:, None])
-    return FilterResult(
-        kind="lm",
-        coefficients=at.c,
-        covariance=covariance,
-        attitude=at.q[-1],
-        nis=np.where(measured.dims > 0, nis, np.nan),
-        dims=measured.dims,
-        innovations=innovations,
-        history=past,
-        seconds=time.perf_counter() - began,
-        converged=not message,
-        message=message,
-        gimbal_cosine=least_cosine(recording),
-    )
+    result = batch_result("lm", recording, measured, (at.q, u), (at.c, covariance), nis, innovations, message)
+    return replace(result, seconds=time.perf_counter() - began)
 
 
 def rough_path(recording: Recording, problem: FilterProblem, start: Start) -> tuple[Array, Array]:
@@ -133,7 +106,7 @@ def rough_path(recording: Recording, problem: FilterProblem, start: Start) -> tu
     return at.q, at.c
 
 
-def wahba(recording: Recording, problem: FilterProblem, measured: Readings, start: Start) -> Array:
+def wahba(recording: Recording, problem: FilterProblem, measured: Measurements, start: Start) -> Array:
     """First attitude (4,) from measurements as they are, in closed form.
 
     Turned back to the first row by the commanded rates, specific forces a_k are C^T u_k, with u_k the vertical as earth
@@ -180,7 +153,7 @@ class _Along(NamedTuple):
 
 
 def _along(
-    x: Array, guess: Array, recording: Recording, problem: FilterProblem, measured: Readings
+    x: Array, guess: Array, recording: Recording, problem: FilterProblem, measured: Measurements
 ) -> _Along:
     """The path of unknowns x (3 + p,): rotation vector [rad] from ``guess``, coefficients over their prior."""
     c, since = problem.prior * x[3:], recording.t - recording.t[0]
@@ -204,7 +177,7 @@ def _along(
 
 
 def _fit(
-    recording: Recording, problem: FilterProblem, measured: Readings, start: Start
+    recording: Recording, problem: FilterProblem, measured: Measurements, start: Start
 ) -> tuple[NonlinearFit, _Along]:
     """Fit the unknowns of `_along`, from those of `wahba`, to the start, the prior and the measurements."""
     guess, size = wahba(recording, problem, measured, start), 3 + len(problem.prior)

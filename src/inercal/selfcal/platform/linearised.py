@@ -18,12 +18,13 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row
 from inercal.geometry.kernels import Quaternion, Vector, exp, right_jacobian, rotate
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import Axes, joint_axes
 
 Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
-FLOOR = 0.05
-"""Part of the encoder noise that is taken for isotropic, against infinite information at gimbal lock."""
+FLOOR = LIMITS.encoder_floor
+"""As kernels take it."""
 
 WIDEST = 10
 """Most entries of a row of the model."""

@@ -10,13 +10,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.selfcal.platform.rig import JOINTS, World
 
 JointName = Literal["x", "y", "z"]
-
-MOST_ROWS = 5_000_000
-"""Most rows of a plan that fit into memory with all that is computed from them."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +38,7 @@ class Rest:
 Move: TypeAlias = Turn | Rest
 
 
+@short_repr
 @dataclass(frozen=True)
 class Plan:
     """Moves one after the other from the angles ``start`` [rad], with rows every ``step`` [s].
@@ -98,7 +96,7 @@ def _words(move: Move) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class CommandedMotion:
     """Motion that a plan commands: ``t`` (n,) [s], nominal ``angles`` (n, 3) [rad], ``rate`` (n - 1, 3) [rad/s].
 
     ``rate`` is that of the platform against inertial space, in p, held from each row to the next.
@@ -109,7 +107,7 @@ class Motion:
     rate: Array
 
 
-def motion(plan: Plan, world: World) -> Motion:
+def motion(plan: Plan, world: World) -> CommandedMotion:
     """The commanded motion of a plan: ``w_c = J(th) th' + C_pb w_Ib^b`` at the middle of each step."""
     from inercal.selfcal.platform.kinematics import (
         commanded_rates,  # here, so that reading a study loads no compiler
@@ -118,7 +116,7 @@ def motion(plan: Plan, world: World) -> Motion:
     angles = plan.angles()
     rate = np.empty((len(angles) - 1, 3))
     commanded_rates(angles, plan.step, world.earth, world.axes, world.signs, rate)
-    return Motion(plan.step * np.arange(len(angles), dtype=float), angles, rate)
+    return CommandedMotion(plan.step * np.arange(len(angles), dtype=float), angles, rate)
 
 
 #: name -> pairs of joint and angle [deg], all at 1 deg/s

@@ -12,16 +12,16 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
-from inercal.selfcal.before.bounds import Bounds
+from inercal.selfcal.before.bounds import PathBounds
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import names, to_product
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.result.systematic import statements
+from inercal.selfcal.result.systematic import systematic_inputs
 from inercal.selfcal.settings import Noise, SelfcalSettings
 
 
-def within(covariance: Array, bounds: Bounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
+def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
     """Noise and prior, whose covariances add up to that of the filter (p, p), product form.
 
     Bounds and filter differ by little; ``T`` with ``T P_bounds T^T = P_filter`` takes the parts of one to the other.
@@ -70,7 +70,7 @@ def systematic(
         Input stated without one -> the error of it, in words, that does as much as one u of a coefficient.
     """
     sources, exact = list[TypeB](), dict[str, str]()
-    for statement in statements(settings):
+    for statement in systematic_inputs(settings):
         by = statement.u or statement.step
         ends = [
             to_product(

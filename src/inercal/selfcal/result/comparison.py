@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
 
 import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded, short
 from inercal.estimate.table import Table
+from inercal.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.platform.coefficients import names, shown_units
 
-FILTERS: Final[Mapping[str, str]] = {
-    "error-state": "error-state filter",
-    "mukf": "multiplicative sigma-point filter",
-    "svd-qukf": "quaternion sigma-point filter",
-    "gimbal-ukf": "gimbal-angle sigma-point filter",
-    "map": "batch, largest posterior",
-    "lm": "batch, Levenberg-Marquardt",
-}
-"""Estimators in words."""
-
 
 def side_by_side(
-    filters: Mapping[str, FilterResult], truth: Array | None, interval: float, status: Mapping[str, str]
+    filters: Mapping[FilterKind, FilterResult],
+    truth: Array | None,
+    interval: float,
+    status: Mapping[str, str],
 ) -> list[Table]:
     """Tables of estimates, of differences or errors, and of verdict and time.
 
@@ -74,7 +67,7 @@ def side_by_side(
         costs.append(
             (
                 kind,
-                FILTERS.get(kind, ""),
+                ESTIMATORS[kind].words,
                 status.get(kind, "ok" if each.converged else "not converged").replace("_", " "),
                 short(each.nis_mean, 3),
                 short(float(np.nanmax(apart)) if np.isfinite(apart).any() else np.nan),
@@ -106,7 +99,7 @@ def side_by_side(
 
 
 def _apart(
-    by_filter: Mapping[str, tuple[Array, Array]], values: Array, u: Array, true: Array | None
+    by_filter: Mapping[FilterKind, tuple[Array, Array]], values: Array, u: Array, true: Array | None
 ) -> Table:
     """Errors in percent of the truth where that is known, else differences from the first in its uncertainties."""
     heads = [(kind, "") for kind in by_filter]

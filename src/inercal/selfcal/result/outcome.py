@@ -18,19 +18,20 @@ from inercal.estimate.result import Estimate
 from inercal.findings import CODES, EVERYTHING, Finding, Status, causes
 from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted
-from inercal.selfcal.before.bounds import Bounds
-from inercal.selfcal.before.observability import Seen, seen, singular, useless
+from inercal.selfcal.before.bounds import PathBounds
+from inercal.selfcal.before.observability import Observability, observability, singular, useless
 from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
+from inercal.selfcal.estimators import ESTIMATORS, FACTOR_OF
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import LOCK
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.budget import systematic, within
 from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.settings import FACTOR_OF, SelfcalSettings
+from inercal.selfcal.settings import SelfcalSettings
 
 COMMAND = "selfcal"
 
@@ -55,39 +56,15 @@ REFERENCES = (
     "73-865 (1973)",
 )
 
-_SIGMA_POINTS = (
-    "S. J. Julier, J. K. Uhlmann, Unscented filtering and nonlinear estimation, Proceedings of the IEEE 92 (2004) "
-    "401"
-)
-_BY_KIND = {
-    "error-state": (
-        "E. J. Lefferts, F. L. Markley, M. D. Shuster, Kalman filtering for spacecraft attitude estimation, Journal of "
-        "Guidance, Control, and Dynamics 5 (1982) 417",
-    ),
-    "mukf": (
-        _SIGMA_POINTS,
-        "J. L. Crassidis, F. L. Markley, Unscented filtering for spacecraft attitude estimation, Journal of Guidance, "
-        "Control, and Dynamics 26 (2003) 536",
-    ),
-    "svd-qukf": (_SIGMA_POINTS,),
-    "gimbal-ukf": (_SIGMA_POINTS,),
-}
-
 #: axis of p -> coefficients that only a turn about it shows well
 _BY_AXIS = (("ds_z", "do_y"), ("ds_x", "do_z"), ("ds_y", "do_x"))
-
-
-def _factor(kind: str, settings: SelfcalSettings) -> dict[str, str]:
-    """The factor of the covariance that a sigma-point filter took; nothing of an estimator without one."""
-    own = next((factor for name, factor in FACTOR_OF.items() if name == kind), None)
-    return {} if own is None else {"factor": settings.filter.factor or own}
 
 
 def assemble(
     recording: Recording,
     settings: SelfcalSettings,
     filtered: FilterResult,
-    bounds: Bounds,
+    bounds: PathBounds,
     findings: Sequence[Finding] = (),
 ) -> Estimate:
     """Put the estimate together.
@@ -97,7 +74,7 @@ def assemble(
     recording : Recording
     settings : SelfcalSettings
     filtered : FilterResult
-    bounds : Bounds
+    bounds : PathBounds
         Along the path as it was estimated, with ``contributions``.
     findings : sequence of Finding
         Of the diagnosis, beside those of the recording.
@@ -108,19 +85,19 @@ def assemble(
         settings,
         recording.sources,
         MODEL + (EXTENSION if settings.filter.extended else ""),
-        REFERENCES + _BY_KIND.get(filtered.kind, ()),
+        REFERENCES + ESTIMATORS[filtered.kind].publications,
         _conditions(recording, settings),
     )
     read = {each.code for each in recording.findings} - {"gap", "outlier"}
     all_findings = [*recording.findings, *(each for each in findings if each.code not in read)]
-    if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LOCK:
+    if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LIMITS.singular_cosine:
         angle = math.degrees(math.acos(filtered.gimbal_cosine))
         text = f"the inner gimbal comes to {angle:.2f} deg, where the gimbal-angle model does not hold"
         all_findings.append(Finding("gimbal_lock", text, harm=EVERYTHING))
-    interval = float(np.median(recording.dt))
+    interval, own = float(np.median(recording.dt)), FACTOR_OF.get(filtered.kind)
     result: dict[str, Any] = {
         "filter": filtered.kind,
-        **_factor(filtered.kind, settings),
+        **({"factor": settings.filter.factor or own} if own else {}),
         "bounds": {},
         "at_prior": [],
         "goal": {},
@@ -150,7 +127,7 @@ def assemble(
     effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
     u = uncertainty.u
 
-    judged = seen(replace(bounds, covariance=by_filter), settings.goal)
+    judged = observability(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
     hidden = _hidden(judged, u / bounds.prior, budget)
     result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
@@ -197,13 +174,13 @@ def verdict(
 ) -> tuple[Status, str]:
     """Status and sentence of an estimator, for comparisons."""
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
-    bounds = Bounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
+    bounds = PathBounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
     if (unusable := useless(filtered, bounds, bounds.covariance)) is not None:
         return unusable
     agreement = nis(filtered.nis, filtered.dims)
     cause = _cause(findings, recording.findings)
     limit = _limit(agreement, recording, settings)
-    return _verdict(seen(bounds, {}), agreement, limit, cause, _hardly_turned(recording, settings))
+    return _verdict(observability(bounds, {}), agreement, limit, cause, _hardly_turned(recording, settings))
 
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
@@ -222,14 +199,14 @@ def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> f
     """
     errors, of = stated_errors(settings), problem(settings)
     if errors is None:
-        return agreement.limit()
+        return agreement.limit(LIMITS.nis_sigmas)
     moved = likely(recording, of, errors)
     before, after = (float(np.nansum(judging((recording, each)).nis)) for each in (of, moved))
-    return agreement.limit() + max(0.0, before - after) / agreement.rows
+    return agreement.limit(LIMITS.nis_sigmas) + max(0.0, before - after) / agreement.rows
 
 
 def _verdict(
-    judged: Seen, agreement: Nis, limit: float, cause: str, hints: Mapping[str, str]
+    judged: Observability, agreement: Nis, limit: float, cause: str, hints: Mapping[str, str]
 ) -> tuple[Status, str]:
     """Status and sentence of numbers that can be used."""
     if agreement.mean > limit:
@@ -261,20 +238,20 @@ def _verdict(
 def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str, str]:
     """Coefficients that only a turn about one axis of p shows well, where there is none -> advice."""
     earth = float(np.linalg.norm(settings.world.earth))
-    moving = np.abs(recording.rate).max(axis=1) > 2.0 * earth
-    turned = np.degrees((np.abs(recording.rate) * recording.dt[:, None])[moving].sum(axis=0))
+    moving = np.abs(recording.rate).max(axis=1) > LIMITS.turning_ratio * earth
+    turned = (np.abs(recording.rate) * recording.dt[:, None])[moving].sum(axis=0)
     words = dict[str, str]()
     for axis, coefficients in zip("XYZ", _BY_AXIS, strict=True):
-        if (by := float(turned["XYZ".index(axis)])) < 45.0:
+        if (by := float(turned["XYZ".index(axis)])) < LIMITS.turned_angle:
             text = (
-                f"{axis}_p is turned by {by:.2g} deg in all, so that {' and '.join(coefficients)} see little more "
-                f"than earth rate: add turns with {axis}_p along the turning axis"
+                f"{axis}_p is turned by {math.degrees(by):.2g} deg in all, so that {' and '.join(coefficients)} see "
+                f"little more than earth rate: add turns with {axis}_p along the turning axis"
             )
             words |= dict.fromkeys(coefficients, text)
     return words
 
 
-def _left_at_prior(judged: Seen, hints: Mapping[str, str]) -> list[Finding]:
+def _left_at_prior(judged: Observability, hints: Mapping[str, str]) -> list[Finding]:
     """Coefficients of which more than half of the prior is left."""
     ratio = dict(zip(judged.learned.names, judged.learned.ratio, strict=True))
     return [
@@ -285,7 +262,9 @@ def _left_at_prior(judged: Seen, hints: Mapping[str, str]) -> list[Finding]:
     ]
 
 
-def _hidden(judged: Seen, ratio: Array, budget: Sequence[BudgetItem]) -> dict[str, tuple[float, str]]:
+def _hidden(
+    judged: Observability, ratio: Array, budget: Sequence[BudgetItem]
+) -> dict[str, tuple[float, str]]:
     """Coefficients that the path shows, but a systematic input hides: u over prior, and why."""
     hidden = {}
     for name, left in zip(judged.learned.names, ratio, strict=True):

@@ -17,7 +17,7 @@ _SECOND = ("arcsec", _DEG / 3600.0)
 
 
 @dataclass(frozen=True)
-class Statement:
+class SystematicInput:
     """One systematic input: its ``u`` (0 if exact), a ``step`` for the derivative, the study with it ``changed``, and
     the ``unit`` in which its errors are shown, of ``size`` SI units."""
 
@@ -29,7 +29,7 @@ class Statement:
     size: float
 
 
-def statements(settings: SelfcalSettings) -> list[Statement]:
+def systematic_inputs(settings: SelfcalSettings) -> list[SystematicInput]:
     """The systematic inputs; beta, with its prior, takes the place of heading and tilt."""
     site, base = settings.site, settings.base
 
@@ -39,10 +39,10 @@ def statements(settings: SelfcalSettings) -> list[Statement]:
     by_gravity = (each for each in site.inputs if each.source != "latitude")
     gravity_u = math.hypot(*(each.u * each.sensitivity for each in by_gravity))
     of_site = [
-        Statement(
+        SystematicInput(
             "latitude", site.latitude_u, 1e-4, lambda by: _moved(settings, by), "deg", _DEG
         ),
-        Statement(
+        SystematicInput(
             "gravity", gravity_u, 1e-5 * site.gravity,
             lambda by: replace(settings, site=replace(site, gravity=site.gravity + by)), "m/s^2", 1.0,
         ),
@@ -52,13 +52,13 @@ def statements(settings: SelfcalSettings) -> list[Statement]:
     north, east = base.tilt
     return [
         *of_site,
-        Statement(
+        SystematicInput(
             "heading", base.heading_u, 1e-4, lambda by: with_base(heading=base.heading + by), "deg", _DEG
         ),
-        Statement(
+        SystematicInput(
             "tilt about north", base.tilt_u[0], 1e-6, lambda by: with_base(tilt=(north + by, east)), *_SECOND
         ),
-        Statement(
+        SystematicInput(
             "tilt about east", base.tilt_u[1], 1e-6, lambda by: with_base(tilt=(north, east + by)), *_SECOND
         ),
     ]
@@ -85,7 +85,7 @@ def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
 
     They are small enough for changes of earth rate and gravity to add up.
     """
-    uncertain = [each for each in statements(settings) if each.u]
+    uncertain = [each for each in systematic_inputs(settings) if each.u]
     if not uncertain:
         return None
     here = settings.world

@@ -14,7 +14,7 @@ from inercal.selfcal.platform.coefficients import shown_units
 from inercal.selfcal.platform.plan import Plan, Turn
 
 if TYPE_CHECKING:
-    from inercal.selfcal.before.bounds import Bounds
+    from inercal.selfcal.before.bounds import PathBounds
     from inercal.selfcal.before.path_design import Designed
     from inercal.selfcal.monte_carlo import Campaign
 
@@ -24,7 +24,7 @@ _WEAKEST = 6
 _JOINTS = {"x": "outer", "y": "inner", "z": "platform"}
 
 
-def weak_combinations(bounds: Bounds) -> Table:
+def weak_combinations(bounds: PathBounds) -> Table:
     """Combinations of coefficients that a path shows least, in words, each in units of its prior."""
     weak = learned(bounds.covariance, bounds.prior, bounds.names)
     unseen = int((weak.left > HALF_SEEN).sum())
@@ -98,16 +98,16 @@ def paths(designed: Designed) -> Table:
     """The path found beside others of the same time."""
     rows = []
     for each in designed.compare:
-        learned = each.seen.learned
+        learned = each.observability.learned
         worst = int(np.argmax(learned.ratio))
         rows.append(
             (
                 each.name,
                 each.plan.words(),
-                ", ".join(each.seen.at_prior) or "none",
+                ", ".join(each.observability.at_prior) or "none",
                 ", ".join(each.beyond) or "none",
                 f"{each.plan.duration:.6g}",
-                f"{each.seen.rank} of {len(learned.left)}",
+                f"{each.observability.rank} of {len(learned.left)}",
                 f"{short(100.0 * float(learned.ratio[worst]))} ({learned.names[worst]})",
                 short(each.criterion),
             )
@@ -134,10 +134,10 @@ def paths(designed: Designed) -> Table:
 
 def bounds_by_path(designed: Designed) -> Table:
     """Bounds of every path, in units of the field."""
-    bounds = [each.seen.bounds for each in designed.compare]
+    bounds = [each.observability.bounds for each in designed.compare]
     units, size = shown_units(len(bounds[0].names))
     first = designed.compare[0]
-    to_goal = first.seen.to_goal
+    to_goal = first.observability.to_goal
 
     def of_goal(name: str) -> tuple[str, ...]:
         return (short(to_goal.get(name, np.nan)),) if to_goal else ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from inercal.arrays import short_repr
 from inercal.errors import StudyError
 from inercal.estimate.result import Estimate
 from inercal.records.record import Record
@@ -15,6 +16,7 @@ from inercal.turntable.readings import Readings, readings
 from inercal.turntable.settings import TurntableSettings
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class PositionCalibration:
     """An ``estimate``, and the evidence behind it for pictures and tests."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.designs.allowed import insensitive, within
 from inercal.designs.candidates import Candidates
 from inercal.designs.comparison import PlanFigures, judge
@@ -62,6 +62,7 @@ class JudgedPlan:
         return earth_rate_of(self.model)
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Designed:
     """A plan that was searched for.

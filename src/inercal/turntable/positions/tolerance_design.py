@@ -68,6 +68,11 @@ class Trial:
         """Positions taken, repeats counted."""
         return len(self.plan) * self.repeats
 
+    @property
+    def angles(self) -> Array:
+        """Joint angles (n, joints) [rad] of the positions, repeats among them."""
+        return np.tile(self.plan.angles, (self.repeats, 1))
+
     def parts(self, x: Array) -> tuple[Array, Array, Array]:
         """Ratios to the goals by noise (g,), by inputs beside the table (g, b), by errors at their present size (g, k).
 
@@ -75,21 +80,20 @@ class Trial:
         """
         chain = self.model.chain
         none = np.zeros_like(self.noise)
-        table = weights_of(chain, self.slopes, self.beside, none, self.samples, chain.std * x)
+        table = weights_of(chain, self.slopes, self.angles, self.beside, none, self.samples, chain.std * x)
         noise = np.maximum(self.noise, least_noise(table.within))
         weight = replace(table, within=table.within + np.diag(np.square(noise)))
         gain = solve(self.rows, np.zeros(self.rows.shape[:2]), weight).gain
         moved = averaged(chain, self.slopes, self.samples) * chain.std
-        constant = np.array([error.scope.constant for error in chain.errors], dtype=bool)
+        # positions of one value move together: 1 where position n has the value v of an error
+        values = [np.eye(numbers.max() + 1)[:, numbers] for numbers in chain.groups(self.angles)]
         by_noise, by_input, by_error = [], [], []
         for wanted in self.wanted:
             own = np.einsum("rp,pnc->rnc", wanted, gain)
             by_noise.append(np.square(own * noise).sum())
             by_input.append(np.square(np.einsum("rnc,ncb->rb", own, self.beside)).sum(axis=0))
-            each = np.einsum("rnc,nck->rnk", own, moved)
-            by_error.append(
-                np.where(constant, np.square(each.sum(axis=1)).sum(axis=0), np.square(each).sum(axis=(0, 1)))
-            )
+            each = np.einsum("rnc,nck->knr", own, moved)
+            by_error.append([np.square(value @ one).sum() for value, one in zip(values, each, strict=True)])
         return np.array(by_noise), np.array(by_input), np.array(by_error)
 
     def ratios(self, x: Array) -> Ratios:

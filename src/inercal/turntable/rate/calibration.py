@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inercal.arrays import short_repr
 from inercal.errors import StudyError
 from inercal.estimate.identifiability import in_words
 from inercal.estimate.result import Estimate
@@ -16,6 +17,7 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
 from inercal.turntable.limits import LIMITS
+from inercal.turntable.rate.ends import settled
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
 from inercal.turntable.rate.linearity import SEED
 from inercal.turntable.rate.outcome import assemble, unobservable
@@ -23,6 +25,7 @@ from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwe
 from inercal.turntable.settings import TurntableSettings
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class RateCalibration:
     """An ``estimate``, and the evidence behind it: stays, inputs and fits of the gyros that took part."""
@@ -65,7 +68,8 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             "the same kind of unit",
         )
     findings = [*record.findings]
-    along = turning_axis(chain, test.joint, readings.angles)
+    still = settled(chain, test.joint, readings.angles)
+    along = turning_axis(still, test.joint, readings.angles)
     taken = []
     for channel in readings.channels:
         if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine:

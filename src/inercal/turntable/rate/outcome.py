@@ -86,6 +86,7 @@ def assemble(
             "plan": _plan(dwells, test, full_scale),
             "tolerance_shares": _shares(settings, names, found_sources),
             "instrument": settings.instrument.kind,
+            "unit": {"gyro": unit},
             "linearity": [
                 {"name": each.name, "observed": each.observed, "low": each.low, "high": each.high}
                 for fit in fits
@@ -221,10 +222,11 @@ def _shares(
     settings: TurntableSettings, names: Sequence[str], components: Sequence[TypeA | TypeB]
 ) -> dict[str, dict[str, float]]:
     """Share of each error of the table, by itself, in the table's part of each term's variance."""
+    of_table = {error.source for error in settings.chain.errors}
     own = [
         each
         for each in components
-        if each.source in settings.chain.factors or each.source.startswith("cosine")
+        if each.source.removesuffix(", at the ends") in of_table or each.source.startswith("cosine")
     ]
     parts = {each.source: np.diag(each.covariance) for each in own}
     whole = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(names))
@@ -238,5 +240,9 @@ def _shares(
 def _basis(record: Record, dwells: RateDwells, settings: TurntableSettings) -> Basis:
     """The basis of every estimate of a rate test."""
     ranges = {"rate_rad_s": [float(dwells.rate.min()), float(dwells.rate.max())]}
-    conditions = conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME)
-    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
+    conditions = conditions_of(
+        settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=dwells.unit.symbol
+    )
+    return studied(
+        COMMAND, settings, (*record.sources, *settings.chain.sources), MODEL, REFERENCES, conditions
+    )

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
+from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
 from inercal.estimate.rounding import concise
 from inercal.records.places import counted
 from inercal.rigs.outputs import table_outputs
 from inercal.sensitivities import averages
 from inercal.sensitivities.averages import Averages, Flag
-from inercal.sensitivities.indices import Indices
+from inercal.sensitivities.indices import Indices, joined
+from inercal.turntable.sensitivity import drift
+from inercal.turntable.sensitivity.drift import drift_output
 from inercal.turntable.settings import TurntableSettings
 
 _INDICES = (
@@ -40,6 +42,7 @@ _BY_METHOD = {
 """Publications behind each method."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Analysed:
     """A sensitivity analysis: ``indices`` at each position, and averages over them.
@@ -126,22 +129,29 @@ def analyse(
             "rig.errors",
             'found no errors of the table, expected some such as default = { uniform = "2 arcmin" }',
         )
-    outputs = table_outputs(how.outputs, settings.site.gravity, settings.site.latitude)
+    of_rig = [name for name in how.outputs if not name.startswith("y_")]
+    drifts = [drift_output(settings, name) for name in how.outputs if name.startswith("y_")]
+    outputs = table_outputs(of_rig, settings.site.gravity, settings.site.latitude)
     angles, note = settings.plan.angles, ""
     if how.method == "exact":
         from inercal._jit import compiling
         from inercal.sensitivities import exact
 
-        with compiling("sensitivity", say):
-            exact.analyse(chain, outputs[:1], angles[:1], second=maps)
+        if outputs:
+            with compiling("sensitivity", say):
+                exact.analyse(chain, outputs[:1], angles[:1], second=maps)
         clock = time.perf_counter()
-        indices = exact.analyse(chain, outputs, angles, shapley=maps, second=maps)
+        parts = [exact.analyse(chain, outputs, angles, shapley=maps, second=maps)] if outputs else []
+        parts += [drift.exact(settings, drifts, angles, maps, maps)] if drifts else []
+        indices = _together(parts)
     elif how.method == "sampled":
         from inercal.sensitivities import sampled
 
         clock = time.perf_counter()
         rng = np.random.default_rng(how.seed)
-        indices = sampled.analyse(chain, outputs, angles, how.samples, rng, how.sampling, progress)
+        indices = sampled.analyse(
+            chain, [*outputs, *drifts], angles, how.samples, rng, how.sampling, progress
+        )
         indices = replace(indices, method={**indices.method, "seed": how.seed})
         taken = indices.method["samples"]
         if taken != how.samples:
@@ -150,9 +160,20 @@ def analyse(
         from inercal.sensitivities import local
 
         clock = time.perf_counter()
-        indices = local.analyse(chain, outputs, angles)
+        indices = local.analyse(chain, [*outputs, *drifts], angles)
     solve = time.perf_counter() - clock
     return Analysed(indices, chain.joints, tuple(error.what for error in chain.errors), note, solve)
+
+
+def _together(parts: Sequence[Indices]) -> Indices:
+    """Indices of several groups of outputs as one."""
+    return joined(
+        parts,
+        axis=0,
+        outputs=tuple(name for part in parts for name in part.outputs),
+        units=tuple(unit for part in parts for unit in part.units),
+        scales=np.concatenate([part.scales for part in parts]),
+    )
 
 
 def result(analysed: Analysed) -> dict[str, Any]:

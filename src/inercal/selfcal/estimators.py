@@ -1,0 +1,49 @@
+"""The estimators of self-calibration: names, words, factors, publications; light, as ``--help`` reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, Literal, NamedTuple, get_args
+
+FilterKind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
+FactorKind = Literal["cholesky", "eigen", "svd"]
+
+KINDS: Final[tuple[FilterKind, ...]] = get_args(FilterKind)
+"""All estimators, the product's default first."""
+
+FACTOR_OF: Final[Mapping[FilterKind, FactorKind]] = {
+    "mukf": "cholesky",
+    "svd-qukf": "eigen",
+    "gimbal-ukf": "cholesky",
+}
+"""Factor of the covariance that each sigma-point filter takes where the study names none."""
+
+
+class Estimator(NamedTuple):
+    """An estimator in ``words``, and the ``publications`` behind it beside those of self-calibration."""
+
+    words: str
+    publications: tuple[str, ...] = ()
+
+
+_JULIER = (
+    "S. J. Julier, J. K. Uhlmann, Unscented filtering and nonlinear estimation, Proceedings of the IEEE 92 (2004) "
+    "401"
+)
+_LEFFERTS = (
+    "E. J. Lefferts, F. L. Markley, M. D. Shuster, Kalman filtering for spacecraft attitude estimation, Journal of "
+    "Guidance, Control, and Dynamics 5 (1982) 417"
+)
+_CRASSIDIS = (
+    "J. L. Crassidis, F. L. Markley, Unscented filtering for spacecraft attitude estimation, Journal of Guidance, "
+    "Control, and Dynamics 26 (2003) 536"
+)
+
+ESTIMATORS: Final[Mapping[FilterKind, Estimator]] = {
+    "error-state": Estimator("error-state filter", (_LEFFERTS,)),
+    "mukf": Estimator("multiplicative sigma-point filter", (_JULIER, _CRASSIDIS)),
+    "svd-qukf": Estimator("quaternion sigma-point filter", (_JULIER,)),
+    "gimbal-ukf": Estimator("gimbal-angle sigma-point filter", (_JULIER,)),
+    "map": Estimator("batch, largest posterior"),
+    "lm": Estimator("batch, Levenberg-Marquardt"),
+}
