@@ -76,7 +76,7 @@ class Limits:
     """Shift of a value by the K2 that the poses leave open, over its u, beyond which it does harm where poses would
     allow K2 to be fitted."""
 
-    k2_probability: float = 1e-3
+    k2_probability: float = 2e-3
     """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
 
     same_pose: float = 5e-3

@@ -16,16 +16,17 @@ from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
 from inercal.imu.multiposition.joint import Joint, Scatter, radial
+from inercal.imu.multiposition.poses import Poses
 from inercal.instruments.terms import shown_unit
 
 
 def squares_finding(
-    joint: Joint, scatter: Scatter, means: Array, gravity: float, u: Array
+    joint: Joint, scatter: Scatter, poses: Poses, gravity: float, u: Array
 ) -> Iterator[Finding]:
     """A finding where K2 shows, or may shift a value by more than its ``u`` (p,); none where it is fitted.
 
     K2 of each axis is 0 with the standard deviation `LIMITS.ordinary_k2` before the data, which may tell more of it.
-    ``means`` (n, 3) are the outputs in the poses, ``gravity`` [m/s^2].
+    ``gravity`` [m/s^2] is that of the site.
     """
     from scipy.special import fdtrc
 
@@ -38,13 +39,16 @@ def squares_finding(
     J = acc.fit.jacobian
     unexplained = columns - J @ (acc.fit.unit_covariance @ (J.T @ columns))
     K = unexplained.T @ unexplained
-    allowed = _allowed(acc, means, gravity)
+    allowed = _allowed(acc, poses.means, gravity)
     names, unit = joint.names, shown_unit("1/(m/s^2)")
     if allowed and acc.fit.dof > 3:
         estimate = -np.linalg.solve(K, unexplained.T @ acc.fit.residuals)
         gained = float(estimate @ K @ estimate)
-        left = (acc.fit.chi2 - gained) / (acc.fit.dof - 3)
-        if left > 0 and fdtrc(3, acc.fit.dof - 3, gained / 3.0 / left) < LIMITS.k2_probability:
+        left, dof = (acc.fit.chi2 - gained) / (acc.fit.dof - 3), float(acc.fit.dof - 3)
+        noise, noise_dof = float(np.mean(poses.noise_variance)), poses.noise_dof
+        if noise > 0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
+            left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
+        if left > 0 and fdtrc(3, dof, gained / 3.0 / left) < LIMITS.k2_probability:
             size = np.sqrt(np.diag(np.linalg.inv(K)) * left) / unit[1]
             words = ", ".join(
                 f"{axis} {' ± '.join(rounded(value, each))}"
