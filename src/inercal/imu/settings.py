@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -75,6 +75,40 @@ class AidedSettings:
     azimuth_u: float | None = None
 
 
+@dataclass(frozen=True)
+class MeansSettings:
+    """Options of a calibration by pose means, a row for each pose: there are none."""
+
+
+@dataclass(frozen=True)
+class KnownRatesSettings:
+    """Options of a gyro's calibration at known rates: ``rates`` (k,) [rad/s], one a record, and their ``rates_u``."""
+
+    rates: tuple[float, ...]
+    rates_u: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class KnownTurnsSettings:
+    """Options of a gyro's calibration by turns by known angles, about x, y and z.
+
+    Attributes
+    ----------
+    angles, angles_u : three floats
+        Angle of each turn [rad], positive about the positive axis by the right-hand rule, and its standard uncertainty.
+    alignment : float or None
+        As its key says [rad].
+    """
+
+    angles: tuple[float, float, float]
+    angles_u: tuple[float, float, float]
+    alignment: float | None = None
+
+
+Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRatesSettings | KnownTurnsSettings
+"""Options of a method other than multi-position."""
+
+
 @short_repr
 @dataclass(frozen=True)
 class ImuSettings:
@@ -88,7 +122,7 @@ class ImuSettings:
         As their keys say.
     traceability : mapping
         ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
-    method : FerrarisSettings, AidedSettings or None
+    method : Method or None
         Options of the method; None: multi-position, un-aided.
     temperature : Quantity or None
         Temperature of the instrument.
@@ -108,7 +142,7 @@ class ImuSettings:
         bounds=RELATIVE_U, name="time_base",
     )  # fmt: skip
     traceability: Mapping[str, str] = field(default_factory=dict)
-    method: FerrarisSettings | AidedSettings | None = None
+    method: Method | None = None
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
 
