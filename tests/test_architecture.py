@@ -148,10 +148,12 @@ def test_no_circles():
 
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
-    "imu": ("limits recording turns settings simulate multiposition ferraris aided temperature task figures"),
+    "imu": (
+        "limits rest recording turns settings simulate multiposition ferraris aided temperature task figures"
+    ),
     "turntable": (
-        "limits settings model weights noise regression readings display sensitivity positions rate task "
-        "figures"
+        "limits settings disturbances model weights second_order noise regression readings display sensitivity "
+        "positions rate task figures"
     ),
     "aoa": (
         "limits layout settings angles motion reading fusion paper diagnosis reference result simulate task "

@@ -26,7 +26,8 @@ READ_A_RECORD = {
 }
 READ_A_STUDY = {
     *("calibrate imu", "calibrate turntable", "selfcal", "aoa", "sensitivity", "design positions"),
-    *("design selfcal", "simulate turntable", "simulate selfcal", "simulate aoa"),
+    *("design tolerances", "design selfcal"),
+    *("simulate imu", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor"}
 TEMPLATES = {
@@ -344,7 +345,7 @@ def test_bash_completes_verbs_kinds_options_and_choices(tmp_path, scripts):
     path.write_text(scripts["bash"], encoding="utf-8")
     asked = {
         "inercal cal": {"calibrate"},
-        "inercal simulate ''": {"turntable", "selfcal", "aoa"},
+        "inercal simulate ''": {"imu", "turntable", "selfcal", "aoa"},
         "inercal aoa --sta": {"--static", "--states"},
         "inercal selfcal --filter ''": {"error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"},
         "inercal aoa log.csv --states ''": {"8", "11", "15", "19"},

@@ -334,7 +334,7 @@ def test_bad_usage_is_one_sentence(arguments, words, folder, here):
         (HEADER.replace("count", "deg/s") + "0,1,2,3,4,5,6,a\n" * 3, ["acc_x", "acceleration"]),
         (HEADER.replace("gyro_x [count]", "gyro_x [deg/s]") + "0,1,2,3,4,5,6,a\n", ["gyro_y", "another unit"]),
         (HEADER.replace("acc_x [count],acc_y [count],acc_z [count]", "acc_x [g],acc_y [g],acc_z [g]")
-         + "0,1,2,3,4,5,6,a\n", ["acc is in g, expected count"]),
+         + "0,1,2,3,4,5,6,a\n", ["acc_x is in g, expected count"]),
     ],
 )  # fmt: skip
 def test_a_stream_that_does_not_fit_is_one_sentence(log, words, here):

@@ -10,7 +10,7 @@ import pytest
 from paper_study import NOISE, TRUTH, study
 
 from inercal.cli import run
-from inercal.convert.correct import apply_to
+from inercal.convert.correction import apply_to
 from inercal.convert.platform import not_applied, platform_model
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate

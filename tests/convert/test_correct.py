@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inercal.convert.correct import ImuModel, apply_to, imu_model, not_applied
+from inercal.convert.correct import ImuModel, imu_model, not_applied
+from inercal.convert.correction import apply_to
 from inercal.errors import InputError
 from inercal.inputs import Source
 from inercal.instruments.triad import TriadModel
@@ -124,5 +125,5 @@ def test_a_recording_in_another_unit_of_the_same_kind_is_corrected_alike():
     other = apply_to(recorded("m/s^2", "rad/s", acc * 9.80665e-3, np.radians(gyro)), model)
     for name in same.columns:
         np.testing.assert_allclose(other[name].values, same[name].values, rtol=1e-12)
-    with pytest.raises(InputError, match="acc is in count, expected mg"):
+    with pytest.raises(InputError, match="acc_x is in count, expected mg"):
         apply_to(recorded("count", "deg/s", acc, gyro), model)

@@ -31,6 +31,7 @@ SLOW = [
     "docs/how-to/on-a-table-with-known-angles.md",
     "docs/how-to/read-your-files.md",
     "docs/how-to/temperature.md",
+    "docs/how-to/tolerances-from-a-goal.md",
     "docs/how-to/validate.md",
     "docs/published/continuous-self-calibration.md",
     "docs/published/zhao-2023.md",

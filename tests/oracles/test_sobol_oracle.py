@@ -58,8 +58,11 @@ def test_the_estimators_of_salib(values):
         assert_allclose(first[o], theirs["S1"], atol=1e-5)
         assert_allclose(total[o], theirs["ST"], atol=1e-8)
         # two bootstraps of 100 resamples each: 7 % on either, five standard deviations
-        u = estimate(*values, 100, np.random.default_rng(34))
-        for own, conf in ((u.u_first[o], theirs["S1_conf"]), (u.u_total[o], theirs["ST_conf"])):
+        again = estimate(*values, 100, np.random.default_rng(34)).resampled
+        whole = again.first_variance + again.interaction_variance
+        for part, key in ((again.first_variance, "S1_conf"), (whole, "ST_conf")):
+            own = np.std(part[:, o] / again.variance[:, o, None], axis=0, ddof=1)
+            conf = theirs[key]
             assert_allclose(own, conf / 1.959964, rtol=0.5, atol=1e-12)
 
 

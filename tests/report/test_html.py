@@ -172,8 +172,8 @@ def test_order_of_the_sections():
 
 def test_residuals_have_aligned_decimals():
     rows = Page(render(estimate(), [], "Report")).rows
-    assert ["1", "0.50", "(0.000, 0.000, 1.000)", "-0.001500"] in rows
-    assert ["2", "61.25", "(1.000, 0.000, 0.000)", "0.000250"] in rows
+    assert ["1", "0.50", "(0.000, 0.000, 1.000)", "-153.0"] in rows
+    assert ["2", "61.25", "(1.000, 0.000, 0.000)", "25.5"] in rows
 
 
 def test_shares_of_the_budget():

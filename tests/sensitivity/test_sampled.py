@@ -9,7 +9,7 @@ from inercal.rigs.distribution import normal, uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
-from inercal.sensitivities import exact, sampled
+from inercal.sensitivities import averages, exact, sampled
 from inercal.sensitivities.estimators import estimate, evaluate
 
 LAW = uniform(np.radians(2.0 / 60.0))
@@ -125,6 +125,38 @@ def test_the_procedure_of_zhao_et_al():
     assert (found.interaction_variance < 0.0).any()  # estimates of what is almost nothing
     assert found.factors == TABLE.factors
     assert found.units == ("m/s^2", "m/s^2", "m/s^2", "rad/s", "rad/s")
+
+
+def test_interactions_rule_only_beyond_the_noise_of_sampling():
+    """At N = 1000 the sums of S scatter by hundredths: 96 sound sums go unflagged, and singular attitudes do not."""
+    sound = grid((4, 8)).angles
+    found = sampled.analyse(TABLE, OUTPUTS[:3], sound, 1000, np.random.default_rng(19), "random")
+    assert (found.first.sum(axis=2) < 0.99).sum() > 20  # what their own noise would have said
+    assert averages.flagged(exact.analyse(TABLE, OUTPUTS[:3], sound)) == ()
+    assert averages.flagged(found) == ()
+    for sampling in ("random", "sobol"):
+        at = sampled.analyse(TABLE, OUTPUTS[2:3], [[0.0, 0.3]], 1000, np.random.default_rng(20), sampling)
+        (flag,) = averages.flagged(at)
+        (true,) = averages.flagged(exact.analyse(TABLE, OUTPUTS[2:3], [[0.0, 0.3]]))
+        assert true.u == 0.0
+        assert flag.sum_first == pytest.approx(true.sum_first, abs=5.0 * flag.u)
+        assert 0.0 < flag.u < 0.3
+
+
+@pytest.mark.slow
+def test_averages_scatter_as_they_say():
+    """40 repeats of 6 positions: each average spreads by its own u, within five times the 1/sqrt(2 n) of a spread."""
+    angles, rng = grid((2, 3)).angles, np.random.default_rng(21)
+    runs = [sampled.analyse(TABLE, OUTPUTS[:3], angles, 200, rng, "random") for _ in range(40)]
+    loose = 5.0 / np.sqrt(2.0 * len(runs))
+    for average in (averages.mean, averages.weighted, averages.aggregate):
+        each = [average(run) for run in runs]
+        for name in ("first", "total"):
+            values = np.array([getattr(one, name) for one in each])
+            u = np.sqrt(np.mean([np.square(getattr(one, f"u_{name}")) for one in each], axis=0))
+            acting = values.mean(axis=0) > 0.01
+            assert_allclose(values.std(axis=0, ddof=1)[acting], u[acting], rtol=loose)
+    assert averages.mean(exact.analyse(TABLE, OUTPUTS[:3], angles)).u_first is None
 
 
 def test_outputs_are_centred_first():

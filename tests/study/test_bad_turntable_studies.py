@@ -26,6 +26,8 @@ HEAD = '[site]\nlatitude = "39.1 deg"\n[rig]\nkind = "two_axis_turntable"\n'
 ERRORS = HEAD + "[rig.errors]\n"
 INSTRUMENT = HEAD + "[instrument]\n"
 COEFFICIENTS = HEAD + "[instrument.coefficients]\n"
+CHAIN = HEAD.replace("two_axis_turntable", "chain")
+JOINT, E = '{ joint = "phi1", axis = "z" }', '{ error = "e", axis = "x", normal = "1 arcsec" }'
 DESIGN = ERRORS + 'default = { uniform = "2 arcmin" }\n[design]\n'
 
 
@@ -53,7 +55,7 @@ def load(tmp_path):
             "site.latitude: found '120 deg', that is 2.0944 rad, expected a latitude",
         ),
         (HEAD.replace("two", "four"), "rig.kind: found 'four_axis_turntable', expected 'two_axis_turntable'"),
-        (HEAD + "speed = 1", "rig.speed: unknown key, known keys: kind, errors, base, limits"),
+        (HEAD + "speed = 1", "rig.speed: unknown key, known keys: kind, chain, errors, base, limits"),
         (HEAD + "[postions]", "postions: unknown key, did you mean positions?"),
         # errors of the table
         (
@@ -122,6 +124,80 @@ def load(tmp_path):
             ERRORS + 'deps_x = { uniform = "1 mm" }',
             "rig.errors.deps_x.uniform: found '1 mm', which is of length",
         ),
+        # what is measured, and what follows an angle
+        (
+            ERRORS + 'dbase_x = { normal = "1 arcsec", scope = "angle" }',
+            'rig.errors.dbase_x.scope: found "angle" before the first joint, expected another scope',
+        ),
+        (
+            ERRORS + 'dbase_x = { harmonics = [{ order = 1, amplitude = "1 arcsec" }] }',
+            "rig.errors.dbase_x: found an error over angle before the first joint, expected a value",
+        ),
+        (
+            ERRORS + 'deps_x = { certificate = "K" , normal = "1 arcsec" }',
+            "rig.errors.deps_x: found a certificate of nothing measured, expected value, table or a phase",
+        ),
+        (
+            ERRORS + 'deps_x = { value = "1(1) arcsec", scope = "run" }',
+            "rig.errors.deps_x: scope: found with what is measured alone, expected it with a distribution",
+        ),
+        (ERRORS + 'deps_x = { value = "11 deg" }', "that is 0.191986 rad, expected an angle within 10 deg"),
+        (
+            ERRORS + 'dphi_y1 = { harmonics = [{ order = 0, amplitude = "1 arcsec" }] }',
+            "rig.errors.dphi_y1.harmonics.0.order: found 0, expected greater than or equal to 1",
+        ),
+        (
+            ERRORS
+            + 'dphi_y1.harmonics = [{ order = 2, amplitude = "1 arcsec" }, { order = 2, amplitude = "1 arcsec" }]',
+            "rig.errors.dphi_y1: harmonics.1.order: found 2 twice, expected each order once",
+        ),
+        (
+            ERRORS + 'dphi_y1 = { table = "gone.csv" }',
+            "rig.errors.dphi_y1.table: 'gone.csv': cannot be read (No such file or directory), expected a CSV beside",
+        ),
+        # a chain of one's own
+        (CHAIN + "chain = []", "rig.chain: found the joints none, expected phi1, then phi2, phi3"),
+        (
+            CHAIN + 'chain = [{ joint = "phi2", axis = "z" }]',
+            "rig.chain: found the joints phi2, expected phi1, then phi2, phi3",
+        ),
+        (CHAIN + 'chain = [{ joint = "phi1" }]', "rig.chain.0.axis: missing, expected a value"),
+        (
+            CHAIN + 'chain = [{ joint = "phi1", turn = "1 deg", axis = "z" }]',
+            "rig.chain.0: found joint and turn, expected one of joint, turn and error",
+        ),
+        (
+            CHAIN + 'chain = [{ joint = "phi1", axis = "z", normal = "1 arcsec" }]',
+            "rig.chain.0: normal: found with a joint, expected it with an error only",
+        ),
+        (
+            CHAIN + f'chain = [{JOINT}, {{ error = "e", axis = "z" }}]',
+            "rig.chain.1: found no distribution, expected uniform",
+        ),
+        (
+            CHAIN + f'chain = [{JOINT}, {{ error = "1 e", axis = "z", normal = "1 arcsec" }}]',
+            "rig.chain.1: error: found '1 e', expected a name of letters, digits and _",
+        ),
+        (
+            CHAIN + f"chain = [{JOINT}, {E}, {E}]",
+            "rig.chain: found e twice, expected each name once in a chain",
+        ),
+        (
+            CHAIN + f'chain = [{{ error = "e", axis = "x", normal = "1 arcsec", scope = "angle" }}, {JOINT}]',
+            'rig.chain.0.scope: found "angle" before the first joint',
+        ),
+        (
+            CHAIN + f'chain = [{{ turn = "1(1) deg", axis = "x" }}, {JOINT}]',
+            "rig.chain.0: turn: found an uncertainty, expected it as an error with a value beside the turn",
+        ),
+        (
+            CHAIN + f'chain = [{JOINT}]\n[rig.errors]\ndefault = {{ normal = "1 arcsec" }}',
+            "rig.errors: found with a chain, expected its errors among rig.chain",
+        ),
+        (
+            HEAD + f"chain = [{JOINT}]",
+            "rig.chain: found with kind = 'two_axis_turntable', expected it with \"chain\" only",
+        ),
         # base and limits
         (HEAD + '[rig.base]\nazimut = "1 deg"', "rig.base.azimut: unknown key, did you mean azimuth?"),
         (
@@ -154,7 +230,7 @@ def load(tmp_path):
         (HEAD + "[positions]\nlist = []", "positions.list: found []"),
         (HEAD + '[positions]\nlist = [["0 deg"]]', "positions.list.0: found 1 angles, expected phi1, phi2"),
         (HEAD + "[positions]\nlist = [[0, 1]]", "positions.list.0.0: found '0' without a unit"),
-        (HEAD + "[positions]\ngrid = { phi1 = 36 }", "positions.grid.phi2: missing, expected a value"),
+        (HEAD + "[positions]\ngrid = { phi1 = 36 }", "positions.grid: found phi1, expected phi1, phi2"),
         (HEAD + "[positions]\ngrid = { phi1 = 0, phi2 = 1 }", "positions.grid.phi1: found 0"),
         (
             HEAD + "[positions]\ngrid = { phi1 = 9, phi2 = 9, phi3 = 9 }",
@@ -305,3 +381,27 @@ def test_random_values_of_known_keys(table, content):
     data = {"site": {"latitude": "39.1 deg"}, "rig": rig}
     (rig if table in ("errors", "base", "limits") else data)[table] = content
     is_study_or_error(lambda: turntable_study(data, "study.toml"))
+
+
+@for_each(
+    ("content", "message"),
+    [
+        ("", "line 1: found '', expected a header such as angle [deg],error [arcsec],u [arcsec]"),
+        ("angle [deg],error [arcsec]\n", "line 1: found 'angle [deg],error [arcsec]', expected a header"),
+        ("angle [deg],error [mm],u [mm]\n", "line 1: found mm, a unit of length, expected an angle"),
+        ("angle [deg],error [arcsec],u [arcsec]\n1,2\n", "line 2: found '1,2', expected three numbers"),
+        (
+            "angle [deg],error [arcsec],u [arcsec]\n1,2,nan\n",
+            "line 2: found '1,2,nan', expected three numbers",
+        ),
+        ("angle [deg],error [arcsec],u [arcsec]\n1,2,-1\n", "line 2: found u below zero"),
+        ("angle [deg],error [deg],u [arcsec]\n1,20,1\n", "line 2: found an error above 10 deg"),
+        ("angle [deg],error [arcsec],u [arcsec]\n1,2,1\n", "found 1 rows, expected two or more"),
+        ("angle [deg],error [arcsec],u [arcsec]\n1,2,1\n361,2,1\n", "found an angle twice, expected two"),
+    ],
+)
+def test_a_table_over_angle_that_cannot_be_read(load, tmp_path, content, message):
+    (tmp_path / "e.csv").write_text(content)
+    with pytest.raises(StudyError, match=re.escape(message)) as caught:
+        load(ERRORS + 'dphi_y1 = { table = "e.csv" }')
+    assert "rig.errors.dphi_y1.table: 'e.csv'" in str(caught.value)

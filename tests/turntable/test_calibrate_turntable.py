@@ -453,9 +453,14 @@ def test_accelerometers_whose_noise_is_not_stated_are_known_as_well_as_those_who
         assert np.all(found.u > 0.4 * known.u)
 
 
-def test_errors_whose_squares_matter_are_named():
-    """The cosine of a degree takes 1.5e-4 of gravity, fifteen times this noise; of two arcmin it takes nothing."""
-    for size, codes in ((60.0 * ARCMIN, ["large_errors"]), (2.0 * ARCMIN, [])):
+def test_errors_whose_squares_matter_are_fitted_to_second_order():
+    """The cosine of a degree takes 1.5e-4 of gravity, fifteen times this noise; of two arcmin it takes nothing. Of ten
+    degrees the cube bends readings too."""
+    for size, second, codes in (
+        (600.0 * ARCMIN, True, ["large_errors"]),
+        (60.0 * ARCMIN, True, []),
+        (2.0 * ARCMIN, False, []),
+    ):
         settings = study(
             grid((7, 8)),
             table(size),
@@ -464,11 +469,13 @@ def test_errors_whose_squares_matter_are_named():
             coefficients=ACCELEROMETERS,
             noise=1e-4,
         )
-        assert [finding.code for finding in run(settings).estimate.findings] == codes
+        estimate = run(settings).estimate
+        assert estimate.result["second_order"] is second
+        assert [finding.code for finding in estimate.findings] == codes
 
 
-@pytest.mark.parametrize(("noise", "codes"), [(None, ["large_errors"]), (NOISE, [])])
-def test_squares_of_errors_that_stay_are_named_where_there_is_no_noise_above_them(noise, codes):
+@pytest.mark.parametrize(("noise", "second"), [(None, True), (NOISE, False)])
+def test_squares_of_errors_that_stay_are_fitted_where_there_is_no_noise_above_them(noise, second):
     """Errors that stay are found with the terms, as well as the noise allows: without any only their squares are left,
     (1e-3)^2 of earth rate, which no u of first order holds. Noise of 0.01 deg/h is 700 times that."""
     settings = study(FULL_RANK, table().with_scope(Scope.RIG), noise=noise, earth_rate="stated")
@@ -476,7 +483,10 @@ def test_squares_of_errors_that_stay_are_named_where_there_is_no_noise_above_the
         replace(settings, instrument=replace(settings.instrument, noise=noise or 0.0)),
         np.random.default_rng(2),
     )
-    assert [finding.code for finding in calibrate(made, settings).estimate.findings] == codes
+    estimate = calibrate(made, settings).estimate
+    assert estimate.result["second_order"] is second
+    assert estimate.status is Status.OK
+    assert np.all(np.abs(estimate.values - [WHEEL[name] for name in estimate.names]) < 4.0 * estimate.u)
 
 
 def test_a_relative_term_without_its_gain_is_refused():

@@ -44,6 +44,35 @@ def design_positions(
     return hand_over(estimate, designed.view.tables(), designed.view.page, output, "positions", rows)
 
 
+def design_tolerances(
+    study: Study,
+    /,
+    *,
+    overrides: Overrides = None,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Find the cheapest tolerances of a turntable that reach wanted uncertainties."""
+    from inercal._files import write_text
+    from inercal.face import turntable as system
+    from inercal.face.study import read_study
+    from inercal.turntable.positions.tolerance_result import study_tables
+
+    output.check((".json", ".toml"), (study,))
+    clock = time.perf_counter()
+    the_study = read_study("turntable", study, overrides or ())
+    output.spare(the_study.files)
+    read_s = time.perf_counter() - clock
+    with working(output) as progress:
+        designed = system.design_tolerances(the_study, progress)
+
+    def tables(path: Path) -> None:
+        write_text(path, study_tables(designed.evidence))
+
+    estimate = read_in(designed.estimate, read_s)
+    page = designed.view.page
+    return hand_over(estimate, designed.view.tables(), page, output, "tolerances", tables, whole=(".json",))
+
+
 def design_selfcal(
     study: Study,
     /,

@@ -35,6 +35,18 @@ def simulate_turntable(
     _simulated("turntable", study, seed, overrides, output)
 
 
+def simulate_imu(
+    study: Study,
+    /,
+    *,
+    seed: Seed = 1,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Simulate an IMU that is held by hand in many poses."""
+    _simulated("imu", study, seed, overrides, output)
+
+
 def simulate_selfcal(
     study: Study,
     /,

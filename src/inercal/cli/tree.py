@@ -113,6 +113,13 @@ COMMANDS = {
         "field.\n\n--out writes the positions (.csv) or the whole result (.json), --report a page with pictures.",
         "inercal design positions turntable.toml --out positions.csv",
     ),
+    ("design", "tolerances"): (
+        "inercal.cli.design:design_tolerances",
+        "Find the cheapest tolerances of a turntable, and the plan, that reach wanted uncertainties.\n\nThe study "
+        "states the goals under [goal] and what tolerances cost under [cost]. --out writes the tolerances and "
+        "positions as tables of a study (.toml) or the whole result (.json), --report a page with pictures.",
+        "inercal design tolerances turntable.toml --out tolerances.toml",
+    ),
     ("design", "selfcal"): (
         "inercal.cli.design:design_selfcal",
         "Find the path on which a platform calibrates itself best, and compare it with others of the same "
@@ -124,9 +131,17 @@ COMMANDS = {
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",
         "Simulate a test on a turntable, with the errors of the table and the noise of the instrument.\n\nThe study "
-        "states the true coefficients under [instrument.coefficients]. The recording goes to --out (.csv, "
-        ".npz, .h5, .parquet or .nc).",
+        "states the true coefficients under [instrument.coefficients], and under [disturbances] what real tests add. "
+        "The recording goes to --out (.csv, .npz, .h5, .parquet or .nc).",
         "inercal simulate turntable turntable.toml --seed 1 --out test.csv",
+    ),
+    ("simulate", "imu"): (
+        "inercal.cli.simulate:simulate_imu",
+        "Simulate an IMU that is held by hand in many poses, as the method multiposition calibrates it.\n\nThe study "
+        "states poses, noise and true coefficients under [simulation] (coefficients that are absent are drawn, as of a "
+        "consumer-grade unit with outputs in counts), and under [disturbances] what real recordings add. The recording "
+        "goes to --out (.csv, .npz, .h5, .parquet or .nc).",
+        "inercal simulate imu imu.toml --seed 1 --out log.csv",
     ),
     ("simulate", "selfcal"): (
         "inercal.cli.simulate:simulate_selfcal",
@@ -155,10 +170,14 @@ COMMANDS = {
     ("apply", ""): (
         "inercal.cli.apply:apply",
         "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv, "
-        ".npz, .h5, .parquet or .nc). A self-calibration makes of wanted rates (wc) commands that turn the platform "
-        "so, and corrects its gyros and accelerometers, all in the units of the recording. With --invert the recording "
-        "holds true values and the outputs of the instrument are written. With --stream CSV lines come in on standard "
-        "input and corrected ones go out, each at once.",
+        ".npz, .h5, .parquet or .nc). Of an instrument that was calibrated on a turntable the drift is compensated by "
+        "the specific force (acc_x acc_y acc_z) or the angles of the table, and the rate left is rate_x, rate_y; a "
+        "temperature model goes by the temperature of each sample. A self-calibration makes of wanted rates (wc) "
+        "commands that turn the platform so, and corrects its gyros and accelerometers, all in the units of the "
+        "recording. With --uncertainty the standard uncertainty of each value, by that of the coefficients, stands in "
+        "a column u_acc_x, u_rate_x, ... With --invert the recording holds true values and the outputs of the "
+        "instrument are written. With --stream CSV lines come in on standard input and corrected ones go out, each at "
+        "once.",
         "inercal apply cal.json log.csv --out corrected.csv",
     ),
     ("compare", ""): (

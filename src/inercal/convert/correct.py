@@ -1,48 +1,30 @@
-"""A calibration applied to a recording: outputs to truth, and back."""
+"""The IMU that a calibration describes: three accelerometers and three gyros, outputs to truth and back."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.convert.correction import Correction, Samples, factor_of
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
+from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel, apart, triad_from_terms
-from inercal.records.column import Column
 from inercal.records.record import Record
-from inercal.units import Unit, parse_unit
+from inercal.units import parse_unit
 
-Samples = Mapping[str, Array]
-
-
-@dataclass(frozen=True)
-class Correction:
-    """Correction of the samples of a record, or its inverse.
-
-    ``work`` takes samples by sensor, times ``factors``, to results in ``units``; ``settings`` hold all that decides
-    them.
-    """
-
-    work: Callable[[Samples], Samples]
-    units: Mapping[str, Unit]
-    factors: Mapping[str, float]
-    settings: Mapping[str, object]
-
-    def __call__(self, samples: Samples) -> Samples:
-        """Results (*batch, 3) for samples (*batch, 3) of all its sensors, in the units of the record."""
-        return self.work({sensor: samples[sensor] * factor for sensor, factor in self.factors.items()})
-
-
-class Model(Protocol):
-    """An instrument that a calibration describes."""
-
-    def correction(self, record: Record, invert: bool = False) -> Correction:
-        """The correction of a record, whose columns may be without samples yet; raises `InputError`."""
+TERMS_IN_USE = (
+    *ACCELEROMETER_TRIAD,
+    *("M_yx", "M_zx", "M_zy"),
+    *(f"K2_{axis}" for axis in "xyz"),
+    *GYRO_TRIAD,
+    *GYRO_G_SENSITIVITY,
+)
+"""Terms of an IMU that are applied."""
 
 
 @dataclass(frozen=True)
@@ -50,24 +32,26 @@ class ImuModel:
     """The instrument that a calibration describes, forward: truth to indication.
 
     ``units`` are those of the outputs it was calibrated for, by sensor; ``gyro`` is None where only the
-    accelerometers were calibrated; ``g_sensitivity`` (3, 3) [gyro output/(m/s^2)].
+    accelerometers were calibrated; ``g_sensitivity`` (3, 3) [gyro output/(m/s^2)]; ``second_order`` (3,) [1/(m/s^2)]
+    is K2 of the accelerometers, whose output is K0 + K1 (s + K2 s^2) at the specific force s along the input axis.
     """
 
     accelerometer: TriadModel
     gyro: TriadModel | None
     g_sensitivity: Array
     units: dict[str, str]
+    second_order: Array = field(default_factory=lambda: np.zeros(3))
 
     def correct(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:
         """Specific force (*batch, 3) [m/s^2] and rate (*batch, 3) [rad/s] from outputs."""
-        f = self.accelerometer.correct(acc)
+        f = self.accelerometer.correct(self._straight(acc))
         if gyro is None or self.gyro is None:
             return f, None
         return f, self.gyro.correct(gyro - self._drift(f))
 
     def indicate(self, f: Array, omega: Array | None) -> tuple[Array, Array | None]:
         """Outputs from specific force [m/s^2] and rate [rad/s]: the inverse of `correct`."""
-        acc = self.accelerometer.indicate(f)
+        acc = self._bent(self.accelerometer.indicate(f))
         if omega is None or self.gyro is None:
             return acc, None
         return acc, self.gyro.indicate(omega) + self._drift(f)
@@ -94,28 +78,55 @@ class ImuModel:
                 )
         truth = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
         output = {sensor: parse_unit(symbol) for sensor, symbol in self.units.items()}
-        units, factors = {}, {}
+        reads, writes = {}, {}
         for triad in (acc, gyro):
             if triad is None:
                 continue
             wanted = (truth if invert else output).get(triad.sensor, triad.unit)
-            if triad.unit.dimension != wanted.dimension:
-                raise InputError(
-                    triad.source.path,
-                    f"{triad.sensor} is in {triad.unit.symbol}, expected {wanted.symbol} as "
-                    f"{'true values' if invert else 'the instrument was calibrated'}",
-                )
-            units[triad.sensor] = (output if invert else truth).get(triad.sensor, triad.unit)
-            factors[triad.sensor] = triad.unit.factor / wanted.factor  # exactly 1 for one and the same unit
+            written = (output if invert else truth).get(triad.sensor, triad.unit)
+            of = "as true values" if invert else "as the instrument was calibrated"
+            for axis in "xyz":
+                name = f"{triad.sensor}_{axis}"
+                reads[name] = factor_of(record[name], wanted, of)
+                writes[name] = (name, written)
         both = self.indicate if invert else self.correct
 
         def work(samples: Samples) -> Samples:
-            results = zip(("acc", "gyro"), both(samples["acc"], samples.get("gyro")), strict=True)
-            return {sensor: corrected for sensor, corrected in results if corrected is not None}
+            given = {
+                sensor: np.stack([samples[f"{sensor}_{axis}"] for axis in "xyz"], axis=-1)
+                for sensor in ("acc", "gyro")
+                if f"{sensor}_x" in writes
+            }
+            results = zip(("acc", "gyro"), both(given["acc"], given.get("gyro")), strict=True)
+            return {
+                f"{sensor}_{axis}": values[..., i]
+                for sensor, values in results
+                if values is not None
+                for i, axis in enumerate("xyz")
+            }
 
         triads = {"acc": self.accelerometer, **({} if self.gyro is None else {"gyro": self.gyro})}
         settings = {**triads, "g": self.g_sensitivity, "units": self.units, "invert": invert}
-        return Correction(work, units, factors, settings)
+        if self.second_order.any():
+            settings["k2"] = self.second_order
+        return Correction(work, reads, writes, settings)
+
+    def _straight(self, acc: Array) -> Array:
+        """Outputs of the accelerometers as they would be without K2: the root of s + K2 s^2 that is small with it."""
+        if not self.second_order.any():
+            return acc
+        bent = (acc - self.accelerometer.bias) / self.accelerometer.scale
+        with np.errstate(invalid="ignore"):  # beyond the extreme of the parabola there is no input
+            straight = 2.0 * bent / (1.0 + np.sqrt(1.0 + 4.0 * self.second_order * bent))
+        return np.asarray(self.accelerometer.bias + self.accelerometer.scale * straight)
+
+    def _bent(self, acc: Array) -> Array:
+        """The inverse of `_straight`."""
+        if not self.second_order.any():
+            return acc
+        straight = (acc - self.accelerometer.bias) / self.accelerometer.scale
+        bent = straight + self.second_order * straight * straight
+        return np.asarray(self.accelerometer.bias + self.accelerometer.scale * bent)
 
     def _drift(self, f: Array) -> Array | float:
         """g-sensitive drift [gyro output]; where there is none, a missing specific force takes no part."""
@@ -133,34 +144,47 @@ def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
     if not complete or not np.all(np.isfinite(estimate.values)):
         names = ", ".join(estimate.names) or "no coefficients"
         raise InputError(where, f"found {names}, expected the coefficients of an IMU")
-    accelerometer = triad_from_terms(values, "K1", "M", "K0")
-    gyro = triad_from_terms(values, "S", "T", "D_F") if "S_x" in values else None
-    for name, triad in (("accelerometers", accelerometer), ("gyro", gyro)):
+    model = imu_of(values, {str(sensor): str(unit) for sensor, unit in units.items()})
+    for name, triad in (("accelerometers", model.accelerometer), ("gyro", model.gyro)):
         if triad is not None and not _invertible(triad):
             raise InputError(
                 where, f"the scale factors of the {name} cannot be inverted, expected three independent axes"
             )
     for unit in units.values():
         parse_unit(str(unit), where)
-    g = [[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"]
-    symbols = {str(sensor): str(unit) for sensor, unit in units.items()}
-    return ImuModel(accelerometer, gyro, np.array(g), symbols)
+    return model
+
+
+def imu_of(values: Mapping[str, float] | Mapping[str, Array], units: dict[str, str]) -> ImuModel:
+    """The instrument of these terms (*batch,) by symbol, absent ones 0, with outputs in ``units`` by sensor."""
+    rows = [
+        np.stack(np.broadcast_arrays(*(values.get(f"G_{i}{j}", 0.0) for j in "xyz")), axis=-1) for i in "xyz"
+    ]
+    return ImuModel(
+        triad_from_terms(values, "K1", "M", "K0"),
+        triad_from_terms(values, "S", "T", "D_F") if "S_x" in values else None,
+        np.stack(np.broadcast_arrays(*rows), axis=-2),
+        units,
+        np.stack(np.broadcast_arrays(*(values.get(f"K2_{axis}", 0.0) for axis in "xyz")), axis=-1),
+    )
 
 
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
     """``not_held``: the terms of a calibration that `imu_model` leaves out, for they do not go with any recording."""
-    if not any(name.startswith("D_R_") for name in estimate.names):
-        return ()
-    t0 = estimate.result.get("bias_time_s")
-    time = f"{t0:.6g} s" if isinstance(t0, int | float) else "the time bias_time_s"
-    return (
-        Finding(
-            "not_held",
+    findings = []
+    if any(name.startswith("D_R_") for name in estimate.names):
+        t0 = estimate.result.get("bias_time_s")
+        time = f"{t0:.6g} s" if isinstance(t0, int | float) else "the time bias_time_s"
+        text = (
             "the drift D_R of the gyro bias belongs to the recording of the calibration and is not applied: "
-            f"D_F is the bias at {time} of that",
-            str(where),
-        ),
-    )
+            f"D_F is the bias at {time} of that"
+        )
+        findings.append(Finding("not_held", text, str(where)))
+    other = [name for name in estimate.names if name not in TERMS_IN_USE and not name.startswith("D_R_")]
+    if other:
+        text = f"{', '.join(other)}: not applied, for a sample by itself does not tell the motion they act on"
+        findings.append(Finding("not_held", text, str(where)))
+    return tuple(findings)
 
 
 @np.errstate(all="ignore")
@@ -172,19 +196,3 @@ def _invertible(triad: TriadModel) -> bool:
         and np.linalg.matrix_rank(gain) == 3
         and np.isfinite(np.linalg.inv(gain)).all()
     )
-
-
-def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
-    """Correct the sensors of a record that a model covers, all other columns unchanged; raises as `correction` does.
-
-    With ``invert`` the record holds true values and the outputs of the instrument are made of them.
-    """
-    correct = model.correction(record, invert)
-    triads = [record.triad(sensor) for sensor in correct.units]
-    corrected = correct({triad.sensor: triad.values for triad in triads})
-    columns = dict(record.columns)
-    for triad in triads:
-        for i, axis in enumerate("xyz"):
-            name, values = f"{triad.sensor}_{axis}", np.ascontiguousarray(corrected[triad.sensor][:, i])
-            columns[name] = Column(name, correct.units[triad.sensor], values, triad.t, triad.source)
-    return Record(columns, record.findings, record.sources, record.labels)

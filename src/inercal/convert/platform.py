@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inercal.convert.correct import Correction, Samples
+from inercal.arrays import Array
+from inercal.convert.correction import Correction, Samples
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -75,13 +76,22 @@ class PlatformModel:
             "acc": acc.indicate if invert else acc.correct,
         }
         units = {triad.sensor: triad.unit for triad in triads}
-        factors = {sensor: unit.factor for sensor, unit in units.items()}
+        columns = [(sensor, f"{sensor}_{axis}") for sensor in units for axis in "xyz"]
 
         def work(samples: Samples) -> Samples:
-            return {sensor: works[sensor](x) / factors[sensor] for sensor, x in samples.items()}
+            results: dict[str, Array] = {}
+            for sensor, unit in units.items():
+                x = np.stack([samples[f"{sensor}_{axis}"] for axis in "xyz"], axis=-1)
+                corrected = works[sensor](x) / unit.factor
+                results |= {f"{sensor}_{axis}": corrected[..., i] for i, axis in enumerate("xyz")}
+            return results
 
-        settings = {"platform": self.platform, "acc": self.accelerometer, "invert": invert}
-        return Correction(work, units, factors, settings)
+        return Correction(
+            work,
+            {name: (units[sensor].factor, 0.0) for sensor, name in columns},
+            {name: (name, units[sensor]) for sensor, name in columns},
+            {"platform": self.platform, "acc": self.accelerometer, "invert": invert},
+        )
 
 
 def platform_model(estimate: Estimate, where: object = "calibration") -> PlatformModel:

@@ -29,6 +29,16 @@ def rounded(value: float, u: float, *others: float) -> tuple[str, ...]:
     return (f"{value:.{digits}e}", *(f"{x:.1e}" for x in (u, *others)))
 
 
+def concise(value: float, u: float) -> str:
+    """A value with its u in brackets, in units of the last digits: ``0.1667(12)``, ``3.0(21)e-09``."""
+    power = Decimal(f"{max(abs(value), u):.1e}").adjusted()
+    if power < -5:
+        return f"{concise(value / 10.0**power, u / 10.0**power)}e{power:03d}"
+    first = Decimal(f"{u:.1e}").adjusted()
+    places = max(0, 1 - first)
+    return f"{round(value, 1 - first) + 0.0:.{places}f}({round(u * 10**places)})"
+
+
 def short(value: float | None, digits: int = 2) -> str:
     """A number without an uncertainty, to so many digits after the first; a dash where there is none."""
     if value is None or not math.isfinite(value):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result
-from inercal.findings import Finding, Status
+from inercal.findings import Finding
 from inercal.records.record import Record
 
 
@@ -48,22 +47,31 @@ def compare(first: Result | Estimate | str | Path, second: Result | Estimate | s
     return of_comparison(compared(*files), files[0].estimate)
 
 
-def apply(calibration: Result | Estimate | str | Path, record: Record, invert: bool = False) -> Record:
+def apply(
+    calibration: Result | Estimate | str | Path,
+    record: Record,
+    invert: bool = False,
+    uncertainty: bool = False,
+) -> Record:
     """Correct a recording with a calibration.
 
     Parameters
     ----------
     calibration : Result, or path of a saved one
-        Of an IMU or a platform.
+        Of an IMU, an instrument on a turntable, a platform, or a temperature model.
     record : Record
-        With the channels that were calibrated, in units of the same kind.
+        With the channels that were calibrated, in units of the same kind; of gyros whose drift depends on gravity also
+        the specific force ``acc_x acc_y acc_z`` or the angles of the table, of a temperature model ``temperature``.
     invert : bool
         The record holds true values, and outputs of the instrument are made of them.
+    uncertainty : bool
+        Also the standard uncertainty of each corrected value by that of the coefficients, as columns ``u_acc_x``, ...
 
     Returns
     -------
     Record
-        Specific force [m/s^2] and rate [rad/s]; its findings include those of the calibration.
+        Specific force [m/s^2] and rate [rad/s] (``rate_x`` of an instrument that was calibrated on a turntable); its
+        findings include those of the calibration.
 
     Raises
     ------
@@ -78,30 +86,21 @@ def apply(calibration: Result | Estimate | str | Path, record: Record, invert: b
     >>> ic.apply(ic.calibrate(log, gravity="9.81 m/s^2"), log)["acc_x"].unit.symbol
     'm/s^2'
     """
-    from inercal.convert.correct import apply_to
+    from inercal.convert.correction import apply_to
+    from inercal.convert.models import model_of, worth_knowing
 
-    model, findings = model_of(*estimate_of(calibration, "calibration"))
-    corrected = apply_to(record, model, invert)
-    return replace(corrected, findings=(*findings, *worth_saying(corrected, model)))
-
-
-def model_of(estimate: Estimate, where: object = "calibration") -> tuple[Any, tuple[Finding, ...]]:
-    """The instrument of a calibration, and what to say of that: a bad verdict, terms that are not applied."""
-    from inercal.convert import correct, platform
-
-    verdict = f"the calibration ended {estimate.status.value}: {estimate.message}"
-    bad = () if estimate.status is Status.OK else (Finding("bad_verdict", verdict, str(where)),)
-    if estimate.command == platform.COMMAND:
-        return platform.platform_model(estimate, where), (*bad, *platform.not_applied(estimate, where))
-    return correct.imu_model(estimate, where), (*bad, *correct.not_applied(estimate, where))
+    estimate, where = estimate_of(calibration, "calibration")
+    corrected = apply_to(record, model_of(estimate, where, uncertainty), invert)
+    findings = (*worth_knowing(estimate, where), *worth_saying(corrected, estimate))
+    return replace(corrected, findings=findings)
 
 
-def worth_saying(record: Record, model: Any) -> tuple[Finding, ...]:
+def worth_saying(record: Record, estimate: Estimate) -> tuple[Finding, ...]:
     """Findings of a record, but for the rate and the accelerometers that nobody needs of a platform."""
-    from inercal.convert.platform import PlatformModel
+    from inercal.convert.platform import COMMAND
     from inercal.selfcal.reading import worth_saying as of_platform
 
-    if isinstance(model, PlatformModel):
+    if estimate.command == COMMAND:
         return tuple(of_platform(record, record.columns.values()))
     return record.findings
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View, coefficients
 from inercal.face.study import Study
@@ -46,6 +48,14 @@ def calibrate(
     return Result(
         estimate, of_coefficients(shown, page), calibrated[0] if len(calibrated) == 1 else tuple(calibrated)
     )
+
+
+def simulate(study: Study, rng: np.random.Generator) -> Record:
+    """A simulated record of an IMU that is held in the poses of the study."""
+    from inercal.imu import task
+
+    with study.at_fault():
+        return task.simulate(study.settings, rng)
 
 
 def of_temperature(model: TemperatureModel) -> Result:

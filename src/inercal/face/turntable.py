@@ -73,6 +73,49 @@ def design(study: Study, progress: Progress = lambda _: None) -> Result:
     return Result(result, View(result, words, lambda: [designed.table()], page, picture), designed)
 
 
+def design_tolerances(study: Study, progress: Progress = lambda _: None) -> Result:
+    """Find the cheapest tolerances that reach the goals of the study.
+
+    ``evidence`` is the `inercal.turntable.positions.tolerance_design.ToleranceDesign`.
+    """
+    from inercal.records.read import source_of
+    from inercal.turntable.positions.tolerance_design import REFERENCES
+    from inercal.turntable.positions.tolerance_design import design_tolerances as searched
+    from inercal.turntable.positions.tolerance_result import result as as_result
+    from inercal.turntable.positions.tolerance_result import table
+
+    clock = time.perf_counter()
+    with study.at_fault():
+        designed = searched(study.settings, progress)
+    timing = {"solve": time.perf_counter() - clock}
+    made = as_result(designed, study.settings)
+    estimate = without_coefficients(
+        "design tolerances",
+        designed.message,
+        made,
+        map(source_of, study.files),
+        designed.findings,
+        timing,
+        study.keys,
+        references=REFERENCES,
+    )
+
+    def page() -> str:
+        from inercal.turntable.figures.tolerances import page as of_tolerances
+
+        return of_tolerances(designed, study.settings, estimate)
+
+    def picture() -> Picture:
+        from inercal.turntable.figures.tolerances import main
+
+        return main(made)
+
+    words = f"a cost of {designed.best.cost:.4g}, {designed.present_cost:.4g} as they are"
+    return Result(
+        estimate, View(estimate, words, lambda: [table(made, study.settings)], page, picture), designed
+    )
+
+
 def sensitivity(
     study: Study,
     maps: bool = True,

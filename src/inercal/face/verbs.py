@@ -102,7 +102,7 @@ def _imu_study(record: Record, given: dict[str, str]) -> Study:
 
 
 def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
-    """Simulate a recording of the test that a study plans: of a turntable, a platform, or a model on a sting.
+    """Simulate a recording of the test that a study plans: of an IMU, a turntable, a platform, or a model on a sting.
 
     Parameters
     ----------
@@ -130,18 +130,19 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
     study = study_of(study)
     if not isinstance(rng, np.random.Generator):
         raise InputError("rng", f"found {type(rng).__name__}, expected numpy.random.default_rng(seed)")
-    made: Record = _of_system(study, "simulate", "turntable, selfcal or aoa")(study, rng)
+    made: Record = _of_system(study, "simulate", "imu, turntable, selfcal or aoa")(study, rng)
     return made
 
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
-    """Find the positions of a turntable, or the path of a platform, that calibrate best.
+    """Find the positions or tolerances of a turntable, or the path of a platform, that calibrate best.
 
     Parameters
     ----------
     study : Study or path
     what : str, optional
-        ``"positions"`` of a turntable, ``"selfcal"`` of a platform, as the commands name it; by the kind if absent.
+        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, as the commands name it; if
+        absent, by the kind, positions.
 
     Returns
     -------
@@ -162,7 +163,7 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     12
     """
     study = study_of(study)
-    kinds = {"positions": "turntable", "selfcal": "selfcal"}
+    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal"}
     if what is not None and kinds.get(what) != study.kind:
         raise InputError(
             "design", f"found {what!r} of a study of kind {study.kind}, expected {_designs(study.kind)}"
@@ -174,13 +175,13 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     system = import_module(f"inercal.face.{study.kind}")
     if study.kind == "selfcal":
         system.prepare_design(study)
-    result: Result = system.design(study)
+    result: Result = system.design_tolerances(study) if what == "tolerances" else system.design(study)
     return result
 
 
 def _designs(kind: str) -> str:
     """The designs of a kind, in words."""
-    return {"turntable": "'positions'", "selfcal": "'selfcal'"}.get(
+    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'"}.get(
         kind, "a study of kind turntable or selfcal"
     )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from inercal.units import STANDARD_GRAVITY
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -13,7 +15,17 @@ class Limits:
     # every method
 
     initial_rest: float = 5.0
-    """Shortest period of rest [s] at the start of a recording."""
+    """Shortest period of rest [s] at the start of a recording by which its noise is judged."""
+
+    calm_variance: float = 3.0
+    """Variance of an output, over that of its calmest twentieth, below which a stretch is among the quietest."""
+
+    restless_variance: float = 1.5
+    """Variance of an output at the start, over that in the quietest stretches elsewhere, from which the start is
+    restless."""
+
+    fewest_at_rest: int = 16
+    """Samples of a stretch at rest that say something of the noise."""
 
     moving_variance: float = 30.0
     """Variance of an output, over that at rest, from which the instrument certainly moves."""
@@ -25,17 +37,47 @@ class Limits:
     """Rms angle [rad] between carried and measured verticals beyond which gyro and accelerometers contradict each
     other."""
 
+    outlier_risk: float = 5e-4
+    """Accepted probability that a sound pose, or a sound turn, of a recording is named as outlying."""
+
+    outlier_share: float = 0.2
+    """Share of the poses, or turns, that outliers may be."""
+
+    outlier_dof: int = 3
+    """Degrees of freedom that have to be left without the outliers."""
+
     scatter_probability: float = 0.05
     """Probability below which more scatter than the noise explains is not put down to chance."""
+
+    low_scatter_probability: float = 0.01
+    """Probability below which less scatter than the noise explains is not: the noise at rest was not that of the
+    poses."""
 
     condition: float = 50.0
     """Condition number of the scaled Jacobian beyond which a combination of terms counts as weakly known; sound tests
     have 1 to 20."""
 
+    ordinary_clock: float = 50e-6
+    """Relative error that the clock of a recorder has as a rule."""
+
     # multi-position
 
     fewest_poses: int = 10
     """Poses that a fit needs: nine would fit nine parameters without a residual and prove nothing."""
+
+    poses_with_k2: int = 13
+    """Poses that a fit with K2 needs."""
+
+    ordinary_k2: float = 30e-6 / STANDARD_GRAVITY
+    """Second-order coefficient [1/(m/s^2)] that good accelerometers have, 30 ug/g^2: what is not fitted may be as
+    large, unless the poses say otherwise."""
+
+    possible_k2_shift: float = 2.0
+    """Shift of a value by the K2 that the poses leave open, over its u, beyond which it does harm where poses would
+    allow K2 to be fitted."""
+
+    k2_probability: float = 1e-3
+    """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
 
     same_pose: float = 5e-3
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""

@@ -1,4 +1,4 @@
-"""A recording made ready: its triads, the initial static period, and the noise at rest."""
+"""A recording made ready: its triads, and the noise at rest."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.errors import RecordError, StudyError
+from inercal.errors import RecordError
+from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
+from inercal.imu.rest import rest_of
 from inercal.instruments.triad import TriadModel
-from inercal.noise.dwell_means import AllanFit
-from inercal.noise.dwell_means import fit as fit_allan
+from inercal.noise.dwell_means import AllanFit, fit_pooled
 from inercal.records.checks.values import saturated
 from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
@@ -21,22 +22,23 @@ from inercal.records.record import Record
 
 @dataclass(frozen=True)
 class Recording:
-    """The triads of a record, and their noise in its initial static period.
+    """The triads of a record, and their noise at rest.
 
-    ``restlessness`` holds, for each triad, the windowed variance over that of the initial static period, on
-    the accelerometers' time axis; ``initial`` is that period, ``noise`` the Allan fit of each triad in it,
-    ``resolution`` (3,) the step of those axes whose noise at rest is below half a step (0 for the others)
-    [output].
+    ``rest`` is where that noise was taken: the initial static period or, where the start was restless, the quietest
+    stretches of the recording. ``restlessness`` holds, for each triad, the windowed variance over that at rest, on
+    the accelerometers' time axis; ``noise`` the Allan fit of each triad at rest, ``resolution`` (3,) the step of those
+    axes whose noise at rest is below half a step (0 for the others) [output].
     """
 
     accelerometer: Triad
     gyro: Triad | None
-    initial: Dwell
+    rest: tuple[Dwell, ...]
     window: int
     cuts: NDArray[np.int64]
     restlessness: dict[str, Array]
     noise: dict[str, AllanFit]
     resolution: dict[str, Array]
+    findings: tuple[Finding, ...] = ()
 
 
 def prepare(record: Record, static_start: float | None) -> Recording:
@@ -45,7 +47,7 @@ def prepare(record: Record, static_start: float | None) -> Recording:
     Raises
     ------
     RecordError
-        No accelerometer triad, hardly any samples, or no quiet start.
+        No accelerometer triad, hardly any samples, or no rest.
     StudyError
         ``static_start`` [s] does not fit the record, or the instrument moves in it.
     """
@@ -58,21 +60,31 @@ def prepare(record: Record, static_start: float | None) -> Recording:
             _plausible(triad)
     window = window_samples(accelerometer.rate)
     variances = {"acc": windowed_variance(accelerometer.values, window)}
+    floors = {"acc": _least_variance(accelerometer)}
     if gyro is not None:
         own = windowed_variance(gyro.values, window_samples(gyro.rate))
         variances["gyro"] = own if gyro.t is t else on_other_clock(own, gyro.t, t)
+        floors["gyro"] = _least_variance(gyro)
     # a lost sample does no harm to the mean of a hold; half a window lost may hide a movement
     cuts = breaks(t, 0.5 * window / accelerometer.rate)
-    initial = _initial(t, variances["acc"], window, cuts, static_start, where)
+    rest, findings = rest_of(t, variances, floors, window, cuts, static_start, where)
     noise, restlessness, resolution = {}, {}, {}
     for triad in (accelerometer, gyro):
         if triad is not None:
-            rest = _at_rest(triad, t[initial.start], t[initial.stop - 1], static_start)
-            size = float(np.linalg.norm(np.var(rest, axis=0, ddof=1)))
-            restlessness[triad.sensor] = variances[triad.sensor] / max(size, 1e-300)
-            noise[triad.sensor] = fit_allan(rest, 1.0 / triad.rate)
-            resolution[triad.sensor] = coarse_steps(triad.values, rest)
-    return Recording(accelerometer, gyro, initial, window, cuts, restlessness, noise, resolution)
+            stretches = _at_rest(triad, t, rest)
+            dof = [len(each) - 1 for each in stretches]
+            variance = np.average([np.var(each, axis=0, ddof=1) for each in stretches], axis=0, weights=dof)
+            size = max(float(np.linalg.norm(variance)), floors[triad.sensor])
+            restlessness[triad.sensor] = variances[triad.sensor] / size
+            noise[triad.sensor] = fit_pooled(stretches, 1.0 / triad.rate)
+            resolution[triad.sensor] = coarse_steps(triad.values, np.sqrt(variance))
+    return Recording(accelerometer, gyro, rest, window, cuts, restlessness, noise, resolution, findings)
+
+
+def _least_variance(triad: Triad) -> float:
+    """Windowed variance below which nothing is told of rest: of rounding to the output's steps, and of arithmetic."""
+    steps = coarse_steps(triad.values, np.zeros(3))
+    return float(np.linalg.norm(np.maximum(steps**2 / 12.0, (1e-7 * np.ptp(triad.values, axis=0)) ** 2)))
 
 
 def _plausible(triad: Triad) -> None:
@@ -125,84 +137,27 @@ def on_other_clock(values: Array, t: Array, other: Array) -> Array:
     return out
 
 
-def _at_rest(triad: Triad, begin: float, end: float, static_start: float | None) -> Array:
-    """Finite samples of a triad in the initial static period; raises where nothing varies."""
-    rest = triad.values[(triad.t >= begin) & (triad.t <= end)]
-    rest = rest[np.isfinite(rest).all(axis=1)]
-    if len(rest) < 16 or not np.any(np.var(rest, axis=0) > 0):
-        length = "" if static_start is None else f" of {static_start:g} s"
+def _at_rest(triad: Triad, t: Array, rest: tuple[Dwell, ...]) -> list[Array]:
+    """Samples of a triad in the stretches at rest, which are on the time axis ``t``; raises where there are none."""
+    stretches = [triad.values[(triad.t >= t[d.start]) & (triad.t <= t[d.stop - 1])] for d in rest]
+    stretches = [each for each in stretches if len(each) >= LIMITS.fewest_at_rest]
+    if not stretches:
         raise RecordError(
             triad.source.path,
-            f"{triad.sensor} has no noise in the initial static period{length} ({len(rest)} samples), "
-            "expected raw samples of an instrument at rest",
+            f"{triad.sensor} has no samples where the instrument is at rest, expected raw samples",
         )
-    return rest
+    return stretches
 
 
-def coarse_steps(values: Array, rest: Array) -> Array:
-    """The output's step on axes (3,) whose standard deviation at ``rest`` is below half of it, else 0."""
+def coarse_steps(values: Array, deviation: Array) -> Array:
+    """The output's step on axes (3,) whose standard ``deviation`` (3,) at rest is below half of it, else 0."""
     steps = np.zeros(3)
     for i in range(3):
         moves = np.abs(np.diff(values[:, i]))
         least = np.min(moves, initial=np.inf, where=np.isfinite(moves) & (moves > 0))
-        if np.std(rest[:, i]) < 0.5 * least < np.inf:
+        if deviation[i] < 0.5 * least < np.inf:
             steps[i] = least
     return steps
-
-
-def _initial(
-    t: Array,
-    variance: Array,
-    window: int,
-    cuts: NDArray[np.int64],
-    static_start: float | None,
-    where: str,
-) -> Dwell:
-    """The initial static period: as stated and then checked, or up to the first movement."""
-    finite = np.isfinite(variance)
-    if np.count_nonzero(finite) < 2 * window:
-        raise RecordError(
-            where,
-            f"found {len(t)} samples, expected a recording that starts with at least {LIMITS.initial_rest:g} s at rest",
-        )
-    first = int(np.argmax(finite))
-    # the calmest twentieth of the record tells what rest looks like before anything else is known
-    calm = float(np.quantile(variance[finite], 0.05))
-    restless = np.flatnonzero(variance[first:] > LIMITS.moving_variance * max(calm, 1e-300)) + first
-    moves = int(restless[0] - window // 2) if len(restless) else len(t)
-    broken = int(next(iter(cuts[cuts > first]), len(t)))
-    stop = max(min(moves, broken), 0)
-    still = float(t[max(stop - 1, 0)] - t[0])
-    event = "the instrument moves" if moves <= broken else "the time axis breaks"
-    if static_start is None:
-        if still < LIMITS.initial_rest:
-            raise RecordError(
-                where,
-                f"{event} {still:.1f} s after the start, expected at least {LIMITS.initial_rest:g} s at rest",
-            )
-        return Dwell(0, stop)
-    if t[-1] - t[0] < LIMITS.initial_rest:
-        raise RecordError(
-            where,
-            f"lasts {t[-1] - t[0]:.1f} s, expected at least {LIMITS.initial_rest:g} s at rest and turns",
-        )
-    if not LIMITS.initial_rest <= static_start <= t[-1] - t[0]:
-        raise StudyError(
-            "imu.static_start",
-            f"found {static_start:g} s, expected {LIMITS.initial_rest:g} s to the length of the record, "
-            f"{t[-1] - t[0]:.1f} s",
-        )
-    end = int(np.argmax(t > t[0] + static_start)) or len(t)
-    inside = variance[: max(end - window // 2, 0)]
-    inside = inside[np.isfinite(inside)]
-    if stop < end - window and (
-        not len(inside) or np.max(inside) > LIMITS.moving_variance * np.median(inside)
-    ):
-        raise StudyError(
-            "imu.static_start",
-            f"found {static_start:g} s, expected a still period: {event} after {still:.1f} s",
-        )
-    return Dwell(0, end)
 
 
 def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
-from inercal.keys import RELATIVE_U, TIME, Bounds, option, quantity, within
+from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, within
 from inercal.rigs.chain import Chain
 from inercal.units import Quantity
 
@@ -21,6 +21,8 @@ MASKED = ("saturation",)
 
 COMMAND = "calibrate imu"
 """The command behind every method of this room, as its results have it."""
+
+NOT_NEGATIVE = within(0.0, math.inf, "a size of 0 or more")
 
 _TURN = Bounds(
     lambda angle: math.radians(10.0) <= abs(angle) <= math.radians(36000.0),
@@ -111,6 +113,65 @@ Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRate
 
 @short_repr
 @dataclass(frozen=True)
+class Simulation:
+    """A simulated recording: the instrument lies still, then is turned from pose to pose by hand.
+
+    Biases wander with a correlation time of 100 s. ``coefficients`` are true values by symbol, in counts and SI.
+    """
+
+    poses: int = option("held one after the other, the first level", 24, least=4, most=1000)
+    start: float = quantity("length of the first hold", "time", "30 s", bounds=TIME)
+    hold: float = quantity("length of each other hold", "time", "3 s", bounds=TIME)
+    turning: float = quantity("length of each turn", "time", "3 s", bounds=TIME)
+    sample_rate: float = quantity("samples per second", "frequency", "100 Hz", bounds=FREQUENCY)
+    accelerometer_noise: float = quantity(
+        "white noise of the accelerometers", "velocity random walk", "80 ug/sqrt(Hz)", bounds=NOT_NEGATIVE
+    )
+    gyro_noise: float = quantity(
+        "white noise of the gyros", "angle random walk", "2 deg/sqrt(h)", bounds=NOT_NEGATIVE
+    )
+    accelerometer_wander: float = quantity(
+        "standard deviation of the biases of accelerometers", "acceleration", "30 ug", bounds=NOT_NEGATIVE
+    )
+    gyro_wander: float = quantity(
+        "standard deviation of the biases of gyros", "rate", "10 deg/h", bounds=NOT_NEGATIVE
+    )
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Disturbances that a simulation adds to a recording by hand; none if absent. ``k2`` [1/(m/s^2)]."""
+
+    restless_start: float = quantity(
+        "standard deviation of a tremble of the attitude in the first hold, as of an IMU in the hand", "angle",
+        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE,
+    )  # fmt: skip
+    knocks: int = option("turns in which the instrument is knocked", 0, least=0, most=1000)
+    knock: float = quantity("angle by which the gyro is wrong after a knock", "angle", "1 deg")
+    gyro_range: float | None = quantity(
+        "rate at which the gyro clips; without limit if absent", "rate", example="80 deg/s", bounds=RATE
+    )
+    clock: float = quantity(
+        "relative error of the clock, positive where it counts too many seconds", "number", "0", example="0.3 %",
+        bounds=within(-0.5, 0.5, "within 50 %"),
+    )  # fmt: skip
+    k2: float = 0.0
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """Parts of a recording that no fit uses: ``times`` (begin, end) [s] of its clock, and ``poses`` by number."""
+
+    times: tuple[tuple[float, float], ...] = ()
+    poses: tuple[int, ...] = ()
+
+    def touches(self, begin: float, end: float) -> bool:
+        """True where some of the time from ``begin`` to ``end`` [s] is left out."""
+        return any(begin < last and first < end for first, last in self.times)
+
+
+@dataclass(frozen=True)
 class ImuSettings:
     """Settings of a calibration, in SI.
 
@@ -118,12 +179,16 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start, g_sensitivity, bias_drift, time_base_u
+    static_start, g_sensitivity, bias_drift, k2, time_base_u
         As their keys say.
+    exclude : Exclusion
+        Poses and turns to be left out.
     traceability : mapping
         ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
     method : Method or None
         Options of the method; None: multi-position, un-aided.
+    simulation, disturbances
+        What is simulated, and what is added to it.
     temperature : Quantity or None
         Temperature of the instrument.
     given : mapping
@@ -137,12 +202,19 @@ class ImuSettings:
     )  # fmt: skip
     g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
     bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
+    k2: bool = option(
+        "also estimate the second-order coefficients of the accelerometers: K1 (f + K2 f^2), f along the input axis",
+        False,
+    )
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="time_base",
     )  # fmt: skip
+    exclude: Exclusion = Exclusion()
     traceability: Mapping[str, str] = field(default_factory=dict)
     method: Method | None = None
+    simulation: Simulation = Simulation()
+    disturbances: Disturbances = Disturbances()
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
 

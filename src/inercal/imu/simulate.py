@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.earth import earth_rate
 from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
+from inercal.imu.settings import Disturbances
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel, triad_from_terms
 from inercal.records.made import record_of
@@ -111,6 +113,7 @@ def simulate(
     hold: float = 3.0,
     turn: float = 3.0,
     clock: float = 1.0,
+    disturbances: Disturbances = Disturbances(),  # noqa: B008  (frozen)
 ) -> tuple[Record, ImuTruth]:
     """Record a hand-held calibration.
 
@@ -128,6 +131,8 @@ def simulate(
         Length of the first hold, of the others and of the turns [s].
     clock : float
         Seconds that the record's clock counts in a true second.
+    disturbances : Disturbances
+        All but the error of the clock.
 
     Returns
     -------
@@ -158,6 +163,8 @@ def simulate(
             q.append(multiply(attitude, exp(angle[:, None] * steps[k])))
             rates.append(speed[:, None] * steps[k])
             moving.append(np.sin(2.0 * np.pi * s)[:, None] * rng.uniform(-1.0, 1.0, 3))
+    if disturbances.restless_start > 0.0:
+        q[0], rates[0] = _trembling(poses[0], len(q[0]), rate, disturbances.restless_start, rng)
     q_nb = np.concatenate(q)
     to_body = conjugate(q_nb)
     north, up = earth_rate(latitude)
@@ -167,13 +174,61 @@ def simulate(
     f_error, f_wander = wandering_noise(truth.accelerometer_noise, n, rate, rng)
     w_error, w_wander = wandering_noise(truth.gyro_noise, n, rate, rng)
     acc = truth.accelerometer.indicate(f + f_error)
+    if disturbances.k2:
+        along = f @ truth.accelerometer.misalignment.T
+        acc = acc + truth.accelerometer.scale * (disturbances.k2 * along**2)
+    turned = [slice(a.stop, b.start) for a, b in itertools.pairwise(holds)]
+    knocked = rng.permutation(len(turned))[: disturbances.knocks] if disturbances.knocks else ()
+    for k in knocked:
+        w_error = w_error + _knock(turned[k], rate, disturbances.knock, n, rng)
     gyro = truth.gyro.indicate(omega + w_error) + f @ truth.g_sensitivity.T
+    if disturbances.gyro_range is not None:
+        most = np.abs(truth.gyro.scale) * disturbances.gyro_range
+        gyro = np.clip(gyro, truth.gyro.bias - most, truth.gyro.bias + most)
     t = np.arange(n, dtype=np.float64) * (clock / rate)
     return record_of_counts(t, acc, gyro), replace(
         truth,
         accelerometer=_with_mean(truth.accelerometer, f_wander, holds),
         gyro=_with_mean(truth.gyro, w_wander, holds),
     )
+
+
+def with_values(truth: ImuTruth, values: Mapping[str, float]) -> ImuTruth:
+    """The instrument with these coefficients by term symbol in the place of its own."""
+    whole = truth.values() | dict(values)
+    g = np.array([[whole[f"G_{i}{j}"] for j in "xyz"] for i in "xyz"])
+    return replace(
+        truth,
+        accelerometer=triad_from_terms(whole, "K1", "M", "K0"),
+        gyro=triad_from_terms(whole, "S", "T", "D_F"),
+        g_sensitivity=g,
+    )
+
+
+def _trembling(
+    attitude: Array, n: int, rate: float, size: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Attitudes (n, 4) and rates (n, 3) [rad/s] of a hold that trembles by ``size`` [rad], at 1 to 6 Hz."""
+    t = np.arange(n) / rate
+    frequency = 2.0 * np.pi * rng.uniform(1.0, 6.0, (6, 3, 1))
+    phase = frequency * t + rng.uniform(0.0, 2.0 * np.pi, (6, 3, 1))
+    part = np.clip((t[-1] - t) / 0.5, 0.0, 1.0)  # dies away over the last half second
+    fade, slope = part**2 * (3.0 - 2.0 * part), np.where(part < 1.0, -12.0 * part * (1.0 - part), 0.0)
+    wave = size * np.sqrt(2.0 / 6.0) * np.sin(phase).sum(axis=0)
+    speed = size * np.sqrt(2.0 / 6.0) * (frequency * np.cos(phase)).sum(axis=0)
+    angle, change = (fade * wave).T, (fade * speed + slope * wave).T
+    # rate on the body's axes of exp(angle), to second order
+    return multiply(attitude, exp(angle)), change - 0.5 * np.cross(angle, change)
+
+
+def _knock(turn: slice, rate: float, angle: float, n: int, rng: np.random.Generator) -> Array:
+    """Rates (n, 3) [rad/s] that a gyro reads in some 20 ms of a turn and that are none, by ``angle`` [rad] in all."""
+    length = max(1, round(0.02 * rate))
+    begin = int(rng.integers(turn.start, max(turn.start + 1, turn.stop - length)))
+    axis = rng.standard_normal(3)
+    made = np.zeros((n, 3))
+    made[begin : begin + length] = angle * rate / length * axis / np.linalg.norm(axis)
+    return made
 
 
 def wandering_noise(noise: Noise, n: int, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:

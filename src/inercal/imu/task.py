@@ -1,4 +1,4 @@
-"""Calibration of an IMU by whichever method the settings ask for: a recording in, an estimate out."""
+"""The tasks of an IMU study: a calibration by the method it asks for, a simulated recording."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from inercal.errors import StudyError
+from inercal.estimate.suspicion import judged
 from inercal.findings import Finding
+from inercal.imu.limits import LIMITS
 from inercal.imu.settings import AidedSettings, FerrarisSettings, ImuSettings
 from inercal.records.record import Record
 
@@ -43,7 +48,11 @@ def calibrate(
     InputError
         The record does not hold what the method needs.
     """
+    if record.rate_u and not settings.time_base_u:
+        settings = replace(settings, time_base_u=record.rate_u)
     calibration = _by_method(record, settings, progress)
+    if record.rate_u == 0.0 and not settings.time_base_u:
+        calibration = _with_exact_rate(calibration)
     return calibration if settings.site.inputs else _with_exact_gravity(calibration, settings.site.gravity)
 
 
@@ -64,6 +73,27 @@ def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], 
             return calibrate_multiposition(record, settings, progress)
 
 
+def _with_exact_rate(calibration: Calibrated) -> Calibrated:
+    """The calibration, saying what an ordinary error of a sample rate typed without an uncertainty would do."""
+    estimate = calibration.estimate
+    scales = [estimate[f"S_{axis}"] for axis in "xyz" if f"S_{axis}" in estimate.names]
+    if not scales:
+        return calibration
+    shifts = {p.name: LIMITS.ordinary_clock * abs(p.value) / p.u for p in scales}
+    text = (
+        f"the sample rate is typed without an uncertainty: an error of {1e6 * LIMITS.ordinary_clock:.0f} ppm, ordinary "
+        f"for a clock, shifts the scale factors of the gyro by as much, {max(shifts.values()):.2g} of their u: state "
+        'its uncertainty, such as rate = "100.00(1) Hz", or imu.time_base'
+    )
+    harm = tuple(name for name, shift in shifts.items() if shift > 1.0)
+    findings, (status, message) = judged(
+        (estimate.status, estimate.message),
+        (*estimate.findings, Finding("rate_without_u", text, harm=harm)),
+        estimate.names,
+    )
+    return replace(calibration, estimate=replace(estimate, findings=findings, status=status, message=message))
+
+
 def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
     """The calibration, saying that gravity without an uncertainty was taken as it stands."""
     text = (
@@ -72,3 +102,42 @@ def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
     )
     findings = (*calibration.estimate.findings, Finding("stated_exact", text))
     return replace(calibration, estimate=replace(calibration.estimate, findings=findings))
+
+
+def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
+    """A simulated record of the study: an IMU held by hand in one pose after the other.
+
+    Coefficients that the study does not state are drawn.
+
+    Raises
+    ------
+    StudyError
+        Another method than multi-position, or no latitude for the earth rate.
+    """
+    from inercal.imu.simulate import Noise, draw_truth, hand_poses, with_values
+    from inercal.imu.simulate import simulate as simulate_poses
+
+    if settings.method is not None:
+        raise StudyError("imu.method", 'found another method, expected "multiposition" for a simulation')
+    if settings.site.latitude is None:
+        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
+    of, site = settings.simulation, settings.site
+    truth = replace(
+        with_values(draw_truth(rng), of.coefficients),
+        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
+        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
+    )
+    record, _ = simulate_poses(
+        truth,
+        hand_poses(rng, of.poses),
+        site.gravity,
+        settings.site.latitude,
+        rng,
+        rate=of.sample_rate,
+        start=of.start,
+        hold=of.hold,
+        turn=of.turning,
+        clock=1.0 + settings.disturbances.clock,
+        disturbances=settings.disturbances,
+    )
+    return record

@@ -8,7 +8,7 @@ of sensor z, y in the plane of those of y and z.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,7 +19,10 @@ from inercal.arrays import Array
 
 @dataclass(frozen=True)
 class TriadModel:
-    """Coefficients of a triad: ``scale`` (3,), ``misalignment`` (3, 3) with unit diagonal, ``bias`` (3,)."""
+    """Coefficients of a triad: ``scale`` (3,), ``misalignment`` (3, 3) with unit diagonal, ``bias`` (3,).
+
+    All may have batch axes in front, as where they change with temperature from sample to sample.
+    """
 
     scale: Array
     misalignment: Array
@@ -28,7 +31,7 @@ class TriadModel:
     @property
     def gain(self) -> Array:
         """S M (3, 3) [output per SI unit]."""
-        return self.scale[:, None] * self.misalignment
+        return self.scale[..., :, None] * self.misalignment
 
     def indicate(self, x: Array) -> Array:
         """Outputs (*batch, 3) for true inputs ``x`` (*batch, 3) in SI units."""
@@ -45,20 +48,26 @@ class TriadModel:
 
 
 def apart(A: Array, x: Array) -> Array:
-    """``A x`` of a matrix (3, 3) and each of the vectors ``x`` (*batch, 3), to the same digits in any batch.
+    """``A x`` of a matrix (*batch, 3, 3) and vectors ``x`` (*batch, 3), to the same digits in any batch.
 
     The matrix product of NumPy rounds one sample otherwise than the same among many.
     """
-    return x[..., 0, None] * A[:, 0] + x[..., 1, None] * A[:, 1] + x[..., 2, None] * A[:, 2]
+    return x[..., 0, None] * A[..., :, 0] + x[..., 1, None] * A[..., :, 1] + x[..., 2, None] * A[..., :, 2]
 
 
-def triad_from_terms(values: Mapping[str, float], scale: str, misalignment: str, bias: str) -> TriadModel:
-    """A triad from values by term symbol (prefixes such as ``K1``, ``M``, ``K0``); absent terms are 0."""
-    matrix = np.eye(3)
-    for i, j in ((i, j) for i in range(3) for j in range(3) if i != j):
-        matrix[i, j] = values.get(f"{misalignment}_{'xyz'[i]}{'xyz'[j]}", 0.0)
+def triad_from_terms(
+    values: Mapping[str, float] | Mapping[str, Array], scale: str, misalignment: str, bias: str
+) -> TriadModel:
+    """A triad from values (*batch,) by term symbol (prefixes such as ``K1``, ``M``, ``K0``); absent terms are 0."""
+
+    def together(parts: Iterable[float | Array]) -> Array:
+        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+    rows = [
+        together(1.0 if i == j else values.get(f"{misalignment}_{i}{j}", 0.0) for j in "xyz") for i in "xyz"
+    ]
     return TriadModel(
-        np.array([values[f"{scale}_{axis}"] for axis in "xyz"]),
-        matrix,
-        np.array([values.get(f"{bias}_{axis}", 0.0) for axis in "xyz"]),
+        together(values[f"{scale}_{axis}"] for axis in "xyz"),
+        np.stack(np.broadcast_arrays(*rows), axis=-2),
+        together(values.get(f"{bias}_{axis}", 0.0) for axis in "xyz"),
     )

@@ -98,7 +98,9 @@ class TimeEntry(Strict):
     """``[time]``: the sample rate of files without a time column, or whose stamps can't be trusted."""
 
     rate: str | None = Field(
-        default=None, description="sample rate, for files without a time column", examples=["100 Hz"]
+        default=None,
+        description="sample rate, for files without a time column, perhaps with its standard uncertainty",
+        examples=["100.00(1) Hz"],
     )
     ignore: bool = Field(default=False, description="take the rate in the place of stamps not to be trusted")
 
@@ -116,13 +118,15 @@ class RecordMap:
     """A column map, checked.
 
     ``parts`` holds the plain ``[columns]`` (its name is empty) and each ``[file.NAME]``; ``rate`` is the
-    sample rate [Hz] of ``[time]`` or None, and ``ignore_time`` asks to use it in place of any time column.
+    sample rate [Hz] of ``[time]`` or None, ``rate_u`` its relative standard uncertainty, and ``ignore_time`` asks to
+    use it in place of any time column.
     """
 
     path: Path
     parts: tuple[Part, ...]
     rate: float | None = None
     ignore_time: bool = False
+    rate_u: float = 0.0
 
 
 def read_map(path: str | Path) -> RecordMap:
@@ -150,13 +154,13 @@ def read_map(path: str | Path) -> RecordMap:
     if not entry.columns and not named:
         raise MapError(path, "columns: missing, expected at least one [columns.NAME] or [file.NAME]")
     plain = (Part(_channels(entry.columns, path), _options(entry.file)),) if entry.columns else ()
-    rate = _rate(entry.time, path)
+    rate, rate_u = _rate(entry.time, path)
     parts = (*plain, *(_part(name, named[name], path) for name in named))
     files = sorted({Path(part.path) for part in parts if part.name})
     if len({file.name for file in files}) < len(files):
         names = ", ".join(map(str, files))
         raise MapError(path, f"file: found one file name in two folders in {names}, expected distinct ones")
-    return RecordMap(Path(path), parts, rate, entry.time.ignore)
+    return RecordMap(Path(path), parts, rate, entry.time.ignore, rate_u)
 
 
 def _part(name: str, table: Mapping[str, Any], path: object) -> Part:
@@ -171,17 +175,17 @@ def _options(entry: FileEntry) -> FileOptions:
     return FileOptions(entry.delimiter, entry.decimal, entry.comment, entry.skip, entry.variable)
 
 
-def _rate(entry: TimeEntry, path: object) -> float | None:
-    """The stated sample rate [Hz]."""
+def _rate(entry: TimeEntry, path: object) -> tuple[float | None, float]:
+    """The stated sample rate [Hz], and its relative standard uncertainty."""
     where = f"{path}: time.rate"
     if entry.rate is None:
         if entry.ignore:
             raise MapError(where, 'missing, expected a rate such as "100 Hz" where time.ignore = true')
-        return None
-    rate = parse_quantity(entry.rate, "frequency", where).value
-    if rate <= 0:
+        return None, 0.0
+    rate = parse_quantity(entry.rate, "frequency", where)
+    if rate.value <= 0:
         raise MapError(where, f"found {shown(entry.rate)}, expected a rate above 0")
-    return rate
+    return rate.value, rate.u / rate.value
 
 
 def _channels(columns: Mapping[str, ColumnEntry], where: object) -> tuple[Channel, ...]:

@@ -28,7 +28,8 @@ class Record:
     Reading never drops, sorts or interpolates: rows that could not be read stand as NaN and are listed in
     ``findings``. Columns of files with different clocks keep their own time axes. ``labels`` holds the text
     of a label column (one string a row), if the map names one. ``span`` says what part of the sources it is, as
-    ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all.
+    ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all. ``rate_u`` is the relative standard
+    uncertainty of a sample rate that was typed, 0 if it had none; None where stamps are the clock.
     """
 
     columns: Mapping[str, Column]
@@ -36,6 +37,7 @@ class Record:
     sources: tuple[Source, ...] = ()
     labels: tuple[str, ...] = ()
     span: Mapping[str, float] = field(default_factory=dict)
+    rate_u: float | None = None
 
     def __repr__(self) -> str:
         """Ten lines at most: columns by clock with units and rows, and the findings."""

@@ -18,6 +18,7 @@ from inercal.findings import Status
 from inercal.instruments.terms import term
 from inercal.report.mathml import clauses
 from inercal.report.style import plain_unit
+from inercal.units import parse_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,19 +60,21 @@ _LABELS = {
     "condition": ("condition number", ""),
     "column_condition": ("condition number of the terms, columns scaled to one length", ""),
     "residual_rms": ("root-mean-square residual |f| − g", "m/s²"),
-    "residual_m_s2": ("residual |f| − g", "m/s²"),
+    "residual_m_s2": ("residual |f| − g", "µg"),
     "scatter": ("standard deviation of |f| in a pose about the fit", "m/s²"),
     "scatter_over_noise": ("that deviation over what the noise at rest explains", ""),
-    "threshold": ("threshold of rest, in variances of the initial static period", ""),
+    "threshold": ("threshold of rest, in variances at rest", ""),
     "chi2": ("weighted sum of squares", ""),
     "intervals": ("static poses", ""),
     "turns": ("turns", ""),
     "gyro_dof": ("degrees of freedom of the turns", ""),
     "gyro_condition": ("condition number of the scaled Jacobian, gyro", ""),
     "gyro_residual_rms_rad": ("root-mean-square miss of the turns", "rad"),
-    "miss_rad": ("miss", "rad"),
+    "miss_rad": ("miss", "arcsec"),
     "direction": ("direction of the specific force", ""),
 }
+#: key of a column -> the SI value of the unit that its label has
+_SIZES = {"residual_m_s2": parse_unit("ug").factor, "miss_rad": parse_unit("arcsec").factor}
 _UNITS = {
     "_m_s2": "m/s²",
     "_rad_s": "rad/s",
@@ -334,8 +337,13 @@ def _table(key: str, rows: Sequence[Mapping[str, Any]]) -> tuple[str, list[tuple
     """Title, columns (name and unit) and cells of rows of the result."""
     title, _ = _labelled((key,))
     heads = [_labelled((name,)) for name in rows[0]]
-    columns = [_column([row[name] for row in rows]) for name in rows[0]]
+    columns = [_column([_sized(name, row[name]) for row in rows]) for name in rows[0]]
     return title, heads, [list(cells) for cells in zip(*columns, strict=True)]
+
+
+def _sized(key: str, value: Any) -> Any:
+    """A value in the unit of its column's label."""
+    return value / _SIZES[key] if key in _SIZES and isinstance(value, float) else value
 
 
 def _column(values: Sequence[Any]) -> list[str]:
@@ -348,13 +356,20 @@ def _column(values: Sequence[Any]) -> list[str]:
     return [f"{round(x, places) + 0.0:.{places}f}" for x in numbers]
 
 
+def _component(x: float, small: bool) -> str:
+    """A component of a vector, to three decimals, or to three digits where the vector is small."""
+    return f"{x:.3g}" if small else f"{round(x, 3) + 0.0:.3f}"
+
+
 def _short(value: Any) -> str:
-    """A leaf as text, to four digits; vectors to three decimals."""
+    """A leaf as text, to four digits; vectors to three decimals, or as many digits where all are small."""
     match value:
         case float() if math.isfinite(value):
             return f"{value:.4g}"
         case list():
-            items = (f"{round(x, 3) + 0.0:.3f}" if isinstance(x, float) else _text(x) for x in value)
+            sizes = [abs(x) for x in value if isinstance(x, float) and math.isfinite(x)]
+            small = 0.0 < max(sizes, default=0.0) < 0.01
+            items = (_component(x, small) if isinstance(x, float) else _text(x) for x in value)
             return f"({', '.join(items)})"
         case _:
             return _text(value)

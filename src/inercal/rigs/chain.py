@@ -21,7 +21,9 @@ from numpy.typing import ArrayLike
 
 from inercal.arrays import Array
 from inercal.geometry.rotations import Axis, elementary, skew
+from inercal.inputs import Source
 from inercal.rigs.distribution import Distribution
+from inercal.rigs.patterns import Known, Numbers, Pattern, commanded
 
 
 class Scope(enum.Enum):
@@ -29,6 +31,7 @@ class Scope(enum.Enum):
 
     SAMPLE = "sample"
     POSITION = "position"
+    ANGLE = "angle"
     RUN = "run"
     RIG = "rig"
 
@@ -58,7 +61,9 @@ class Joint:
 class Error:
     """An elementary error: a small random rotation about ``axis``, or a shift along it.
 
-    ``distribution`` [rad; m if ``is_offset``], ``scope`` how long a value lasts, ``what`` in words.
+    ``distribution`` [rad; m if ``is_offset``], ``scope`` how long a value lasts, ``what`` in words. With a ``pattern``,
+    the error is the drawn value times the pattern at the angle of the joint before it. ``certificate`` says where its
+    distribution is stated, if it was measured.
     """
 
     name: str
@@ -67,9 +72,16 @@ class Error:
     scope: Scope
     what: str = ""
     is_offset: bool = False
+    pattern: Pattern | None = None
+    certificate: str = ""
+
+    @property
+    def source(self) -> str:
+        """Its name in a budget: the certificate first, if there is one."""
+        return f"{self.certificate}: {self.name}" if self.certificate else self.name
 
 
-Element: TypeAlias = Fixed | Joint | Error
+Element: TypeAlias = Fixed | Joint | Known | Error
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,17 +91,28 @@ class Chain:
     Raises
     ------
     ValueError
-        A joint or an error that occurs twice: one variable at two places is not covered.
+        A joint or an error that occurs twice: one variable at two places is not covered. An error that follows the
+        angle of a joint, before any joint.
     """
 
     elements: tuple[Element, ...]
 
     def __post_init__(self) -> None:
-        """Refuse names that occur twice."""
-        names = [element.name for element in self.elements if not isinstance(element, Fixed)]
+        """Refuse names that occur twice, and what follows the angle of no joint."""
+        names = [element.name for element in self.elements if isinstance(element, Joint | Error)]
         twice = {name for name in names if names.count(name) > 1}
         if twice:
             raise ValueError(f"found {', '.join(sorted(twice))} twice, expected each name once in a chain")
+        for element, joint in zip(self.elements, self._joint_before, strict=True):
+            if joint < 0 and follows_angle(element):
+                name = element.name if isinstance(element, Error) else "a known error"
+                raise ValueError(f"{name} follows an angle, expected it after a joint")
+
+    @cached_property
+    def _joint_before(self) -> tuple[int, ...]:
+        """Place among the joints of the last one up to each element; -1 before the first."""
+        counts = np.cumsum([isinstance(element, Joint) for element in self.elements])
+        return tuple((counts - 1).tolist())
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -119,24 +142,99 @@ class Chain:
             raise KeyError(missing[0])
         return Chain(tuple(new.get(e.name, e) if isinstance(e, Error) else e for e in self.elements))
 
+    @cached_property
+    def joint_of(self) -> tuple[int, ...]:
+        """Place among the joints of the one before each error (k,), whose angle it may follow; -1 where none is."""
+        pairs = zip(self.elements, self._joint_before, strict=True)
+        return tuple(joint for element, joint in pairs if isinstance(element, Error))
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Files of measured errors."""
+        return tuple(e.source for e in self.elements if isinstance(e, Known) and e.source is not None)
+
+    @cached_property
+    def followed(self) -> tuple[int, ...]:
+        """Places of the joints whose angle a known error, or the size of an error, follows."""
+        pairs = zip(self.elements, self._joint_before, strict=True)
+        return tuple(sorted({joint for element, joint in pairs if _has_pattern(element)}))
+
+    def sizes(self, angles: ArrayLike) -> Array:
+        """Patterns (*batch, k) of the errors at ``angles`` (*batch, joints) [rad]; 1 where an error has none."""
+        given, _ = self._checked(angles, None)
+        sizes = np.ones((*given.shape[:-1], len(self.errors)))
+        for k, (error, joint) in enumerate(zip(self.errors, self.joint_of, strict=True)):
+            if error.pattern is not None:
+                sizes[..., k] = error.pattern(given[..., joint])
+        return sizes
+
+    def standing(self, angles: ArrayLike) -> Chain:
+        """The chain near one position (joints,) [rad], free of patterns.
+
+        The errors are as wide as they are there, and what is known of them is a fixed rotation.
+        """
+        given, sizes = np.asarray(angles, dtype=float), self.sizes(angles)
+        elements: list[Element] = []
+        for element, joint in zip(self.elements, self._joint_before, strict=True):
+            if isinstance(element, Known):
+                elements.append(Fixed(elementary(element.axis, element.at(given[joint]))))
+            elif isinstance(element, Error) and element.pattern is not None:
+                size = float(sizes[self.factors.index(element.name)])
+                elements.append(
+                    replace(element, distribution=element.distribution.scaled(size), pattern=None)
+                )
+            else:
+                elements.append(element)
+        return Chain(tuple(elements))
+
+    def groups(self, angles: ArrayLike) -> tuple[Numbers, ...]:
+        """Number (n,) of the value that each error has at each of the positions (n, joints) [rad].
+
+        Positions of one number share one value.
+        """
+        given, _ = self._checked(angles, None)
+        every = np.arange(len(given))
+        return tuple(
+            np.zeros_like(every)
+            if error.scope.constant
+            else commanded(given[:, joint])
+            if error.scope is Scope.ANGLE
+            else every
+            for error, joint in zip(self.errors, self.joint_of, strict=True)
+        )
+
     def with_scope(self, scope: Scope) -> Chain:
         """The chain with all errors of one scope."""
         return self.with_errors(*(replace(error, scope=scope) for error in self.errors))
 
-    def draw(self, rng: np.random.Generator, positions: int, runs: int | None = None) -> Array:
+    def draw(self, rng: np.random.Generator, positions: int | Array, runs: int | None = None) -> Array:
         """Errors for the positions of a test, drawn by scope.
+
+        Parameters
+        ----------
+        rng : Generator
+        positions : int, or (n, joints) rad
+            Their number is enough where no error has the scope ``angle``.
+        runs : int, optional
 
         Returns
         -------
-        (positions, k), or (runs, positions, k) where ``runs`` is given
-            Errors [rad or m]; those of scope ``run`` and ``rig`` are the same at all positions of a run.
-            One of scope ``sample`` is drawn once a position too: averaging it is the simulation's work.
+        (n, k), or (runs, n, k) where ``runs`` is given
+            Errors [rad or m], before their patterns; those of scope ``run`` and ``rig`` are the same at all positions
+            of a run, those of scope ``angle`` at all of one angle. One of scope ``sample`` is drawn once a position
+            too: averaging it is the simulation's work.
         """
-        shape = (positions,) if runs is None else (runs, positions)
-        errors = np.empty((*shape, len(self.errors)))
-        for k, error in enumerate(self.errors):
-            once = (*shape[:-1], 1) if error.scope.constant else shape
-            errors[..., k] = error.distribution.sample(rng, once)
+        if isinstance(positions, int):
+            if any(error.scope is Scope.ANGLE for error in self.errors):
+                raise ValueError(
+                    "found a number of positions, expected their angles for errors of scope angle"
+                )
+            positions = np.zeros((positions, len(self.joints)))
+        batch = () if runs is None else (runs,)
+        errors = np.empty((*batch, len(positions), len(self.errors)))
+        for k, (error, numbers) in enumerate(zip(self.errors, self.groups(positions), strict=True)):
+            drawn = error.distribution.sample(rng, (*batch, int(numbers.max(initial=-1)) + 1))
+            errors[..., k] = drawn[..., numbers]
         return errors
 
     def pose(self, angles: ArrayLike, errors: ArrayLike | None = None) -> Array:
@@ -177,12 +275,14 @@ class Chain:
         """
         angles, none = self._checked(angles, None)
         before = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
-        turned_parts = []
+        sizes = self.sizes(angles)
+        turned_parts: list[tuple[Array, Array]] = []
         for element, value in self._values(angles, none):
             if isinstance(element, Error):
-                turn = np.zeros((3, 3)) if element.is_offset else skew(_UNIT[element.axis])
+                turn: Array = np.zeros((3, 3)) if element.is_offset else skew(_UNIT[element.axis])
                 # before K after, with C = before after
-                turned_parts.append((before @ turn, before))
+                size = sizes[..., len(turned_parts)][..., None, None]
+                turned_parts.append((before @ turn * size, before))
             else:
                 before = before @ _rotation(element, value)
         if not turned_parts:
@@ -194,14 +294,19 @@ class Chain:
 
     def _values(self, angles: Array, errors: Array) -> Iterable[tuple[Element, Array]]:
         """Each element with its values (*batch)."""
-        joint, error = 0, 0
-        for element in self.elements:
+        error = 0
+        for element, joint in zip(self.elements, self._joint_before, strict=True):
             if isinstance(element, Joint):
                 yield element, angles[..., joint]
-                joint += 1
             elif isinstance(element, Error):
-                yield element, errors[..., error]
+                value = errors[..., error]
+                yield (
+                    element,
+                    value if element.pattern is None else value * element.pattern(angles[..., joint]),
+                )
                 error += 1
+            elif isinstance(element, Known):
+                yield element, element.at(angles[..., joint] if joint >= 0 else np.zeros(()))
             else:
                 yield element, np.zeros(())
 
@@ -215,6 +320,18 @@ class Chain:
                     f"found {what} of shape {array.shape}, expected {len(names)} in the last axis"
                 )
         return given, values
+
+
+def follows_angle(element: Element) -> bool:
+    """True if an element needs the angle of a joint: by a pattern, or by one value for each angle."""
+    return _has_pattern(element) or (isinstance(element, Error) and element.scope is Scope.ANGLE)
+
+
+def _has_pattern(element: Element) -> bool:
+    """True if an error is known over the angle of a joint, or has a size that follows it."""
+    if isinstance(element, Known):
+        return bool(element.parts)
+    return isinstance(element, Error) and element.pattern is not None
 
 
 _UNIT: dict[str, Array] = dict(zip("xyz", np.eye(3), strict=True))

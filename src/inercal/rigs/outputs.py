@@ -33,6 +33,10 @@ class Output:
         """The output (*batch) [``unit``] for attitudes (*batch, 3, 3)."""
         return np.asarray(self.reference @ C_nb @ self.axis)
 
+    def slope(self, C_nb: Array, change: Array) -> Array:
+        """Change (*batch) of the output for a small ``change`` of the attitudes, both (*batch, 3, 3)."""
+        return self.value(change)
+
 
 #: names of the outputs of a table
 NAMES = ("ax", "ay", "az", "wx", "wy", "wz")

@@ -90,6 +90,7 @@ def turntable(
     scopes: Mapping[str, Scope] | None = None,
     base: Sequence[float] = (0.0, 0.0, 0.0),
     mounting: Array | None = None,
+    parts: Mapping[str, Sequence[Element]] | None = None,
 ) -> Chain:
     """A table of a known kind with its errors put in.
 
@@ -108,6 +109,8 @@ def turntable(
         order.
     mounting : (3, 3), optional
         Known nominal attitude of the instrument on the inner axis.
+    parts : mapping, optional
+        What else there is at the place of an error, by factor name: known errors, harmonics.
 
     Raises
     ------
@@ -116,7 +119,7 @@ def turntable(
     """
     given, scope_of = dict(errors or {}), dict(scopes or {})
     factors = {slot.name for slot in slots(kind)}
-    for name in (*given, *scope_of):
+    for name in (*given, *scope_of, *(parts or {})):
         if name not in factors:
             raise KeyError(name)
     elements: list[Element] = []
@@ -129,6 +132,7 @@ def turntable(
             continue
         if part.name == "dtheta_x" and mounting is not None:
             elements.append(Fixed(mounting))
+        elements += (parts or {}).get(part.name, ())
         distribution = given.get(part.name) or (None if part.optional else default)
         if distribution is not None:
             scope = scope_of.get(part.name, part.scope)

@@ -23,6 +23,7 @@ from inercal.arrays import Array
 from inercal.geometry.rotations import elementary, skew
 from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
+from inercal.rigs.patterns import Known
 from inercal.sensitivities.exact import drop_rounding, positions
 from inercal.sensitivities.indices import Indices, VarianceParts
 from inercal.sensitivities.moments import moments
@@ -80,6 +81,8 @@ def blocks(chain: Chain, angles: ArrayLike, degrees: Sequence[int]) -> Dense:
         elif isinstance(element, Joint):
             rotation = elementary(element.axis, given[:, chain.joints.index(element.name)])
             elements.append(_diagonal([_power(rotation, degree) for degree in degrees]))
+        elif isinstance(element, Known):
+            raise ValueError("found a known error, expected the chain of one position")
         else:
             elements.append(_diagonal([_power(element.rotation, degree) for degree in degrees]))
     return Dense(chain.factors, given, tuple(elements))

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from inercal.arrays import Array
 from inercal.rigs.distribution import Distribution
+from inercal.sensitivities.indices import Resampled
 
 Sampling: TypeAlias = Literal["random", "sobol"]
 
@@ -29,16 +30,15 @@ class Parts:
     """Estimated parts of the variance of outputs (o,), by factor (o, k).
 
     ``variance``, ``first_variance`` V_i and ``interaction_variance`` VT_i - V_i in units of the outputs squared,
-    ``mean`` in their units, ``u_first`` and ``u_total`` the standard uncertainties of the indices. The
-    differences VT_i - V_i of two estimates scatter about zero where a factor does not interact.
+    ``mean`` in their units; ``resampled`` the same three from resampled rows. The differences VT_i - V_i of two
+    estimates scatter about zero where a factor does not interact.
     """
 
     mean: Array
     variance: Array
     first_variance: Array
     interaction_variance: Array
-    u_first: Array
-    u_total: Array
+    resampled: Resampled
 
 
 def rows(samples: int, sampling: Sampling) -> int:
@@ -96,7 +96,7 @@ def evaluate(function: Callable[[Array], ArrayLike], A: Array, B: Array) -> tupl
 
 
 def estimate(f_A: Array, f_B: Array, f_AB: Array, resamples: int, rng: np.random.Generator) -> Parts:
-    """Saltelli's estimate of V_i and Jansen's of VT_i, with uncertainties from resampled rows.
+    """Saltelli's estimate of V_i and Jansen's of VT_i, and the same from resampled rows.
 
     The outputs are centred first: a mean far from zero would drown the first order in noise. The bootstrap
     takes the rows for independent: for Sobol points it states too much, up to some twenty times where the
@@ -122,12 +122,9 @@ def estimate(f_A: Array, f_B: Array, f_AB: Array, resamples: int, rng: np.random
     variance, first, total = _moments(terms, np.full((1, n), 1.0 / n))
     chosen = rng.integers(n, size=(resamples, n)) + n * np.arange(resamples)[:, None]
     weights = np.bincount(chosen.ravel(), minlength=n * resamples).reshape(resamples, n) / n
-    scattered, first_scattered, total_scattered = _moments(terms, weights)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        u_first, u_total = (
-            np.std(part / scattered[..., None], axis=0, ddof=1) for part in (first_scattered, total_scattered)
-        )
-    return Parts(mean, variance[0], first[0], total[0] - first[0], u_first, u_total)
+    again, first_again, total_again = _moments(terms, weights)
+    resampled = Resampled(again, first_again, total_again - first_again)
+    return Parts(mean, variance[0], first[0], total[0] - first[0], resampled)
 
 
 def _moments(terms: tuple[Array, ...], weights: Array) -> tuple[Array, Array, Array]:

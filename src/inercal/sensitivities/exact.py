@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 from inercal.arrays import Array
 from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
-from inercal.sensitivities.indices import Indices, VarianceParts
+from inercal.rigs.patterns import Known
+from inercal.sensitivities.indices import Indices, VarianceParts, by_position
 from inercal.sensitivities.moments import moments
 from inercal.sensitivities.shapley import shapley_effects
 
@@ -69,6 +70,17 @@ def analyse(
     ValueError
         Angles that do not fit the joints of the chain, or no threads.
     """
+    return by_position(
+        lambda standing, at: _analyse(standing, outputs, at, shapley, second, threads),
+        chain,
+        positions(chain, angles),
+    )
+
+
+def _analyse(
+    chain: Chain, outputs: Sequence[Output], angles: Array, shapley: bool, second: bool, threads: int | None
+) -> Indices:
+    """The parts where no error follows an angle."""
     passes = _Passes.of(chain, outputs, angles)
     variance, bias, first, interaction = passes.parts(threads)
     return Indices(
@@ -97,7 +109,7 @@ def closed_variance(
     KeyError
         A factor that the chain does not have.
     ValueError
-        As `analyse`.
+        As `analyse`; a chain in which errors are known or follow an angle (see `Chain.standing`).
     """
     for name in factors:
         if name not in chain.factors:
@@ -153,6 +165,8 @@ class _Passes:
                 elements.append((kernels.FIXED, 0, len(fixed)))
                 fixed.append(element.rotation)
                 continue
+            if isinstance(element, Known):
+                raise ValueError("found a known error, expected the chain of one position")
             axis = "xyz".index(element.axis)
             if isinstance(element, Joint):
                 elements.append((kernels.JOINT, axis, chain.joints.index(element.name)))

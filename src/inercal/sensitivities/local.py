@@ -29,7 +29,8 @@ def analyse(chain: Chain, outputs: Sequence[Output], angles: ArrayLike) -> Indic
     """
     positions = np.atleast_2d(np.asarray(angles, dtype=float))
     by_error = chain.slopes(positions)  # (n, k, 3, 3)
-    slopes = np.stack([each.value(by_error) for each in outputs])
+    C_nb = chain.attitude(positions)[:, None]
+    slopes = np.stack([each.slope(C_nb, by_error) for each in outputs])
     sizes = np.array([np.linalg.norm(each.reference) * np.linalg.norm(each.axis) for each in outputs])
     slopes[np.abs(slopes) < _ROUNDING * sizes[:, None, None]] = 0.0
     first = np.square(slopes * chain.std)

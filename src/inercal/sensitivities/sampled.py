@@ -18,7 +18,7 @@ from inercal.rigs.chain import Chain
 from inercal.rigs.distribution import Distribution
 from inercal.rigs.outputs import Output
 from inercal.sensitivities.estimators import Parts, Sampling, draw, estimate, evaluate, rows
-from inercal.sensitivities.indices import Indices
+from inercal.sensitivities.indices import Indices, Resampled
 
 RESAMPLES = 100
 """Resamples of the bootstrap: they give a standard uncertainty to 7 %."""
@@ -187,6 +187,10 @@ def _indices(
         first_variance=np.stack([parts.first_variance for parts in positions], axis=1),
         interaction_variance=np.stack([parts.interaction_variance for parts in positions], axis=1),
         method=method,
-        u_first=np.stack([parts.u_first for parts in positions], axis=1),
-        u_total=np.stack([parts.u_total for parts in positions], axis=1),
+        resampled=Resampled(
+            *(
+                np.stack([getattr(parts.resampled, part) for parts in positions], axis=2)
+                for part in ("variance", "first_variance", "interaction_variance")
+            )
+        ),
     )

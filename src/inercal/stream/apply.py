@@ -1,12 +1,14 @@
-"""A calibration applied to a stream: the digits are those of `inercal.convert.correct.apply_to` on a file."""
+"""A calibration applied to a stream: the digits are those of `inercal.convert.correction.apply_to` on a file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from inercal.convert.correct import Model
+from inercal.convert.correction import Model
+from inercal.findings import Finding
 from inercal.records.write.text import quoted
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output
@@ -24,6 +26,8 @@ class Apply:
     model : Model
     invert : bool
         From true values to outputs of the instrument.
+    say : callable
+        Told what is not corrected, and once of each column of the first sample beyond the range of the calibration.
 
     Raises
     ------
@@ -33,19 +37,25 @@ class Apply:
 
     kind = "apply"
 
-    def __init__(self, lines: Lines, model: Model, invert: bool = False) -> None:
+    def __init__(
+        self,
+        lines: Lines,
+        model: Model,
+        invert: bool = False,
+        say: Callable[[Finding], None] = lambda _: None,
+    ) -> None:
         self._correct = model.correction(lines.record, invert)
+        self._say, self._ranges = say, dict(self._correct.ranges)
+        for finding in self._correct.findings:
+            say(finding)
         self._labelled = lines.labelled
         names = list(lines.record.columns)
-        self._places = {
-            sensor: [names.index(f"{sensor}_{axis}") for axis in "xyz"] for sensor in self._correct.units
-        }
-        titles = ["t [s]"]
-        for column in lines.record.columns.values():
-            inside = column.axis != "" and column.sensor in self._correct.units
-            unit = self._correct.units[column.sensor] if inside else column.unit
-            titles.append(f"{column.name} [{unit.symbol}]")
-        self.columns = [*titles, *(["label"] if lines.labelled else [])]
+        self._reads = {name: names.index(name) for name in self._correct.reads}
+        written = {name: (name, lines.record[name].unit) for name in names} | dict(self._correct.writes)
+        self._writes = [(names.index(old), written[old][0]) for old in self._correct.writes]
+        titles = [*written.values(), *self._correct.appends.items()]
+        self.columns = ["t [s]", *(f"{name} [{unit.symbol}]" for name, unit in titles)]
+        self.columns += ["label"] if lines.labelled else []
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -59,10 +69,15 @@ class Apply:
     def step(self, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
         """The corrected sample."""
         values = sample.values.copy()
-        triads = {sensor: np.array([values[i] for i in places]) for sensor, places in self._places.items()}
-        for sensor, triad in self._correct(triads).items():
-            for i, value in zip(self._places[sensor], triad.tolist(), strict=True):
-                values[i] = value
+        results = self._correct({name: np.asarray(values[i]) for name, i in self._reads.items()})
+        beyond = [name for name, (low, high, _) in self._ranges.items() if not low <= results[name] <= high]
+        for name in beyond:
+            if results[name] == results[name]:
+                span = {name: self._ranges.pop(name)}
+                self._say(*replace(self._correct, ranges=span).outside(results))
+        for i, name in self._writes:
+            values[i] = float(results[name])
+        values += [float(results[name]) for name in self._correct.appends]
         return state, [[sample.t, *values, *([quoted(sample.label)] if self._labelled else [])]]
 
     def finish(self, state: State) -> Sequence[Output]:

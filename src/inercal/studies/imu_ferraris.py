@@ -29,13 +29,13 @@ def _ends(value: object) -> object:
             if 0 <= start < end - 1:
                 return value
         case [str(start), str(end)]:
-            begin, stop = _seconds(start), _seconds(end)
+            begin, stop = seconds_of(start), seconds_of(end)
             if begin < stop:
                 return value
     raise refusal(f"found {shown(value)}, {_EXPECTED}, the end after the start")
 
 
-def _seconds(text: str) -> float:
+def seconds_of(text: str) -> float:
     """A time [s]."""
     try:
         return parse_quantity(text, "time", "time").value
@@ -87,5 +87,5 @@ def _span(ends: list[str] | list[int] | str) -> tuple[float, float] | str:
     """A section as the settings have it: seconds, samples or a label."""
     if isinstance(ends, str):
         return ends
-    start, end = (_seconds(each) if isinstance(each, str) else each for each in ends)
+    start, end = (seconds_of(each) if isinstance(each, str) else each for each in ends)
     return start, end

@@ -84,14 +84,14 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
     unit = _unit(table, where)
     symbols = tuple(s for channel in CHANNELS[table.kind] for s in channel_model(table.kind, channel).symbols)
     for k, symbol in enumerate(table.terms or ()):
-        _check_symbol(symbol, symbols, f"instrument.terms.{k}", where)
+        check_symbol(symbol, symbols, f"instrument.terms.{k}", where)
         if symbol in (table.terms or ())[:k]:
             raise StudyError(where, f"instrument.terms: found {symbol} twice, expected each term once")
     values, uncertainties = {}, {}
     for symbol, text in table.coefficients.items():
         key = f"instrument.coefficients.{symbol}"
-        _check_symbol(symbol, (*symbols, *RATE_TERMS) if table.kind == "gyro" else symbols, key, where)
-        value, u = _coefficient(text, symbol, table.kind, unit, gravity, key, where)
+        check_symbol(symbol, (*symbols, *RATE_TERMS) if table.kind == "gyro" else symbols, key, where)
+        value, u = coefficient_of(text, symbol, table.kind, unit, gravity, key, where)
         values[symbol] = value
         if u > 0.0:
             uncertainties[symbol] = u
@@ -128,7 +128,7 @@ def _unit(table: InstrumentTable, where: object) -> Unit:
     return unit
 
 
-def _check_symbol(symbol: str, symbols: Sequence[str], key: str, where: object) -> None:
+def check_symbol(symbol: str, symbols: Sequence[str], key: str, where: object) -> None:
     """Refuse a term the instrument does not have."""
     if symbol not in symbols:
         near = difflib.get_close_matches(symbol[:80], symbols, n=1, cutoff=0.5)
@@ -136,7 +136,7 @@ def _check_symbol(symbol: str, symbols: Sequence[str], key: str, where: object) 
         raise StudyError(where, f"{key}: unknown term {shown(symbol)}, {hint}")
 
 
-def _coefficient(
+def coefficient_of(
     text: object, symbol: str, kind: str, unit: Unit, gravity: float, key: str, where: object
 ) -> tuple[float, float]:
     """Value and standard uncertainty of a term, in SI.

@@ -51,7 +51,7 @@ _ONE_OF = (
 )
 
 #: keys (a regular expression) that name a file
-_FILES = r"estimator\.prior|motion\.file|positions\.file|sensors\.\w+\.calibration"
+_FILES = r"estimator\.prior|motion\.file|positions\.file|rig\.errors\.\w+\.table|sensors\.\w+\.calibration"
 
 
 #: dotted key that a new study leaves open -> an example

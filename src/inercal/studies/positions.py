@@ -48,7 +48,9 @@ class GridTable(Strict):
     """Combinations of evenly spaced angles over full circles, the outer axis slowest."""
 
     phi1: Count = Field(description="number of outer angles", examples=[36])
-    phi2: Count = Field(description="number of angles of the next axis", examples=[36])
+    phi2: Count | None = Field(
+        default=None, description="number of angles of the next axis, where there is one", examples=[36]
+    )
     phi3: Count | None = Field(default=None, description="number of inner angles of a three-axis table")
     offset: Literal["half", "none"] = Field(
         default="half", description="start half a step from zero, clear of singular attitudes, or at zero"
@@ -90,7 +92,7 @@ class PositionsTable(Strict):
 
 
 #: the grid where a study gives none, by number of joints
-_USUAL: Mapping[int, tuple[int, ...]] = {2: (36, 36), 3: (12, 12, 12)}
+_USUAL: Mapping[int, tuple[int, ...]] = {1: (36,), 2: (36, 36), 3: (12, 12, 12)}
 
 
 def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) -> Plan:

@@ -3,106 +3,37 @@
 from __future__ import annotations
 
 import difflib
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model, model_validator
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model
 from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.errors import StudyError
-from inercal.rigs.chain import Chain, Scope
-from inercal.rigs.distribution import Distribution, normal, triangular, two_point, uniform
+from inercal.rigs.chain import Chain, Element, Joint, Scope
+from inercal.rigs.distribution import Distribution
 from inercal.rigs.tables import TABLES, Slot, slots, turntable
 from inercal.studies.fields import QuantityText, refusal
+from inercal.studies.rig_chain import ElementTable, custom_chain
+from inercal.studies.rig_errors import (
+    EXPECTED,
+    AngularErrorTable,
+    NamedErrorTable,
+    OffsetErrorTable,
+    Place,
+    elements_of,
+)
 from inercal.units import Quantity, shown
 
 Limits: TypeAlias = Mapping[str, tuple[float, float]]
-RigKind = Literal["two_axis_turntable", "three_axis_turntable"]
-ScopeName = Literal["sample", "position", "run", "rig"]
+RigKind = Literal["two_axis_turntable", "three_axis_turntable", "chain"]
 
 Angle = Annotated[Quantity, QuantityText("angle", "40 deg")]
 """Any angle."""
-
-_MAKE: Mapping[str, Callable[[float], Distribution]] = {
-    "uniform": uniform,
-    "normal": normal,
-    "triangular": triangular,
-    "two_point": two_point,
-}
-_EXPECTED = "uniform, normal, triangular or two_point"
-_LEAVE_OUT = 'an error is left out with NAME = "none"'
-
-
-HalfWidth = Annotated[
-    Quantity,
-    QuantityText(
-        "angle",
-        "2 arcmin",
-        lambda size: 0.0 < size <= math.pi,
-        f"a half width above 0 and up to 180 deg; {_LEAVE_OUT}",
-    ),
-]
-StandardDeviation = Annotated[
-    Quantity,
-    QuantityText(
-        "angle",
-        "1 arcmin",
-        lambda size: 0.0 < size <= math.pi / 3.0,
-        f"a standard deviation above 0 and up to 60 deg; {_LEAVE_OUT}",
-    ),
-]
-Shift = Annotated[
-    Quantity,
-    QuantityText(
-        "length", "10 um", lambda d: 0.0 < d <= 1.0, f"a length above 0 and up to 1 m; {_LEAVE_OUT}"
-    ),
-]
-_SCOPE = "how long a value lasts: until the next sample, position or mounting, or for good (rig)"
-
-
-class _Distributed(Strict):
-    """Keys of both kinds of error."""
-
-    @model_validator(mode="after")
-    def _one_distribution(self) -> _Distributed:
-        """Refuse two distributions."""
-        given = [name for name in _MAKE if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise refusal(f"found {' and '.join(given)}, expected one distribution")
-        return self
-
-    def distribution(self) -> Distribution | None:
-        """The distribution [rad or m], if one is given."""
-        for name, make in _MAKE.items():
-            size = getattr(self, name)
-            if size is not None:
-                return make(size.value)
-        return None
-
-
-class AngularErrorTable(_Distributed):
-    """An error of an attitude: one distribution, and perhaps its scope."""
-
-    uniform: HalfWidth | None = Field(default=None, description="uniform, by its half width")
-    normal: StandardDeviation | None = Field(default=None, description="normal, by its standard deviation")
-    triangular: HalfWidth | None = Field(default=None, description="triangular, by its half width")
-    two_point: HalfWidth | None = Field(default=None, description="plus or minus that size")
-    scope: ScopeName | None = Field(default=None, description=_SCOPE)
-
-
-class OffsetErrorTable(_Distributed):
-    """An error of a place: one distribution of lengths, and perhaps its scope."""
-
-    uniform: Shift | None = Field(default=None, description="uniform, by its half width")
-    normal: Shift | None = Field(default=None, description="normal, by its standard deviation")
-    triangular: Shift | None = Field(default=None, description="triangular, by its half width")
-    two_point: Shift | None = Field(default=None, description="plus or minus that size")
-    scope: ScopeName | None = Field(default=None, description=_SCOPE)
 
 
 @dataclass(frozen=True)
@@ -146,7 +77,7 @@ def _slots() -> list[Slot]:
 
 def _error_field(slot: Slot) -> Any:
     """The field of one error of a table."""
-    table = OffsetErrorTable if slot.is_offset else AngularErrorTable
+    table = OffsetErrorTable if slot.is_offset else NamedErrorTable
     note = "; only where it is given" if slot.optional else ""
     field = Field(
         default=None,
@@ -200,7 +131,15 @@ class LimitsTable(Strict):
 class RigTable(Strict):
     """The turntable."""
 
-    kind: RigKind = Field(description="two axes (outer y, inner z) or three (z, y, x)")
+    kind: RigKind = Field(
+        description="two axes (outer y, inner z), three (z, y, x), or a chain of elements of your own"
+    )
+    chain: list[ElementTable] = Field(
+        default=[],
+        title="Chain",
+        description="elements of a chain, base first; for kind = chain only",
+        examples=[[{"joint": "phi1", "axis": "z"}]],
+    )
     errors: ErrorsTable = Field(
         default=ErrorsTable(),
         title="Errors",
@@ -226,37 +165,65 @@ def chain_of(
     StudyError
         An error that this kind of table does not have, or one without any distribution.
     """
+    angles = (table.base.azimuth, table.base.tilt_north, table.base.tilt_west)
+    base = [0.0 if angle is None else angle.value for angle in angles]
+    if table.kind == "chain":
+        if "errors" in table.model_fields_set:
+            raise StudyError(
+                where, f"{key}.errors: found with a chain, expected its errors among {key}.chain"
+            )
+        return custom_chain(table.chain, base, mounting, f"{key}.chain", where)
+    if table.chain:
+        raise StudyError(
+            where, f'{key}.chain: found with kind = {table.kind!r}, expected it with "chain" only'
+        )
     by_name = {slot.name: slot for slot in slots(table.kind)}
     given: dict[str, Any] = {name: getattr(table.errors, name) for name in table.errors.model_fields_set}
     usual = given.pop("default", None)
     default = None if usual is None else usual.distribution()
     if usual is not None and default is None:
-        raise StudyError(where, f"{key}.errors.default: found no distribution, expected {_EXPECTED}")
+        raise StudyError(where, f"{key}.errors.default: found no distribution, expected {EXPECTED}")
+    after_joint = _after_joint(table.kind)
     scopes: dict[str, Scope] = {}
     if usual is not None and usual.scope is not None:
-        scopes = dict.fromkeys(by_name, Scope(usual.scope))
+        scope = Scope(usual.scope)
+        scopes = {name: scope for name in by_name if name in after_joint or scope is not Scope.ANGLE}
     errors: dict[str, Distribution] = {}
+    parts: dict[str, list[Element]] = {}
     for name, error in given.items():
+        own = f"{key}.errors.{name}"
         if name not in by_name:
             near = difflib.get_close_matches(name, by_name, n=1, cutoff=0.0)[0]
-            raise StudyError(
-                where, f"{key}.errors.{name}: unknown error of a {table.kind}, did you mean {near}?"
-            )
+            raise StudyError(where, f"{own}: unknown error of a {table.kind}, did you mean {near}?")
         if error == "none":
             continue
-        distribution = error.distribution() or (None if by_name[name].is_offset else default)
-        if distribution is None:
-            raise StudyError(where, f"{key}.errors.{name}: found no distribution, expected {_EXPECTED}")
-        errors[name] = distribution
+        slot, distribution = by_name[name], error.distribution()
+        if isinstance(error, NamedErrorTable) and error.measured:
+            place = Place(name, slot.axis, slot.what, name in after_joint, own, where)
+            parts[name] = elements_of(error, place)
+        elif distribution is None:
+            distribution = None if slot.is_offset else default
+            if distribution is None:
+                raise StudyError(where, f"{own}: found no distribution, expected {EXPECTED}")
+        if distribution is not None:
+            errors[name] = distribution
         if error.scope is not None:
             scopes[name] = Scope(error.scope)
+            if scopes[name] is Scope.ANGLE and name not in after_joint:
+                raise StudyError(
+                    where, f'{own}.scope: found "angle" before the first joint, expected another scope'
+                )
     if default is not None:
         unnamed = (slot.name for slot in by_name.values() if not slot.optional and slot.name not in given)
         errors |= dict.fromkeys(unnamed, default)
-    base = (table.base.azimuth, table.base.tilt_north, table.base.tilt_west)
-    return turntable(
-        table.kind, None, errors, scopes, [0.0 if angle is None else angle.value for angle in base], mounting
-    )
+    return turntable(table.kind, None, errors, scopes, base, mounting, parts)
+
+
+def _after_joint(kind: str) -> frozenset[str]:
+    """Names of the errors of a table of that kind that come after a joint."""
+    parts = TABLES[kind]
+    first = next(k for k, part in enumerate(parts) if isinstance(part, Joint))
+    return frozenset(part.name for part in parts[first:] if isinstance(part, Slot))
 
 
 def limits_of(table: RigTable, chain: Chain, where: object) -> dict[str, tuple[float, float]]:

@@ -15,6 +15,7 @@ from inercal.studies.load import put, reader, unfilled
 from inercal.studies.schema import json_schema
 from inercal.studies.starting import STARTING
 from inercal.studies.template_instrument import instrument_lines
+from inercal.studies.tolerances import SYMBOLS
 from inercal.units import Unit
 
 Kind = Literal["imu", "turntable", "selfcal", "aoa"]
@@ -95,11 +96,15 @@ def _starting(kind: Kind, channels: Mapping[str, Unit | None]) -> dict[str, Any]
 
 
 def _hidden() -> str:
-    """Keys that a template leaves out: more sensors, and errors that a table of two axes does not have."""
+    """Keys that a template leaves out: more sensors, chains, and errors that a table of two axes does not have."""
     two, three = (
         {slot.name for slot in slots(kind)} for kind in ("two_axis_turntable", "three_axis_turntable")
     )
-    return rf"{_HIDDEN}|imu\.aided\.rig\.(errors|base|limits)|rig\.errors\.({'|'.join(sorted(three - two))})"
+    each = "|".join(sorted(two | three))
+    symbols = "|".join(symbol for symbols in SYMBOLS.values() for symbol in symbols if symbol != "DX_F")
+    others = "|".join(sorted(three - two))
+    of_rig = rf"(imu\.aided\.)?rig\.chain|imu\.aided\.rig\.(errors|base|limits)|rig\.errors\.({others})"
+    return rf"{_HIDDEN}|cost\.({each})|goal\.({symbols})|{of_rig}"
 
 
 def _with_instrument(body: str, lines: str, given: Mapping[str, Any]) -> str:

@@ -21,22 +21,26 @@ from inercal.studies.common import (
     Version,
     site_on_earth,
 )
+from inercal.studies.disturbances import TableDisturbancesTable, disturbances_of
 from inercal.studies.instrument import InstrumentTable, instrument_of
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
 from inercal.studies.tables import as_typed, settings_of, table_of
+from inercal.studies.tolerances import CostsTable, WantedTable, tolerances_of
 from inercal.turntable.settings import Analysis, Constraint, Design, RateTest, TurntableSettings
 
 OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
+AnalysedName = Literal["ax", "ay", "az", "wx", "wy", "wz", "y_x", "y_y"]
 
 
 class AnalysisTable(table_of(Analysis)):  # type: ignore[misc]
     """The sensitivity analysis."""
 
-    outputs: list[OutputName] = Field(
+    outputs: list[AnalysedName] = Field(
         default=["ax", "ay", "az", "wx", "wy"],
         min_length=1,
-        description="components of gravity (a) and earth rate (w) on the instrument's axes",
+        description="components of gravity (a) and earth rate (w) on the instrument's axes; y_x, y_y: outputs of a "
+        "gyrowheel with the coefficients of [instrument.coefficients]",
     )
 
 
@@ -106,6 +110,15 @@ class TurntableStudyFile(Strict):
     rate_test: RateTestTable | None = Field(
         default=None, title="Rate test", description="a rate test; none if absent"
     )
+    disturbances: TableDisturbancesTable = Field(
+        default=TableDisturbancesTable(),
+        title="Disturbances",
+        description="what a simulation adds to the model",
+    )
+    goal: WantedTable = Field(default=WantedTable(), title="Goal", description="wanted uncertainties")
+    cost: CostsTable = Field(
+        default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
+    )
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -119,6 +132,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
     site = site_on_earth(file.site, path, "table")
     chain = chain_of(file.rig, path)
     limits = limits_of(file.rig, chain, path)
+    instrument = instrument_of(file.instrument, site.gravity, path)
     return TurntableSettings(
         site=site,
         rig=file.rig.kind,
@@ -126,9 +140,11 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         plan=plan_of(file.positions, chain, limits, path),
         design=_design(file.design, chain, limits, path),
         analysis=_analysis(file.analysis, path),
-        instrument=instrument_of(file.instrument, site.gravity, path),
+        instrument=instrument,
         limits=limits,
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
+        disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
+        tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),

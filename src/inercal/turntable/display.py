@@ -25,7 +25,7 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
     """
     gravity = float(estimate.conditions.get("site", {}).get("gravity_m_s2", STANDARD_GRAVITY))
     shown = [
-        _per_g(name, *shown_unit(text, unit), gravity)
+        per_g(name, *shown_unit(text, unit), gravity)
         for name, text in zip(estimate.names, estimate.units, strict=True)
     ]
     return replace(
@@ -41,7 +41,7 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
     )
 
 
-def _per_g(name: str, text: str, size: float, gravity: float) -> tuple[str, float]:
+def per_g(name: str, text: str, size: float, gravity: float) -> tuple[str, float]:
     """Unit and size of a term whose value is per power of the site's ``gravity`` [m/s^2], per power of g instead."""
     match = re.fullmatch("D[XY]_([XYZ]+)", name)
     if match is None:

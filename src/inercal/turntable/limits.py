@@ -26,14 +26,24 @@ class Limits:
     misfit_probability: float = 1e-4
     """Probability of a misfit by chance below which the readings contradict the stated noise and errors."""
 
+    second_order: float = 0.1
+    """Part of u by which squares and products of the table's errors may shift or blur a coefficient before they are in
+    the fit: below it they change u by half a percent."""
+
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
+
+    most_repeats: int = 24
+    """Times that a plan is taken, at most, where a search for tolerances may repeat it."""
 
     same_rate: float = 1e-3
     """Relative difference below which two rates are one rate."""
 
     turning_cosine: float = 0.1
     """Cosine of turning axis and gyro axis below which a gyro takes no part in a rate test."""
+
+    scatter_dof: int = 3
+    """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""
 
     scale_sigmas: float = 5.0
     """Scale factor, over its standard uncertainty, below which an output does not follow the rate."""

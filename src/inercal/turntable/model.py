@@ -127,6 +127,22 @@ class TableModel:
             made[k] = made[k] + np.einsum("npi,p->ni", fixed.channel.slopes(a, w), fixed.values)
         return np.stack(made, axis=1)
 
+    def bend_by_inputs(self, angles: Array, c: Array) -> Array | None:
+        """Second derivatives (n, channels, 6, 6) of the outputs by a and w there; None where all terms are linear."""
+        parts = [*self.channels, *(each.channel for each in self.stated)]
+        if all(each.order + sum(each.powers[3:]) < 2 for part in parts for each in part.monomials):
+            return None
+        a, w = self.inputs(angles)
+        values = [c[block] for block in self.blocks] + [each.values for each in self.stated]
+        bend = np.zeros((len(angles), len(self.channels), 6, 6))
+        steps = 1e-3 * np.repeat([np.linalg.norm(self.a_n), np.linalg.norm(self.w_n)], 3)
+        for k, (part, own) in enumerate(zip(parts, values, strict=True)):
+            for i, step in enumerate(np.diag(steps)):
+                ends = [part.slopes(a + sign * step[:3], w + sign * step[3:]) for sign in (1.0, -1.0)]
+                change = np.einsum("npi,p->ni", ends[0] - ends[1], own) / (2.0 * steps[i])
+                bend[:, k % len(self.channels), i] += change
+        return bend
+
     def by_errors(self, angles: Array, c: Array) -> Array:
         """Derivatives (n, channels, k) of the outputs with respect to the table's errors, at none."""
         turns = self.chain.slopes(angles)

@@ -8,7 +8,8 @@ errors that stay constant over the test are unknowns with the prior variance of 
     [   0    ] = [   0           1     ]  [ chi/s ]
 
 which is the same as weighting with V + J s^2 J^T, and also says what the test tells about chi. J depends on c,
-so that the fit is repeated until c rests.
+so that the fit is repeated until c rests. Where squares and products of the errors matter against u, they are in the
+readings and in V (`inercal.turntable.second_order`).
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, few_terms, identify, in_words
 from inercal.instruments.polynomial import ChannelModel
+from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import TableModel
 from inercal.turntable.noise import scatter
+from inercal.turntable.second_order import SecondOrder, second_order
 from inercal.turntable.weights import Samples, Weights, beside_inputs, least_noise, weights, whitened
 
 ROUNDS = 6
@@ -57,6 +60,8 @@ class Regression:
     table : (q,) estimated constant errors [rad or m], in the order of ``constant``
     table_u : (q,) their standard uncertainties
     constant : (q,) indices of the constant errors among the chain's
+    second : SecondOrder
+        Second order of the readings, by which they are corrected and weighted; None where it does not matter
     """
 
     model: TableModel
@@ -75,6 +80,7 @@ class Regression:
     table: Array
     table_u: Array
     constant: NDArray[np.int64]
+    second: SecondOrder | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +186,30 @@ def fit(
     LinAlgError
         Terms so large that errors of the table, which they multiply, drown the readings: their weights do not settle.
     """
+    straight = _fit(model, angles, y, noise, start, samples, False)
+    bent = second_order(model, angles, straight.c, straight.samples)
+    if not _matters(straight, bent):
+        return straight
+    return _fit(model, angles, y, noise, straight.c, samples, True)
+
+
+def _matters(straight: Regression, bent: SecondOrder) -> bool:
+    """True if the second order changes a coefficient, or its u, noticeably against its u."""
+    mean, columns = bent.shifts(straight.gain)
+    rms = np.sqrt(np.square(mean) + np.square(columns).sum(axis=1))
+    return bool(np.any(rms > LIMITS.second_order * np.sqrt(np.diag(straight.covariance))))
+
+
+def _fit(
+    model: TableModel,
+    angles: Array,
+    y: Array,
+    noise: Sequence[float | None],
+    start: Array | None,
+    samples: Samples | None,
+    to_second_order: bool,
+) -> Regression:
+    """The fit with or without the second order of the table's errors; raises as `fit`."""
     rows = model.rows(angles)
     n, channels, p = rows.shape
     samples = np.ones(n, dtype=np.int64) if samples is None else samples
@@ -188,11 +218,14 @@ def fit(
     y = y - model.outputs(angles, np.zeros(p))  # what is stated
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
     c = solve(rows, y, plain).c if start is None else start
-    u, settled = np.zeros(p), True
+    u, settled, bent, readings = np.zeros(p), True, None, y
     for _ in range(ROUNDS):
         if not np.isfinite(c).all():
             break
         table = weights(model, angles, c, np.zeros(channels), samples=samples)
+        if to_second_order:
+            bent = second_order(model, angles, c, samples)
+            table, y = bent.added(table), readings - bent.mean
         noise_fit = scatter(rows, y, table, noise, np.maximum(least, least_noise(table.within)))
         sigma = noise_fit.std
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
@@ -225,4 +258,5 @@ def fit(
         solution.chi[: len(std)] * std,
         np.sqrt(np.diag(solution.joint)[p : p + len(std)]) * std,
         constant,
+        bent,
     )

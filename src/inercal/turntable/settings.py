@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from inercal.arrays import short_repr
+from inercal.designs.tolerances import Price
 from inercal.geometry.site import Site
-from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity
+from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity, within
 from inercal.rigs.chain import Chain
 from inercal.rigs.plans import Plan
 from inercal.units import Quantity, Unit
@@ -16,7 +18,7 @@ from inercal.units import Quantity, Unit
 
 @dataclass(frozen=True)
 class Analysis:
-    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`."""
+    """The sensitivity analysis; ``outputs`` are names of `inercal.rigs.outputs.NAMES`, or ``y_x``, ``y_y``."""
 
     outputs: tuple[str, ...] = ("ax", "ay", "az", "wx", "wy")
     method: Literal["exact", "sampled", "local"] = option(
@@ -102,6 +104,26 @@ class Design:
 
 
 @dataclass(frozen=True)
+class Cost:
+    """The cost of a tolerance: of the size that the study states, and its growth as the tolerance is tightened."""
+
+    cost: float = option("relative cost of the size that the study states", 1.0, least=1e-6)
+    exponent: float = option("power of the inverse size that the cost goes with", 1.0, least=0.01, most=10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """The search for tolerances: wanted u by symbol of a coefficient, or ``drift``, in SI; the price of each error.
+
+    ``drift`` is the rms u of the predicted output over all directions of gravity.
+    """
+
+    goal: Mapping[str, float] = field(default_factory=dict)
+    prices: Mapping[str, Price] = field(default_factory=dict)
+    position: float = option("cost of taking one position, in the same unit", 0.0, least=0.0)
+
+
+@dataclass(frozen=True)
 class RateTest:
     """A rate test of gyros: the table turns at each rate in turn, by whole turns or not.
 
@@ -124,6 +146,44 @@ class RateTest:
     at: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Disturbances:
+    """Disturbances that a simulation adds to table and instrument, and no calibration knows; none if absent.
+
+    Those of outputs are in the SI unit of these: ``ramp`` their change over the test, ``warm_up`` their excess at its
+    begin, ``random_walk`` its standard deviation at the end, ``dead_zone`` the response below which there is none,
+    ``hysteresis`` the output after it was raised less that after it was lowered, ``magnetic`` that along a field to the
+    north and down. ``harmonics`` are errors of encoders: joint, order k, amplitude [rad], phase [rad]:
+    a sin(k phi + phase).
+    """
+
+    heading: float = quantity(
+        "turn of the base about up that nobody knows of, north towards west positive", "angle", "0 deg",
+        example="1 deg",
+    )  # fmt: skip
+    tilt_north: float = quantity("tilt of the base about north", "angle", "0 arcsec", example="20 arcsec")
+    tilt_west: float = quantity("tilt of the base about west", "angle", "0 arcsec", example="20 arcsec")
+    angle: float = quantity(
+        "standard deviation of an error of each joint that comes back at each commanded angle", "angle",
+        "0 arcsec", example="5 arcsec", bounds=within(0.0, math.inf, "an angle of 0 or more"),
+    )  # fmt: skip
+    scale_drift: float = quantity(
+        "relative change of the response to inputs from begin to end of the test",
+        "number",
+        "0",
+        example="20 ppm",
+    )
+    warm_up_time: float = quantity("in which the warm-up falls to 1/e", "time", "30 min", bounds=TIME)
+    dip: float = quantity("of the field below the horizon", "angle", "60 deg")
+    harmonics: tuple[tuple[str, int, float, float], ...] = ()
+    ramp: float = 0.0
+    warm_up: float = 0.0
+    random_walk: float = 0.0
+    dead_zone: float = 0.0
+    hysteresis: float = 0.0
+    magnetic: float = 0.0
+
+
 @short_repr
 @dataclass(frozen=True, eq=False)
 class TurntableSettings:
@@ -141,8 +201,10 @@ class TurntableSettings:
         Positions to analyse, simulate or calibrate at.
     limits : mapping
         Allowed range (low, high) [rad] of a joint by its name.
-    design : Design
-        Settings of a search for positions.
+    design, tolerances
+        Settings of a search for positions, and of one for tolerances.
+    disturbances : Disturbances
+        Of a simulation.
     traceability, temperature, given
         As in `inercal.imu.settings.ImuSettings`.
     """
@@ -156,6 +218,8 @@ class TurntableSettings:
     instrument: Instrument = Instrument()
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rate_test: RateTest | None = None
+    disturbances: Disturbances = Disturbances()
+    tolerances: Tolerances = Tolerances()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

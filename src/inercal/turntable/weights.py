@@ -21,7 +21,8 @@ class Weights:
     """Covariance of the readings.
 
     ``within`` (n, c, c) covariance redrawn at each position, noise and table; ``common`` (n, c, q) derivatives
-    with respect to the constants, in their standard deviations: errors of the table, then inputs beside it.
+    with respect to the constants, in their standard deviations: errors of the table, then inputs beside it, then
+    values that the positions of one angle share.
     """
 
     within: Array
@@ -75,7 +76,7 @@ def weights(
     """
     slopes = model.by_errors(angles, c)
     rows = np.ones(len(slopes), dtype=np.int64) if samples is None else samples
-    return weights_of(model.chain, slopes, beside_inputs(model, angles, c), noise, rows, std)
+    return weights_of(model.chain, slopes, angles, beside_inputs(model, angles, c), noise, rows, std)
 
 
 def least_noise(within: Array) -> Array:
@@ -91,17 +92,45 @@ def beside_inputs(model: TableModel, angles: Array, c: Array) -> Array:
 
 
 def weights_of(
-    chain: Chain, slopes: Array, beside: Array, noise: Array, samples: Samples, std: Array | None = None
+    chain: Chain,
+    slopes: Array,
+    angles: Array,
+    beside: Array,
+    noise: Array,
+    samples: Samples,
+    std: Array | None = None,
 ) -> Weights:
     """As `weights`, for derivatives (n, c, k) of the readings with respect to the errors of the ``chain``, and their
     changes (n, c, b) by inputs beside it."""
     scaled = averaged(chain, slopes, samples) * (chain.std if std is None else std)
     constant = np.array([error.scope.constant for error in chain.errors], dtype=bool)
-    redrawn = scaled[..., ~constant]
+    redrawn, by_angle = by_value(chain, scaled, angles)
     return Weights(
         np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)),
-        np.concatenate([scaled[..., constant], beside], axis=-1),
+        np.concatenate([scaled[..., constant], beside, by_angle], axis=-1),
     )
+
+
+def by_value(chain: Chain, scaled: Array, angles: Array) -> tuple[Array, Array]:
+    """Of changes (n, c, k) of the readings by the errors, those that are redrawn from value to value.
+
+    Returns
+    -------
+    redrawn : (n, c, k)
+        By values of one position alone; zero elsewhere.
+    by_angle : (n, c, q)
+        By values that several positions of one angle share, a column for each.
+    """
+    redrawn, columns = scaled.copy(), [np.zeros((*scaled.shape[:2], 0))]
+    for k, (error, numbers) in enumerate(zip(chain.errors, chain.groups(angles), strict=True)):
+        if error.scope.constant:
+            redrawn[..., k] = 0.0
+        elif error.scope is Scope.ANGLE:
+            shared = np.flatnonzero(np.bincount(numbers) > 1)
+            here = numbers[:, None] == shared
+            columns.append(scaled[..., k, None] * here[:, None, :])
+            redrawn[here.any(axis=1), :, k] = 0.0
+    return redrawn, np.concatenate(columns, axis=-1)
 
 
 def averaged(chain: Chain, slopes: Array, samples: Samples) -> Array:

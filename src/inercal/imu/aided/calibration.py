@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,11 @@ from inercal.imu.aided.diagnosis.gross import agreement, cures, expected, lag, t
 from inercal.imu.aided.fit import Fit, fit
 from inercal.imu.aided.model import side_of, unknowns
 from inercal.imu.aided.outcome import assemble, without_fit
-from inercal.imu.aided.table import Motion, motion_of, shifted, times
+from inercal.imu.aided.table import Motion, motion_of, shifted, times, values_of
 from inercal.imu.aided.walk import whiten
 from inercal.imu.limits import LIMITS
 from inercal.imu.settings import AidedSettings, ImuSettings
+from inercal.records.column import Triad
 from inercal.records.places import counted
 from inercal.records.record import Record
 
@@ -73,10 +74,10 @@ def calibrate_aided(
     progress("comparing the sensors with the table's angles")
     motion = motion_of(record, options.chain)
     rests = motion.rests()
-    triads = [record.triad("acc")]
+    triads = [_centred(record, "acc")]
     findings = []
     if any(f"gyro_{axis}" in record for axis in "xyz"):
-        triads.append(record.triad("gyro"))
+        triads.append(_centred(record, "gyro"))
     else:
         findings.append(
             Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated")
@@ -109,8 +110,13 @@ def calibrate_aided(
         estimate = without_fit(record, settings, *bad, earlier=(*findings, *motion.findings))
         return AidedCalibration(timed(estimate, clock), motion, rests)
     progress("fitting all sensors")
-    layout = unknowns(settings.site, options, scales, len(rests), settings.g_sensitivity)
-    names = {each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity) for each in blocks}
+    layout = unknowns(
+        settings.site, options, scales, values_of(motion, rests), settings.g_sensitivity, settings.k2
+    )
+    names = {
+        each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity, settings.k2)
+        for each in blocks
+    }
 
     def fitted() -> Fit:
         sides = [side_of(each, motion, rests, layout) for each in blocks]
@@ -126,6 +132,13 @@ def calibrate_aided(
         done = fitted()
     estimate = assemble(record, motion, rests, done, late, settings, findings)
     return AidedCalibration(timed(estimate, clock), motion, rests, done)
+
+
+def _centred(record: Record, sensor: str) -> Triad:
+    """A triad at the middles of its samples: what was gained since the row before is the rate half a sample earlier."""
+    triad = record.triad(sensor)
+    half = 0.5 / triad.rate if record[f"{sensor}_x"].increment and np.isfinite(triad.rate) else 0.0
+    return replace(triad, t=triad.t - half) if half else triad
 
 
 def _contradiction(wrong: list[str], blocks: list[Blocks], motion: Motion) -> str:

@@ -11,20 +11,25 @@ from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.limits import LIMITS
 from inercal.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
 
+SQUARES = tuple(f"K2_{axis}" for axis in "xyz")
+"""The second-order coefficients of the accelerometers."""
+
 _LETTERS = {"acc": ("K0", "K1", "M"), "gyro": ("D_F", "S", "T")}
 
 
-def gain_names(triad: str, g_sensitivity: bool = False) -> tuple[str, ...]:
+def gain_names(triad: str, g_sensitivity: bool = False, squares: bool = False) -> tuple[str, ...]:
     """Names of the gains of a triad, row by row; the diagonal is the scale factor."""
     _, scale, cross = _LETTERS[triad]
     rows = [f"{scale}_{i}" if i == j else f"{cross}_{i}{j}" for i in "xyz" for j in "xyz"]
-    return (*rows, *(GYRO_G_SENSITIVITY if triad == "gyro" and g_sensitivity else ()))
+    if triad == "acc":
+        return (*rows, *(SQUARES if squares else ()))
+    return (*rows, *(GYRO_G_SENSITIVITY if g_sensitivity else ()))
 
 
-def names_of(triads: tuple[str, ...], g_sensitivity: bool) -> tuple[str, ...]:
+def names_of(triads: tuple[str, ...], g_sensitivity: bool, squares: bool = False) -> tuple[str, ...]:
     """Names of all coefficients in the order of results."""
     gyro = (*GYRO_TRIAD, *(GYRO_G_SENSITIVITY if g_sensitivity else ())) if "gyro" in triads else ()
-    return (*ACCELEROMETERS_IN_A_FRAME, *gyro)
+    return (*ACCELEROMETERS_IN_A_FRAME, *(SQUARES if squares else ()), *gyro)
 
 
 def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]:
@@ -50,6 +55,11 @@ def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]
             by_name[f"{scale}_{i}" if place == own else f"{cross}_{i}{j}"] = (float(value), row, 0.0)
     for name, place in zip(GYRO_G_SENSITIVITY, fit.unknowns.places.get("gain G", ()), strict=False):
         by_name[name] = (float(fit.x[place]), np.eye(P)[place], 0.0)
+    gains = fit.unknowns.places["gain acc"][[0, 4, 8]]
+    for name, place, own in zip(SQUARES, fit.unknowns.places.get("gain K2", ()), gains, strict=False):
+        row = np.zeros(P)
+        row[place], row[own] = 1.0 / fit.x[own], -fit.x[place] / fit.x[own] ** 2
+        by_name[name] = (float(fit.x[place] / fit.x[own]), row, 0.0)
     chosen = [by_name[name] for name in names]
     return (
         np.array([value for value, _, _ in chosen]),
@@ -112,7 +122,7 @@ def type_b(
         pairs = zip(names, values, strict=True)
         return np.array([factor * value if name.startswith(prefixes) else 0.0 for name, value in pairs])
 
-    by_gravity = scaled(-1.0 / site.gravity, "K1_", "G_")
+    by_gravity = scaled(-1.0 / site.gravity, "K1_", "K2_", "G_")
     sources = [TypeB(each.source, each.u, each.unit, by_gravity * each.sensitivity) for each in site.inputs]
     if clock_u > 0.0 and "S_x" in names:
         sources.append(TypeB("time base", clock_u, "1", scaled(1.0, "S_")))
@@ -121,9 +131,9 @@ def type_b(
     variance = np.einsum("pi,ij,pj->p", rows, fit.covariance, rows)
     for name, places in layout.places.items():
         u = float(np.max(layout.sd[places]))
-        # an error with a value in each position has others in the next test
-        redrawn = name not in layout.stated or (len(places) > 1 and name != "earth rate")
-        source = TypeB(name, u, layout.units[name], gain[:, places] / layout.sd[places] / u, redrawn)
+        redrawn = name not in layout.stated or name in layout.redrawn
+        by_input = gain[:, places] / layout.sd[places] / u
+        source = TypeB(layout.sources.get(name, name), u, layout.units[name], by_input, redrawn)
         # priors of gains, arms and shifts are only there for order, unless the test says nothing of these
         if name in layout.stated or np.any(np.diag(source.covariance) > LIMITS.prior_share * variance):
             sources.append(source)

@@ -200,7 +200,8 @@ def _identified(
 
 def _gains(triad: str, layout: Unknowns) -> tuple[str, ...]:
     """Groups of gains of a triad."""
-    return (triad, "G") if triad == "gyro" and "gain G" in layout.places else (triad,)
+    more = "K2" if triad == "acc" else "G"
+    return (triad, more) if f"gain {more}" in layout.places else (triad,)
 
 
 def _triangle(rows: Array) -> Array:

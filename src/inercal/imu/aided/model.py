@@ -1,10 +1,11 @@
 """The unknowns of an IMU on a table, and the linear equations of each sensor in them.
 
-    accelerometer i :  y = B_i (f + A r_i) + bias ,    gyro i :  y = B_i (omega + C h) + G_i f + bias
+    accelerometer i :  y = B_i (f + A r_i) + q_i l_i^2 + bias ,  l_i = B_i f / B_ii
+    gyro i :           y = B_i (omega + C h) + G_i f + bias
 
-B = S M and S T are the gains; f, omega, C the table's force, rate and attitude, for angles that come late by a shift;
-A r the acceleration of a sensor that sits r beside the crossing of the axes; h earth rate in n; and all of them turned
-by the errors of the table.
+B = S M and S T are the gains, q = K1 K2 where K2 is asked for; f, omega, C the table's force, rate and attitude, for
+angles that come late by a shift; A r the acceleration of a sensor that sits r beside the crossing of the axes; h earth
+rate in n; and all of them turned by the errors of the table.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from inercal.geometry.site import Site
 from inercal.imu.aided.blocks import Blocks, Reference
 from inercal.imu.aided.table import Motion, error_nodes
 from inercal.imu.settings import AidedSettings
+from inercal.rigs.chain import Scope
 
 Indices = NDArray[np.int64]
 
@@ -36,7 +38,8 @@ ARM_U = 0.5
 class Unknowns:
     """The unknowns (P,) without the biases: ``places`` of each group, prior ``mean`` and ``sd``, both (P,).
 
-    The priors of ``stated`` groups are knowledge: earth rate, and the errors of the table.
+    The priors of ``stated`` groups are knowledge: earth rate, and the errors of the table. In a budget, a group has the
+    name in ``sources``, its own if there is none. The groups in ``redrawn`` have other values in the next test.
     """
 
     places: Mapping[str, Indices]
@@ -44,10 +47,17 @@ class Unknowns:
     sd: Array
     units: Mapping[str, str]
     stated: frozenset[str]
+    sources: Mapping[str, str]
+    redrawn: frozenset[str]
 
 
 def unknowns(
-    site: Site, options: AidedSettings, scales: Mapping[str, float], rests: int, g_sensitivity: bool
+    site: Site,
+    options: AidedSettings,
+    scales: Mapping[str, float],
+    values: Mapping[str, Indices],
+    g_sensitivity: bool,
+    squares: bool,
 ) -> Unknowns:
     """Lay out the unknowns.
 
@@ -57,9 +67,11 @@ def unknowns(
     options : AidedSettings
     scales : mapping
         Scale factor [output per SI unit] to begin with, of ``acc`` and, where there is a gyro, ``gyro``.
-    rests : int
-        Number of rests: errors of the table have a value in each.
-    g_sensitivity : bool
+    values : mapping
+        Number of the value that each error of the table has in each rest, by its name
+        (`inercal.imu.aided.table.values_of`).
+    g_sensitivity, squares : bool
+        Drift of the gyro by specific force, and K2 of the accelerometers.
     """
     groups: list[tuple[str, Array, Array, str]] = [
         (f"time shift of {sensor}", np.zeros(1), np.full(1, SHIFT_U), "s") for sensor in scales
@@ -68,12 +80,14 @@ def unknowns(
     if "gyro" in scales:
         groups.append(("earth rate", *_earth(site, options), "rad/s"))
     for error in options.chain.errors:
-        if error.is_offset or error.scope.value == "sample":
+        if error.name not in values:
             continue
-        count = 1 if error.scope.constant else max(rests, 1)
+        count = int(values[error.name].max()) + 1
         groups.append((error.name, np.zeros(count), np.full(count, error.distribution.std), "rad"))
     for sensor, scale in scales.items():
         groups.append((f"gain {sensor}", scale * np.eye(3).ravel(), np.full(9, scale), "1"))
+    if squares:
+        groups.append(("gain K2", np.zeros(3), np.full(3, scales["acc"] / site.gravity), "1"))
     if g_sensitivity and "gyro" in scales:
         groups.append(("gain G", np.zeros(9), np.full(9, 0.1 * scales["gyro"] / site.gravity), "1"))
     ends = np.cumsum([0, *(len(mean) for _, mean, _, _ in groups)])
@@ -84,6 +98,8 @@ def unknowns(
         np.concatenate([sd for _, _, sd, _ in groups]),
         {name: unit for name, _, _, unit in groups},
         frozenset(name for name in places if name == "earth rate" or name in options.chain.factors),
+        {error.name: error.source for error in options.chain.errors},
+        frozenset(error.name for error in options.chain.errors if error.scope is Scope.POSITION),
     )
 
 
@@ -181,6 +197,14 @@ def equations(side: Side, ref: Reference, layout: Unknowns, x: Array, gravity: f
         predicted = true @ B[i]
         if side.sensor == "acc":
             predicted = predicted + columns[2] @ x[label]
+            if "gain K2" in places:
+                along, q = true @ B[i] / B[i, i], float(x[places["gain K2"][i]])
+                columns[0] = true + 2.0 * q * along[:, None] / B[i, i] * (
+                    true - np.outer(along, np.eye(3)[i])
+                )
+                index.append(places["gain K2"][i : i + 1])
+                columns.append(along[:, None] ** 2)
+                predicted = predicted + q * along**2
         if side.sensor == "gyro" and "gain G" in places:
             G_i = places["gain G"][3 * i : 3 * i + 3]
             index.append(G_i)

@@ -24,15 +24,15 @@ from inercal.imu.aided.diagnosis.examination import misfits
 from inercal.imu.aided.fit import Fit
 from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
-from inercal.imu.settings import COMMAND, MASKED, ImuSettings
+from inercal.imu.settings import COMMAND, MASKED, AidedSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along frame "
-    "axis j), all of M; accelerometers: K1, M, K0; gyro: S, T, D_F, and + G f where g-sensitivity is estimated. The "
-    "biases take random walks; K0 and D_F are their means over the test."
+    "axis j), all of M; accelerometers: K1, M, K0, and + K1 K2 (M x)^2 where K2 is estimated; gyro: S, T, D_F, and + "
+    "G f where g-sensitivity is estimated. The biases take random walks; K0 and D_F are their means over the test."
 )
 
 FRAME = "b, nominal axes of the instrument on the inner axis of the table"
@@ -59,7 +59,7 @@ def assemble(
 ) -> Estimate:
     """Put the estimate together."""
     triads = tuple(fit.identified)
-    names = names_of(triads, settings.g_sensitivity)
+    names = names_of(triads, settings.g_sensitivity, settings.k2)
     values, rows, own = coefficients(fit, names)
     sources_a = type_a(fit, rows, own, names)
     sources_b = type_b(fit, rows, names, values, settings.site, settings.time_base_u)
@@ -89,7 +89,7 @@ def assemble(
             *settled(record.findings, *MASKED),
             *earlier,
             *motion.findings,
-            *findings(fit, lag, faulty),
+            *findings(fit, lag, faulty, judged[0] is Status.OK),
         ),
         statistics=_statistics(fit, rests),
         result={
@@ -105,7 +105,9 @@ def assemble(
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
     """The basis of the estimate."""
-    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
+    method = settings.method
+    tables = method.chain.sources if isinstance(method, AidedSettings) else ()
+    return studied(COMMAND, settings, (*record.sources, *tables), MODEL, REFERENCES, conditions)
 
 
 def without_fit(

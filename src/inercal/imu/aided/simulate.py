@@ -88,7 +88,8 @@ def simulate(
     dt = 1.0 / rate
     t = np.arange(0.0, sum(duration for *_, duration in program), dt)
     rests = rests_of(program)
-    table_errors = chain.draw(rng, len(rests))
+    middles = rests.mean(axis=1) if len(rests) else np.zeros(0)
+    table_errors = chain.draw(rng, angles_at(program, chain.joints, middles))
 
     def attitude(at: Array) -> Array:
         errors = np.stack(

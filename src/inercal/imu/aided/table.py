@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,6 +17,7 @@ from inercal.records.column import Column
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.rigs.chain import Chain, Error, Scope
+from inercal.rigs.patterns import Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +176,7 @@ def times(t: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ErrorNodes:
-    """An error of the table as unknowns: one for the test, or one for each rest with straight lines between.
+    """An error of the table as unknowns: one for each value that it takes, with straight lines between the rests.
 
     ``slopes`` (n, 3) [rad/rad] turn of the instrument, in its own axes, by the error at its nodes' times;
     ``hats`` (n, q) the part of each unknown in the error at those times.
@@ -192,17 +193,35 @@ def error_nodes(motion: Motion, t: Array, rests: Array) -> Iterator[ErrorNodes]:
     if not chain.errors:
         return
     angles = motion.at(t)
-    C_nb = motion.attitude(t)
+    C_nb, numbers = motion.attitude(t), values_of(motion, rests)
     turned = np.einsum("nji,nkjl->nkil", C_nb, chain.slopes(angles))
     vectors = np.stack([turned[..., 2, 1], turned[..., 0, 2], turned[..., 1, 0]], axis=-1)
     each_rest = np.stack(
         [np.interp(t, rests.ravel(), np.repeat(row, 2)) for row in np.eye(len(rests))], axis=-1
     ) if len(rests) else np.ones((len(t), 1))  # fmt: skip
     for k, error in enumerate(chain.errors):
-        if error.is_offset or error.scope is Scope.SAMPLE:
+        if error.name not in numbers:
             continue
-        hats = np.ones((len(t), 1)) if error.scope.constant else each_rest
+        own = numbers[error.name]
+        if error.scope.constant:
+            hats = np.ones((len(t), 1))
+        else:
+            hats = each_rest @ (own[:, None] == np.arange(own.max() + 1)) if len(rests) else each_rest
         yield ErrorNodes(error, vectors[:, k], hats)
+
+
+def values_of(motion: Motion, rests: Array) -> Mapping[str, Numbers]:
+    """Number (k,) of the value that each error of the table has in each rest (k, 2) [s], at least one rest.
+
+    Offsets turn nothing and are left out, as is what is left to the scatter: errors of scope ``sample``.
+    """
+    angles = motion.at(rests.mean(axis=1)) if len(rests) else motion.angles[:1]
+    groups = motion.chain.groups(angles)
+    return {
+        error.name: numbers
+        for error, numbers in zip(motion.chain.errors, groups, strict=True)
+        if not error.is_offset and error.scope is not Scope.SAMPLE
+    }
 
 
 def shifted(motion: Motion, by: float) -> Motion:

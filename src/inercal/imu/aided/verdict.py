@@ -125,8 +125,8 @@ def scatter(fit: Fit, gravity: float) -> float:
 
 
 def _relative(name: str, values: Mapping[str, float], u: Mapping[str, float]) -> float:
-    """Uncertainty of a scale factor over its value, of a misalignment as it is; g-sensitivities do not count."""
-    if name.startswith("G_"):
+    """Uncertainty of a scale factor over its value, of a misalignment as it is; G and K2 do not count."""
+    if name.startswith(("G_", "K2_")):
         return 0.0
     return u[name] / abs(values[name]) if name.startswith(("K1", "S")) else u[name]
 
@@ -158,10 +158,12 @@ def _unit_words(fit: Fit, triad: str) -> str:
     )
 
 
-def findings(fit: Fit, lag: float, faults: Sequence[Misfit]) -> Iterator[Finding]:
-    """Findings about clocks and biases, saturation, and faults found in the residuals."""
+def findings(fit: Fit, lag: float, faults: Sequence[Misfit], sound: bool) -> Iterator[Finding]:
+    """Findings about clocks, biases, saturation, and faults in the residuals of a result, ``sound`` or not."""
     for fault in faults:
-        yield Finding(fault.code, f"{fault.message}; the uncertainties allow for it", harm=())
+        # where u allows for a fault, sensors and table do not contradict each other
+        code = "unmodelled" if sound and fault.code == "contradiction" else fault.code
+        yield Finding(code, f"{fault.message}; the uncertainties allow for it", harm=())
     for triad in fit.identified:
         blocks = of_triad(fit, triad)[0].side.blocks
         if blocks.clipped:

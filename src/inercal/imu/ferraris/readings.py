@@ -83,7 +83,7 @@ def read_sections(
         np.array([len(sections.acc[name]) for name in POSITIONS]) / acc.rate,
         {triad.sensor: _noise(triad, at_rest[triad.sensor]) for triad in (acc, gyro)},
         {
-            triad.sensor: coarse_steps(triad.values, max(at_rest[triad.sensor], key=len))
+            triad.sensor: coarse_steps(triad.values, np.std(max(at_rest[triad.sensor], key=len), axis=0))
             for triad in (acc, gyro)
         },
         np.array(swing),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,12 +16,14 @@ from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.drivers import drivers_of
 from inercal.imu.multiposition.earth_rate import earth_rate_at
 from inercal.imu.multiposition.gyro import GyroFit, fit_gyro
-from inercal.imu.multiposition.joint import Scatter, force_error, join
-from inercal.imu.multiposition.outcome import assemble, without_fit
-from inercal.imu.multiposition.poses import Poses, choose, sweep
+from inercal.imu.multiposition.joint import Joint, Scatter, force_error, join
+from inercal.imu.multiposition.outcome import assemble, uncertainty_of, without_fit
+from inercal.imu.multiposition.outliers import Outliers, outlier_finding, outliers_of
+from inercal.imu.multiposition.poses import Poses, choose, excluded, refitted, sweep
+from inercal.imu.multiposition.squares import squares_finding
 from inercal.imu.multiposition.verdict import axis_findings, gyro_findings, rms_miss, scatter_findings
 from inercal.imu.recording import Recording, clipped_rows, prepare
-from inercal.imu.settings import ImuSettings
+from inercal.imu.settings import Exclusion, ImuSettings
 from inercal.imu.turns import Turns, cut_turns, first_guess
 from inercal.instruments.triad import TriadModel
 from inercal.records.places import counted
@@ -37,6 +39,18 @@ class MultipositionCalibration:
     recording: Recording
     poses: Poses | None = None
     gyro: GyroFit | None = None
+    outliers: Outliers = field(default_factory=Outliers)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """Accelerometers and gyro fitted to some of the poses and turns, with findings about that."""
+
+    poses: Poses
+    scatter: Scatter
+    gyro: GyroFit | None
+    joint: Joint
+    findings: list[Finding]
 
 
 def calibrate_multiposition(
@@ -61,7 +75,7 @@ def calibrate_multiposition(
     Raises
     ------
     InputError
-        The record has no accelerometer triad, or does not start at rest.
+        The record has no accelerometer triad or no rest, or the study leaves out what is not there.
     """
     import scipy.optimize  # noqa: F401  (loading it is not part of the computation)
 
@@ -72,25 +86,58 @@ def calibrate_multiposition(
     candidates = list(sweep(recording, gravity))
     if not candidates:
         return MultipositionCalibration(timed(without_fit(record, recording, settings), clock), recording)
-    poses = choose(candidates)
-    scatter = _scatter(poses)
+    poses = refitted(
+        choose(candidates), recording, gravity, excluded(candidates, recording, settings), settings.k2
+    )
     progress("fitting the gyro to the turns")
-    gyro, of_gyro = _calibrate_gyro(recording, poses, scatter, settings)
-    findings = [*scatter_findings(poses, scatter), *of_gyro]
+    fitted = _fit(recording, poses, settings)
+    progress("looking for what the model lacks")
+    uncertainty = uncertainty_of(fitted.joint, fitted.scatter, recording, settings)
+    findings = list(fitted.findings)
+    outliers = outliers_of(poses, fitted.gyro)
+    if outliers:
+        findings.append(_outlier_finding(recording, fitted, outliers, settings))
+    else:
+        u = np.sqrt(np.diag(uncertainty.covariance))
+        findings += squares_finding(fitted.joint, fitted.scatter, poses.means, gravity, u)
+    estimate = assemble(record, recording, poses, fitted.scatter, fitted.joint, settings, findings)
+    return MultipositionCalibration(timed(estimate, clock), recording, poses, fitted.gyro, outliers)
+
+
+def _fit(
+    recording: Recording, poses: Poses, settings: ImuSettings, left_out: Collection[tuple[int, int]] = ()
+) -> _Fitted:
+    """Fit all, but for the turns ``left_out``, pairs of the numbers of poses."""
+    scatter = _scatter(poses)
+    gyro, of_gyro = _calibrate_gyro(recording, poses, scatter, settings, left_out)
     joint = join(poses.accelerometer, gyro)
-    estimate = assemble(record, recording, poses, scatter, joint, settings, findings)
-    return MultipositionCalibration(timed(estimate, clock), recording, poses, gyro)
+    return _Fitted(poses, scatter, gyro, joint, [*scatter_findings(poses, scatter), *of_gyro])
+
+
+def _outlier_finding(
+    recording: Recording, fitted: _Fitted, outliers: Outliers, settings: ImuSettings
+) -> Finding:
+    """The finding about outliers, from the calibration without them."""
+    poses, gyro = fitted.poses, fitted.gyro
+    numbers = {poses.numbers[k] for k in outliers.poses}
+    others = refitted(poses, recording, settings.site.gravity, numbers, settings.k2)
+    turns = [] if gyro is None else [gyro.first[k] for k in outliers.turns]
+    without = _fit(recording, others, settings, {(poses.numbers[k], poses.numbers[k + 1]) for k in turns})
+    uncertainty = uncertainty_of(without.joint, without.scatter, recording, settings)
+    u = np.sqrt(np.diag(uncertainty.covariance))
+    return outlier_finding(outliers, poses, recording.accelerometer.t, gyro, fitted.joint, without.joint, u)
 
 
 def _scatter(poses: Poses) -> Scatter:
-    """Residual scatter, pooled with the noise at rest unless it clearly exceeds it (F test)."""
-    from scipy.special import fdtrc
+    """Residual scatter, pooled with the noise at rest unless it clearly differs from that (F test, both sides)."""
+    from scipy.special import fdtr, fdtrc
 
     fit, noise = poses.accelerometer.fit, float(np.mean(poses.noise_variance))
     own = fit.chi2 / fit.dof
     ratio = own / noise if noise > 0 else np.inf
-    if noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < LIMITS.scatter_probability:
-        return Scatter(float(np.sqrt(own)), fit.dof, True, float(np.sqrt(ratio)))
+    more = noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < LIMITS.scatter_probability
+    if more or fdtr(fit.dof, poses.noise_dof, ratio) < LIMITS.low_scatter_probability:
+        return Scatter(float(np.sqrt(own)), fit.dof, bool(more), float(np.sqrt(ratio)))
     return Scatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
 
 
@@ -113,7 +160,13 @@ def _gyro_means(recording: Recording, poses: Poses) -> Array:
     return np.array([part.mean(axis=0) if len(part) else np.full(3, np.nan) for part in parts])
 
 
-def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | None, list[Finding]]:
+def _turns(
+    recording: Recording,
+    poses: Poses,
+    drivers: Array,
+    exclude: Exclusion,
+    without: Collection[tuple[int, int]],
+) -> tuple[Turns | None, list[Finding]]:
     """The turns between neighbouring poses that can be integrated, and findings about the others."""
     gyro = recording.gyro
     assert gyro is not None
@@ -123,6 +176,9 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
     for k, (here, there) in enumerate(itertools.pairwise(poses.dwells)):
         start, stop = _gyro_index(recording, here.stop - 1), _gyro_index(recording, there.start)
         part = slice(start, stop + 1)
+        numbers = poses.numbers[k], poses.numbers[k + 1]
+        if numbers in without or exclude.touches(gyro.t[start], gyro.t[stop]):
+            continue
         steps = np.diff(gyro.t[part])
         if len(steps) == 0 or not np.all(steps >= 0):
             why = "the time axis breaks"
@@ -148,7 +204,11 @@ def _turns(recording: Recording, poses: Poses, drivers: Array) -> tuple[Turns | 
 
 
 def _calibrate_gyro(
-    recording: Recording, poses: Poses, scatter: Scatter, settings: ImuSettings
+    recording: Recording,
+    poses: Poses,
+    scatter: Scatter,
+    settings: ImuSettings,
+    without: Collection[tuple[int, int]],
 ) -> tuple[GyroFit | None, list[Finding]]:
     """The gyro's fit, if it can be made, and findings about it."""
     if recording.gyro is None:
@@ -159,7 +219,7 @@ def _calibrate_gyro(
         text = "the gyro is so restless in most holds that the poses were found by the accelerometers alone"
         findings.append(Finding("gyro_restless", text))
     drivers = drivers_of(recording, poses, settings)
-    turns, skipped = _turns(recording, poses, drivers.at_samples)
+    turns, skipped = _turns(recording, poses, drivers.at_samples, settings.exclude, without)
     findings += skipped
     if turns is None:
         return None, findings

@@ -37,7 +37,7 @@ def drivers_of(recording: Recording, poses: Poses, settings: ImuSettings) -> Dri
     t0 = float(poses.times.mean())
     columns, symbols = [(np.empty((len(poses.times), 0)), np.empty((len(gyro.t), 0)))], []
     if settings.g_sensitivity:
-        f = poses.accelerometer.model.correct(acc.values)
+        f = poses.accelerometer.correct(acc.values)
         if gyro.t is not acc.t:
             f = np.column_stack([np.interp(gyro.t, acc.t, column) for column in f.T])
         columns.append((poses.accelerometer.f, f))

@@ -18,11 +18,15 @@ from inercal.report.marks import Axis, Bars, Dots, Level, Line, Mark, Panel, Str
 from inercal.report.panels import draw
 from inercal.report.sphere import hemispheres
 from inercal.report.style import ALARM, COLOURS, INK, envelope
+from inercal.units import parse_unit
 
 if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
     from inercal.imu.multiposition.calibration import MultipositionCalibration
     from inercal.imu.multiposition.gyro import GyroFit
 
+
+_UG, _ARCSEC = (parse_unit(symbol).factor for symbol in ("ug", "arcsec"))
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 
@@ -40,10 +44,13 @@ def pictures(calibration: MultipositionCalibration) -> list[Picture]:
     pictures += [values(estimate)] if estimate.names else []
     pictures.append(_rest(calibration))
     if poses is not None:
-        pictures.append(_residuals(poses, estimate.statistics["scatter"]))
-    if gyro is not None:
-        durations = np.array([turn["duration_s"] for turn in estimate.result["turns"]])
-        pictures.append(_misses(gyro, durations, estimate.statistics["scatter"]))
+        off = calibration.outliers
+        pictures.append(
+            _residuals(poses, estimate.statistics["scatter"], off.poses, _foretold(estimate, "poses"))
+        )
+    if poses is not None and gyro is not None:
+        told = _foretold(estimate, "turns")
+        pictures.append(_misses(gyro, poses, estimate.statistics["scatter"], off.turns, told))
     if estimate.names:
         pictures += [correlation(estimate), budget(estimate)]
     return pictures
@@ -65,12 +72,14 @@ def _rest(calibration: MultipositionCalibration) -> Picture:
         last = len(panels) == len(recording.restlessness) - 1
         across = Axis("time [s]" if last else "", margin=0.005)
         panels.append([Panel(marks, across, Axis(f"{_WORDS[sensor]}\nvariance / at rest", "log"))])
-    ends = t[recording.initial.start], t[recording.initial.stop - 1]
+    at_rest = f"{t[recording.rest[0].start]:.1f} s to {t[recording.rest[-1].stop - 1]:.1f} s"
+    if len(recording.rest) > 1:
+        at_rest = f"{len(recording.rest)} quiet pieces, {at_rest}"
     unused = "" if judged == set(recording.restlessness) else "; the gyro took no part in finding them"
     return draw(
         "Static intervals",
-        f"Variance in a window of {recording.window} samples over the variance of the initial static period "
-        f"({ends[0]:.1f} s to {ends[1]:.1f} s), least and greatest values of pieces of the recording. Shaded: the "
+        f"Variance in a window of {recording.window} samples over the variance at rest ({at_rest}), "
+        f"least and greatest values of pieces of the recording. Shaded: the "
         f"{len(dwells)} static intervals found below the threshold of {threshold:g} (red){unused}.",
         panels,
         0.6 + 1.5 * len(panels),
@@ -92,7 +101,7 @@ def _sphere(poses: Poses) -> Picture:
         "Direction of the specific force in each static pose, in the frame of the accelerometers, on two "
         "hemispheres seen along −z (equal-area projection; circles at 30° and 60° from the pole), coloured by "
         f"residual. The numbers count the poses in order of time; near ones share a label.{star}",
-        [hemispheres(fit.directions, 1e3 * fit.fit.residuals, "|f| − g [mm/s²]", lacking)],
+        [hemispheres(fit.directions, fit.fit.residuals / _UG, "|f| − g [µg]", lacking)],
         3.3,
     )
 
@@ -106,45 +115,68 @@ def _lacking(fit: AccelerometerFit) -> Array:
     return np.array([cure, -cure])
 
 
-def _residuals(poses: Poses, scatter: float) -> Picture:
+def _foretold(estimate: Estimate, what: str) -> str:
+    """A sentence on every second pose or turn foretold by the others; empty where there are too few."""
+    if what not in estimate.result["held_out"]:
+        return ""
+    told = estimate.result["held_out"][what]
+    low, high = told["range_99"]
+    return (
+        f" Every second one, foretold by the others, is off by {told['rms_z']:.2f} of its u (rms; {low:.2f} to "
+        f"{high:.2f} at 99 % for {told['residuals']} residuals)."
+    )
+
+
+def _alarming(numbers: Array, values: Array, places: tuple[int, ...]) -> list[Mark]:
+    """Rings around what lies off all others."""
+    if not places:
+        return []
+    k = list(places)
+    return [Dots(numbers[k], values[k], "lies off all others", ALARM, "o", 9.0, filled=False)]
+
+
+def _residuals(poses: Poses, scatter: float, off: tuple[int, ...], foretold: str) -> Picture:
     """Residual of each pose, with what the noise explains and what the uncertainties use."""
-    residuals = 1e3 * poses.accelerometer.fit.residuals
-    numbers = np.arange(1, len(residuals) + 1)
-    noise = 1e3 * np.sqrt(poses.noise_variance)
+    residuals = poses.accelerometer.fit.residuals / _UG
+    numbers = np.array(poses.numbers)
+    noise = np.sqrt(poses.noise_variance) / _UG
+    size = scatter / _UG
     marks: list[Mark] = [
-        Strips((-1e3 * scatter, 1e3 * scatter), level=True),
+        Strips((-size, size), level=True),
         Level(0.0),
         Dots(numbers, residuals, up=noise, bar=INK),
+        *_alarming(numbers, residuals, off),
     ]
     return draw(
         "Residual of each pose",
         "Size of the calibrated specific force less local gravity. Bars: ± one standard uncertainty by the noise at "
-        f"rest; band: ± {1e3 * scatter:.2g} mm/s², the standard deviation on which the uncertainties of the "
-        f"accelerometers rest. The nine coefficients draw the residuals towards zero: {len(numbers)} poses leave "
-        f"{counted(poses.accelerometer.fit.dof, 'degree')} of freedom.",
-        [[Panel(marks, _counted("pose"), Axis("|f| − g [mm/s²]"), grid="y")]],
+        f"rest; band: ± {size:.2g} µg, the standard deviation on which the uncertainties of the "
+        f"accelerometers rest. The coefficients draw the residuals towards zero: {len(numbers)} poses leave "
+        f"{counted(poses.accelerometer.fit.dof, 'degree')} of freedom.{foretold}",
+        [[Panel(marks, _counted("pose"), Axis("|f| − g [µg]"), grid="y")]],
         2.1,
     )
 
 
-def _misses(gyro: GyroFit, durations: Array, scatter: float) -> Picture:
+def _misses(gyro: GyroFit, poses: Poses, scatter: float, off: tuple[int, ...], foretold: str) -> Picture:
     """Angle between carried and measured vertical after each turn."""
-    numbers = np.arange(1, len(gyro.miss) + 1)
-    misses = 1e3 * np.linalg.norm(gyro.miss, axis=1)
+    numbers = np.array([poses.numbers[k] for k in gyro.first])
+    misses = np.linalg.norm(gyro.miss, axis=1) / _ARCSEC
     by_verticals = scatter**2 * np.sum(gyro.vertical_error.reshape(len(numbers), -1) ** 2, axis=1)
     # the random walk acts in the two directions across the vertical
-    expected = 1e3 * np.sqrt(by_verticals + 2.0 * gyro.walk**2 * durations)
+    expected = np.sqrt(by_verticals + 2.0 * gyro.walk**2 * gyro.durations) / _ARCSEC
     marks: list[Mark] = [
         Bars(numbers, np.zeros(len(numbers)), misses, thickness=0.06, upright=True),
         Dots(numbers, misses, "miss"),
         Dots(numbers, expected, "expected, rms", COLOURS[1], "_", 9.0),
+        *_alarming(numbers, misses, off),
     ]
     return draw(
         "Miss of each turn",
         "Angle between the vertical of a pose carried through the gyro's output to the next pose and the vertical "
         f"measured there. Dashes: what the uncertainty of the verticals and the fitted angle random walk of "
-        f"{gyro.walk:.2g} rad/√s make expect. Turns left out of the fit are not counted.",
-        [[Panel(marks, _counted("turn"), Axis("miss [mrad]", limits=(0.0, None)), grid="y")]],
+        f"{gyro.walk:.2g} rad/√s make expect. A turn has the number of the pose before it.{foretold}",
+        [[Panel(marks, _counted("turn from pose"), Axis("miss [arcsec]", limits=(0.0, None)), grid="y")]],
         2.1,
     )
 

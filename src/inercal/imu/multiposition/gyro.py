@@ -14,11 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.estimate.linear import least_squares
 from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.imu.multiposition.deletion import LinearFit
 from inercal.imu.multiposition.drivers import Drivers
 from inercal.imu.multiposition.earth_rate import EarthRate, UnknownRates, unknown_rates, vertical_output
 from inercal.imu.turns import Turns, carried, carried_with_derivatives, thin
@@ -73,7 +75,8 @@ class GyroFit:
     units of its standard deviation. ``miss`` (m, 3) is the carried minus the measured vertical [rad], and
     ``by_earth`` (n, 3) the output in the poses that is put down to earth rate [output].
     ``vertical_error`` (3 m, 3 n) takes errors of the specific force in the poses to errors of ``miss``;
-    ``durations`` (m,) [s] of the turns.
+    ``durations`` (m,) [s] of the turns and ``first`` (m,) the pose before each; ``linear`` their misses across the
+    vertical, made linear.
     """
 
     names: tuple[str, ...]
@@ -92,6 +95,8 @@ class GyroFit:
     static: StaticRegression
     vertical_error: Array
     durations: Array
+    first: NDArray[np.int64]
+    linear: LinearFit
 
 
 def fit_gyro(
@@ -190,6 +195,8 @@ def fit_gyro(
         static,
         vertical_error,
         turns.durations,
+        turns.first,
+        _across(turns, verticals, left, by_verticals, fit, weigh),
     )
 
 
@@ -238,6 +245,25 @@ class _Problem:
                 [np.zeros((q, p)), np.diag(1.0 / self.unknown.sizes)],
             ]
         )
+
+
+def _across(
+    turns: Turns, verticals: Array, miss: Array, by_verticals: Array, fit: NonlinearFit, weigh: Array
+) -> LinearFit:
+    """The misses (m, 2) in the two directions across the vertical at the end of each turn, beside all other data."""
+    m, rows = len(turns), len(miss)
+    across = np.linalg.svd(verticals[turns.last][:, None, :])[2][:, 1:]
+    whole = np.zeros((m, 2, m, 3))
+    whole[range(m), :, range(m)] = across
+    project = whole.reshape(2 * m, rows)
+    return LinearFit.beside(
+        (project @ miss).reshape(m, 2),
+        (project @ np.linalg.solve(weigh, fit.jacobian[:rows])).reshape(m, 2, -1),
+        project @ by_verticals @ project.T,
+        turns.durations,
+        fit.jacobian[rows:],
+        fit.residuals[rows:],
+    )
 
 
 def _geometry(
@@ -310,4 +336,4 @@ def _excess(miss: Array, by_verticals: Array, durations: Array, dof: float) -> f
         return floor
     from scipy.optimize import brentq
 
-    return float(brentq(surplus, floor, float(np.sum(parts)) / dof, rtol=1e-9))
+    return float(brentq(surplus, floor, 1.001 * float(np.sum(parts)) / dof, rtol=1e-9))

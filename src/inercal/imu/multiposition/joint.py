@@ -18,7 +18,6 @@ from inercal.estimate.budget import TypeA, TypeB
 from inercal.geometry.site import Site
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.gyro import GyroFit
-from inercal.instruments.terms import ACCELEROMETER_TRIAD
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ def radial(fit: AccelerometerFit) -> Array:
 
 def force_error(fit: AccelerometerFit) -> Array:
     """(3 n, 3 n): errors of the calibrated specific force by independent errors of f in the poses."""
-    by_parameter = fit.force_sensitivity().reshape(-1, len(ACCELEROMETER_TRIAD))
+    by_parameter = fit.force_sensitivity().reshape(3 * len(fit.f), -1)
     return np.asarray(np.eye(3 * len(fit.f)) + by_parameter @ fit.fit.gain() @ radial(fit))
 
 
@@ -66,7 +65,7 @@ class Joint:
 def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> Joint:
     """Stack the two fits."""
     by_force = accelerometer.fit.gain() @ radial(accelerometer)
-    names, values = ACCELEROMETER_TRIAD, accelerometer.fit.x
+    names, values = accelerometer.names, accelerometer.fit.x
     if gyro is None:
         empty = np.zeros((len(names), 0))
         return Joint(names, values, by_force, empty, empty, accelerometer, None)
@@ -111,7 +110,7 @@ def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro
     ``resolution`` (3,) [``gyro_unit``] is the step of gyro outputs too coarse for their noise, else 0: then every
     pose has the same rounding error, u = step/sqrt(12) (GUM F.2.2.1), where scatter shows nothing.
 
-    Gravity sets the scale of specific force: K1 and G go as 1/g. The clock sets the scale of rate: S goes as
+    Gravity sets the scale of specific force: K1, K2 and G go as 1/g. The clock sets the scale of rate: S goes as
     the length of the record's second. The parts of earth rate that are not known act through the fit.
     """
 
@@ -119,7 +118,7 @@ def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro
         values = zip(joint.names, joint.values, strict=True)
         return np.array([factor * value if name.startswith(prefixes) else 0.0 for name, value in values])
 
-    by_gravity = scaled(-1.0 / site.gravity, "K1_", "G_")
+    by_gravity = scaled(-1.0 / site.gravity, "K1_", "K2_", "G_")
     sources = [TypeB(i.source, i.u, i.unit, by_gravity * i.sensitivity) for i in site.inputs]
     if joint.gyro is None:
         return sources
@@ -127,7 +126,7 @@ def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro
         sources.append(TypeB("time base", time_base_u, "1", scaled(1.0, "S_")))
     if site.horizontal_rate_u > 0 and joint.gyro.rate_gain.size:
         padded = np.vstack(
-            [np.zeros((len(ACCELEROMETER_TRIAD), joint.gyro.rate_gain.shape[1])), joint.gyro.rate_gain]
+            [np.zeros((len(joint.accelerometer.names), joint.gyro.rate_gain.shape[1])), joint.gyro.rate_gain]
         )
         sources.append(TypeB("earth rate", site.horizontal_rate_u, "rad/s", padded / site.horizontal_rate_u))
     if np.any(resolution > 0):

@@ -9,11 +9,14 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
-from inercal.estimate.budget import combine
+from inercal.estimate.budget import Uncertainty, combine
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status, settled
 from inercal.imu.limits import LIMITS
+from inercal.imu.multiposition.deletion import held_out
+from inercal.imu.multiposition.gyro import GyroFit
 from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
+from inercal.imu.multiposition.outliers import linear_poses
 from inercal.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
 from inercal.imu.multiposition.verdict import rms_miss, spread_words, verdict
 from inercal.imu.recording import Recording
@@ -54,11 +57,8 @@ def assemble(
     findings: list[Finding],
 ) -> Estimate:
     """Put the estimate together."""
-    gyro_unit = "" if recording.gyro is None else recording.gyro.unit.symbol
-    from_scatter = type_a(joint, scatter, gyro_unit)
-    resolution = recording.resolution.get("gyro", np.zeros(3))
-    from_outside = type_b(joint, settings.site, settings.time_base_u, resolution, gyro_unit)
-    uncertainty = combine(joint.names, [*from_scatter, *from_outside])
+    uncertainty = uncertainty_of(joint, scatter, recording, settings)
+    from_scatter = type_a(joint, scatter, _gyro_unit(recording))
     residual = np.sum([source.covariance for source in from_scatter], axis=0)
     u = dict(zip(joint.names, uncertainty.u.tolist(), strict=True))
     noise = noise_covariance(joint, *_noise(recording, poses, joint))
@@ -86,18 +86,34 @@ def assemble(
         joint.values,
         uncertainty,
         verdict(recording, poses, joint.gyro, settings.site.gravity, u, findings),
-        findings=(*settled(record.findings, *MASKED), *findings),
+        findings=(*settled(record.findings, *MASKED), *recording.findings, *findings),
         statistics=statistics,
         result={
             "method": "multiposition",
             "intervals": _interval_table(recording, poses),
-            "turns": _turn_table(joint),
+            "turns": _turn_table(joint, poses, recording),
+            "held_out": _held_out(poses, scatter, gyro),
             "u_residual": _named(joint.names, np.sqrt(np.diag(residual))),
             "u_noise": _named(joint.names, np.sqrt(np.diag(noise))),
             "unit": {triad.sensor: triad.unit.symbol for triad in _triads(recording)},
             "bias_time_s": float(poses.times.mean()),
         },
     )
+
+
+def uncertainty_of(
+    joint: Joint, scatter: Scatter, recording: Recording, settings: ImuSettings
+) -> Uncertainty:
+    """Covariance, degrees of freedom and budget of the coefficients."""
+    unit = _gyro_unit(recording)
+    resolution = recording.resolution.get("gyro", np.zeros(3))
+    from_outside = type_b(joint, settings.site, settings.time_base_u, resolution, unit)
+    return combine(joint.names, [*type_a(joint, scatter, unit), *from_outside])
+
+
+def _gyro_unit(recording: Recording) -> str:
+    """Unit of the gyro's output; empty where there is none."""
+    return "" if recording.gyro is None else recording.gyro.unit.symbol
 
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
@@ -152,25 +168,46 @@ def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any
     t, fit = recording.accelerometer.t, poses.accelerometer
     return [
         {
+            "pose": number,
             "start_s": float(t[d.start]),
             "end_s": float(t[d.stop - 1]),
             "samples": d.samples,
             "direction": direction,
             "residual_m_s2": float(residual),
         }
-        for d, direction, residual in zip(poses.dwells, fit.directions, fit.fit.residuals, strict=True)
+        for number, d, direction, residual in zip(
+            poses.numbers, poses.dwells, fit.directions, fit.fit.residuals, strict=True
+        )
     ]
 
 
-def _turn_table(joint: Joint) -> list[Mapping[str, Any]]:
+def _turn_table(joint: Joint, poses: Poses, recording: Recording) -> list[Mapping[str, Any]]:
     """One row for each turn used."""
     if joint.gyro is None:
         return []
-    misses = np.linalg.norm(joint.gyro.miss, axis=1)
+    gyro, t = joint.gyro, recording.accelerometer.t
+    misses = np.linalg.norm(gyro.miss, axis=1)
     return [
-        {"duration_s": float(d), "miss_rad": float(m)}
-        for d, m in zip(joint.gyro.durations, misses, strict=True)
+        {
+            "from_pose": poses.numbers[k],
+            "start_s": float(t[poses.dwells[k].stop - 1]),
+            "duration_s": float(d),
+            "miss_rad": float(m),
+        }
+        for k, d, m in zip(gyro.first, gyro.durations, misses, strict=True)
     ]
+
+
+def _held_out(poses: Poses, scatter: Scatter, gyro: GyroFit | None) -> Mapping[str, Any]:
+    """Every second pose and turn foretold by the others: rms error over u, its count, and the 99 % range of that."""
+    of_poses = held_out(linear_poses(poses.accelerometer), scatter.s**2)
+    of_turns = None if gyro is None else held_out(gyro.linear, gyro.walk**2)
+    named = {"poses": of_poses, "turns": of_turns}
+    return {
+        name: {"rms_z": each.rms, "residuals": each.count, "range_99": [each.low, each.high]}
+        for name, each in named.items()
+        if each is not None
+    }
 
 
 def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> Estimate:
@@ -197,7 +234,7 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
         _basis(record, settings),
         status,
         message,
-        findings=record.findings,
+        findings=(*record.findings, *recording.findings),
         statistics={"intervals": float(len(dwells)), "threshold": best},
         result={"method": "multiposition", "intervals": [], "turns": []},
     )

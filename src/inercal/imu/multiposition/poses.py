@@ -1,35 +1,39 @@
 """The static poses of a hand-held recording: found, averaged, and the threshold chosen.
 
-An interval is static where the windowed variance stays below a multiple of that of an initial static period;
+An interval is static where the windowed variance stays below a multiple of that at rest;
 the multiple is the one whose poses the accelerometer model fits best per degree of freedom.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.errors import StudyError
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import PARAMETERS, AccelerometerFit, fit_accelerometer
 from inercal.imu.recording import Recording
+from inercal.imu.settings import ImuSettings
 from inercal.records.dwells import Dwell, static_intervals
 
 MULTIPLES = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 28.0, 40.0)
-"""Thresholds tried, as multiples of the variance of the initial static period."""
+"""Thresholds tried, as multiples of the variance at rest."""
 
 
 @dataclass(frozen=True)
 class Poses:
     """Static poses at one threshold, and the accelerometer fit to them.
 
-    ``times`` (n,) [s] their middles, ``means`` (n, 3) mean outputs, ``noise_variance`` (n,) the variance
-    [(m/s^2)^2] of each pose's |f| that the sensors' noise explains, with ``noise_dof`` degrees of freedom.
+    ``numbers`` count them from 1, those left out too; ``times`` (n,) [s] their middles, ``means`` (n, 3) mean outputs,
+    ``noise_variance`` (n,) the variance [(m/s^2)^2] of each pose's |f| that the sensors' noise explains, with
+    ``noise_dof`` degrees of freedom.
     """
 
     dwells: tuple[Dwell, ...]
+    numbers: tuple[int, ...]
     multiple: float
     with_gyro: bool
     times: Array
@@ -81,7 +85,7 @@ def distinct(dwells: tuple[Dwell, ...], y: Array, window: int) -> tuple[Dwell, .
 
 def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
     """Poses at every threshold that yields enough of them, with and without the gyro's help."""
-    y, rate = recording.accelerometer.values, recording.accelerometer.rate
+    y = recording.accelerometer.values
     seen: set[tuple[Dwell, ...]] = set()
     start: Array | None = None
     for with_gyro in (True, False) if recording.gyro is not None else (False,):
@@ -96,12 +100,61 @@ def sweep(recording: Recording, gravity: float) -> Iterator[Poses]:
             if not accelerometer.fit.converged or not full_rank or np.any(accelerometer.model.scale <= 0):
                 continue
             start = accelerometer.fit.x
-            lengths = np.array([dwell.samples for dwell in dwells]) / rate
-            noise = recording.noise["acc"]
-            variance = np.sum(accelerometer.output_gradient() ** 2 * noise.variance(lengths), axis=1)
-            dof = 3.0 * noise.dof(float(np.median(lengths)))
-            times = np.array([recording.accelerometer.t[(d.start + d.stop) // 2] for d in dwells])
-            yield Poses(dwells, multiple, with_gyro, times, means, accelerometer, variance, dof)
+            numbers = tuple(range(1, len(dwells) + 1))
+            yield _poses(recording, dwells, numbers, multiple, with_gyro, means, accelerometer)
+
+
+def _poses(
+    recording: Recording,
+    dwells: tuple[Dwell, ...],
+    numbers: tuple[int, ...],
+    multiple: float,
+    with_gyro: bool,
+    means: Array,
+    accelerometer: AccelerometerFit,
+) -> Poses:
+    """Poses with their times, and what noise makes of them."""
+    t, noise = recording.accelerometer.t, recording.noise["acc"]
+    lengths = np.array([dwell.samples for dwell in dwells]) / recording.accelerometer.rate
+    of_means = noise.variance(lengths) + recording.resolution["acc"] ** 2 / 12.0
+    variance = np.sum(accelerometer.output_gradient() ** 2 * of_means, axis=1)
+    dof = 3.0 * noise.dof(float(np.median(lengths)))
+    times = np.array([t[(d.start + d.stop) // 2] for d in dwells])
+    return Poses(dwells, numbers, multiple, with_gyro, times, means, accelerometer, variance, dof)
+
+
+def excluded(candidates: list[Poses], recording: Recording, settings: ImuSettings) -> set[int]:
+    """Numbers of the poses that the study leaves out, of those chosen; raises `StudyError` where that does not go."""
+    poses, exclude, t = choose(candidates), settings.exclude, recording.accelerometer.t
+    for number in exclude.poses:
+        if number not in poses.numbers:
+            raise StudyError("imu.exclude", f"found pose {number}, expected one of 1 to {len(poses.numbers)}")
+    for begin, end in exclude.times:
+        if begin >= t[-1] or end <= t[0]:
+            raise StudyError(
+                "imu.exclude",
+                f"found {begin:g} s .. {end:g} s, expected a time of the record, {t[0]:g} s to {t[-1]:g} s",
+            )
+    middles = zip(poses.numbers, poses.times, strict=True)
+    out = set(exclude.poses) | {number for number, middle in middles if exclude.touches(middle, middle)}
+    left, needed = len(poses.numbers) - len(out), LIMITS.poses_with_k2 if settings.k2 else LIMITS.fewest_poses
+    if left < needed:
+        key = "imu.exclude" if out else "imu.k2"
+        raise StudyError(key, f"found {left} poses to fit, expected {needed} at least")
+    return out
+
+
+def refitted(
+    poses: Poses, recording: Recording, gravity: float, left_out: Collection[int], squares: bool
+) -> Poses:
+    """The poses but those of the numbers ``left_out``, fitted again, with K2 where ``squares`` are asked for."""
+    kept = [k for k, number in enumerate(poses.numbers) if number not in left_out]
+    if len(kept) == len(poses.numbers) and squares == poses.accelerometer.squares:
+        return poses
+    means = poses.means[kept]
+    accelerometer = fit_accelerometer(means, gravity, poses.accelerometer.fit.x[:PARAMETERS], squares)
+    dwells, numbers = tuple(poses.dwells[k] for k in kept), tuple(poses.numbers[k] for k in kept)
+    return _poses(recording, dwells, numbers, poses.multiple, poses.with_gyro, means, accelerometer)
 
 
 def choose(candidates: list[Poses]) -> Poses:

@@ -42,7 +42,7 @@ def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
     weak = identified.directions[-1] / identified.scale
     grid = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
     grid /= np.linalg.norm(grid, axis=1, keepdims=True)
-    there = AccelerometerFit(fit.model, gravity * grid, fit.fit)
+    there = AccelerometerFit(fit.model, fit.k2, gravity * grid, fit.fit)
     # residual |f| - g changes with the parameters as f does along its own direction
     gain = np.einsum("ni,nip,p->n", grid, there.force_sensitivity(), weak)
     return np.asarray(grid[np.argmax(np.abs(gain))])
@@ -119,7 +119,8 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
     if dof < 5:
         yield Finding(
             "few_degrees_of_freedom",
-            f"{len(poses.dwells)} poses leave {counted(dof, 'degree')} of freedom for nine parameters: the "
+            f"{len(poses.dwells)} poses leave {counted(dof, 'degree')} of freedom for {len(poses.accelerometer.fit.x)} "
+            f"parameters: the "
             "uncertainties themselves are uncertain, record more poses",
         )
     if scatter.excess:

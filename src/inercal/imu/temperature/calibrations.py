@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -117,7 +118,16 @@ def fit_calibrations(
         findings.append(Finding("few_degrees_of_freedom", text))
     what = f"{len(curves)} coefficients from {len(T)} calibrations"
     given = {"reference_degC": reference}
-    return TemperatureModel(assemble(curves, reference, files, findings, given, what), tuple(curves))
+    estimate = assemble(curves, reference, files, findings, given, what)
+    result = {**estimate.result, "calibration": {"command": first.command, "result": _in_use(first)}}
+    return TemperatureModel(replace(estimate, result=result), tuple(curves))
+
+
+def _in_use(estimate: Estimate) -> dict[str, Any]:
+    """The part of a calibration's result beside the coefficients that its use needs."""
+    keys = ("unit", "instrument", "stated", "attitude", "gravity_m_s2")
+    kept = {key: estimate.result[key] for key in keys if key in estimate.result}
+    return {**kept, "rates": []} if "rates" in estimate.result else kept
 
 
 def _with_neglected(fit: Cubic, T: Array, y: Array, variances: Array, common: float) -> Cubic:

@@ -168,11 +168,13 @@ def _record(tables: Sequence[FileTable], record_map: RecordMap | None) -> Record
         for file in tables
         for finding in file.table.findings
     )
+    stamped = any("t" in file.table.values for file in tables)
     return Record(
         columns,
         (*findings, *check(columns)),
         tuple(dict.fromkeys(sources)),
         next((file.table.labels for file in tables if file.table.labels), ()),
+        rate_u=None if record_map is None or record_map.rate is None or stamped else record_map.rate_u,
     )
 
 

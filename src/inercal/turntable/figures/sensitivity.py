@@ -49,7 +49,7 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
     ]
     order = np.argsort(-np.nan_to_num(analysed.aggregate.total), kind="stable")
     worst = sorted(analysed.flagged, key=lambda flag: flag.sum_first)
-    result = analysis_result(analysed)
+    result, aggregate = analysis_result(analysed), analysed.aggregate
     return framed(
         "sensitivity.html",
         estimate,
@@ -66,17 +66,24 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
             (
                 indices.factors[k],
                 analysed.what[k],
-                float(analysed.aggregate.first[k]),
-                float(analysed.aggregate.total[k]),
-                float(analysed.aggregate.total_minus_first[k]),
+                [
+                    (float(share[k]), None if u is None else float(u[k]))
+                    for share, u in (
+                        (aggregate.first, aggregate.u_first),
+                        (aggregate.total, aggregate.u_total),
+                        (aggregate.total_minus_first, aggregate.u_total_minus_first),
+                    )
+                ],
             )
             for k in order
         ],
         pictures=[picture for picture in pictures if picture is not None],
         flagged=_flag_counts(analysed),
-        sampled=indices.u_first is not None,
+        sampled=indices.resampled is not None,
         joints=analysed.joints,
-        worst=[(flag.output, np.degrees(flag.angles).tolist(), flag.sum_first) for flag in worst[:_FLAGS]],
+        worst=[
+            (flag.output, np.degrees(flag.angles).tolist(), flag.sum_first, flag.u) for flag in worst[:_FLAGS]
+        ],
         outputs=indices.outputs,
         names=indices.factors,
         tables=[
@@ -86,6 +93,9 @@ def page(analysed: Analysed, settings: TurntableSettings, estimate: Estimate) ->
                 ("first", f"First order S, {words}"),
                 ("total", f"Total order ST, {words}"),
                 ("total_minus_first", f"Interactions ST − S, {words}"),
+                ("u_first", f"u of S, {words}"),
+                ("u_total", f"u of ST, {words}"),
+                ("u_total_minus_first", f"u of ST − S, {words}"),
                 ("shapley", f"Shapley effects, {words}"),
             )
             if key in result[kind]
@@ -153,7 +163,7 @@ def interactions(indices: Indices, mean: Averages, weighted: Averages) -> Pictur
 
     None where there is nothing, or where the indices are sampled and the differences are mostly their noise.
     """
-    if indices.u_first is not None:
+    if indices.resampled is not None:
         return None
     beyond = [
         np.where(each.total_minus_first > 0.0, each.total_minus_first, np.nan) for each in (mean, weighted)

@@ -22,6 +22,7 @@ from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
+from inercal.turntable.positions.application import in_use
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
@@ -86,8 +87,11 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(
-            TypeB(error.name, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
+            TypeB(error.source, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
         )
+    if fit.second is not None:
+        columns = terms.slope @ fit.second.shifts(fit.gain)[1]
+        components.append(TypeB("second order of the table's errors", 1.0, "1", columns))
     beside, columns = fit.model.beside(fit.angles, fit.c)
     for each, column in zip(beside, np.moveaxis(columns, -1, 0), strict=True):
         # readings made with another value than taken: the fit takes the difference for coefficients
@@ -100,7 +104,8 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     """Put the estimate together."""
     unit = readings.unit.si
     model, conditions = MODELS[settings.instrument.kind], _conditions(record, readings, settings)
-    basis = studied(COMMAND, settings, record.sources, model, REFERENCES, conditions)
+    sources_read = (*record.sources, *settings.chain.sources)
+    basis = studied(COMMAND, settings, sources_read, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
     rank, terms_asked = worst_rank(fitting.identified)
     result: dict[str, Any] = {
@@ -147,7 +152,12 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         statistics=_statistics(readings, fitting, result["plan"]["condition"]),
         result=result
         | _shares(fit, terms)
-        | {"table_errors": _table_errors(fit), "noise": _noise(readings, fit, unit)},
+        | {
+            "table_errors": _table_errors(fit),
+            "noise": _noise(readings, fit, unit),
+            "second_order": fit.second is not None,
+        }
+        | in_use(fit, terms.slope, settings, unit),
     )
 
 
@@ -184,23 +194,26 @@ def _farthest(readings: Readings, fit: Regression) -> str:
 
 
 def _too_large(fit: Regression) -> list[Finding]:
-    """A finding where errors of the table bend the readings by more than their noise."""
+    """A finding where errors of the table bend the readings by more than their noise beyond the second order."""
+    if fit.second is None:
+        return []
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
     within = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).within
-    # where no noise is left, squares a thousand times below what changes from position to position do not matter
-    # either; errors that stay are found with the terms, and then only their squares are left
+    # where no noise is left, what is a thousand times below what changes from position to position does not matter
     limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.diagonal(within, axis1=1, axis2=2).mean(axis=0)))
     bent = []
-    for error, step in zip(chain.errors, np.diag(chain.std), strict=True):
-        ends = [fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0)]
-        curvature = 0.5 * (ends[0] + ends[1]) - straight
-        if np.any(np.sqrt(np.mean(np.square(curvature), axis=0)) > limit):
+    for k, (error, std) in enumerate(zip(chain.errors, chain.std, strict=True)):
+        step = std * np.eye(len(chain.errors))[k]
+        plus, minus = (fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0))
+        even = 0.5 * (plus + minus) - straight - fit.second.squares[..., k]
+        odd = 0.5 * (plus - minus) - fit.slopes[..., k] * std
+        if np.any(np.sqrt(np.mean(np.square(even) + np.square(odd), axis=0)) > limit):
             bent.append(error.name)
     if not bent:
         return []
     text = (
-        f"{', '.join(bent)} may be so large that their squares bend the readings by more than the noise: the "
-        "uncertainties hold for small errors"
+        f"{', '.join(bent)} may be so large that even with their squares taken into account the readings bend by more "
+        "than the noise: the uncertainties hold for smaller errors"
     )
     return [Finding("large_errors", text)]
 

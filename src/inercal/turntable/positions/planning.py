@@ -124,10 +124,10 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
         raise StudyError(
             "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
         )
-    model, c, findings = _model(settings)
-    everywhere = _candidates(model, asked.candidates.angles, c, settings, asked.table_errors)
+    model, c, findings = expected_model(settings)
+    everywhere = candidates_of(model, asked.candidates.angles, c, settings, asked.table_errors)
     mask = within(asked.candidates.angles, [settings.limits.get(joint) for joint in model.chain.joints])
-    of_noise = _candidates(model, asked.candidates.angles, c, settings, False)
+    of_noise = candidates_of(model, asked.candidates.angles, c, settings, False)
     plans = []
     searched = (
         f"{asked.criterion}-optimal, {'table errors and noise' if asked.table_errors else 'noise alone'}"
@@ -182,11 +182,11 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
         else identify_channels(model, plan.angles)
     )
     used, seen, _ = choose_terms(settings, channels, plan.angles)
-    c, (rank, terms) = _expected(settings, used), worst_rank(whole)
+    c, (rank, terms) = expected_coefficients(settings, used), worst_rank(whole)
     figures = _figures(plan, settings, used)
     shares: Mapping[str, float] = {}
     if not any(each.words for each in seen):
-        noise, samples = [settings.instrument.noise] * len(channels), _samples(settings, plan.angles)
+        noise, samples = [settings.instrument.noise] * len(channels), samples_of(settings, plan.angles)
         y = used.outputs(plan.angles, c)
         shares = drift_shares(fit(used, plan.angles, y, noise, start=c, samples=samples))
     return JudgedPlan(
@@ -204,14 +204,14 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
 
 def _figures(plan: Plan, settings: TurntableSettings, used: TableModel) -> PlanFigures:
     """Figures of a plan for the terms ``used``, with table errors."""
-    candidates = _candidates(used, plan.angles, _expected(settings, used), settings, True)
+    candidates = candidates_of(used, plan.angles, expected_coefficients(settings, used), settings, True)
     prediction = i_criterion(sphere_rows(used) / np.sqrt(len(used.channels)))
     return judge(plan.name, candidates, orthonormal(used, plan.angles), prediction)
 
 
 def _of_site(judged: JudgedPlan, settings: TurntableSettings) -> list[Finding]:
     """A remark where it is the site, not the table or the noise, that rules what a plan is worth."""
-    acting, _ = judged.model.beside(judged.plan.angles, _expected(settings, judged.model))
+    acting, _ = judged.model.beside(judged.plan.angles, expected_coefficients(settings, judged.model))
     rms = judged.figures.rms_prediction
     best = _figures(judged.plan, settings, replace(judged.model, references=())).rms_prediction
     if not LIMITS.site_ratio * best < rms < math.inf:
@@ -225,7 +225,7 @@ def _of_site(judged: JudgedPlan, settings: TurntableSettings) -> list[Finding]:
     return [Finding("uncertain_site", text)]
 
 
-def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:
+def expected_model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:
     """The terms that are to be identified, their expected linear coefficients, and remarks."""
     model, what, free = choose_terms(settings, channels_of(settings), settings.design.candidates.angles)
     findings: list[Finding] = []
@@ -245,26 +245,26 @@ def _model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding
             "foreseen; state them under [instrument.coefficients]"
         )
         findings.append(Finding("no_coefficients", text))
-    return model, _expected(settings, model), findings
+    return model, expected_coefficients(settings, model), findings
 
 
-def _expected(settings: TurntableSettings, model: TableModel) -> Array:
+def expected_coefficients(settings: TurntableSettings, model: TableModel) -> Array:
     """Linear coefficients (p,) that the study expects of the instrument."""
     return np.concatenate([channel.linear(stated_values(settings, channel)) for channel in model.channels])
 
 
-def _samples(settings: TurntableSettings, angles: Array) -> NDArray[np.int64]:
+def samples_of(settings: TurntableSettings, angles: Array) -> NDArray[np.int64]:
     """Rows (n,) behind each reading."""
     return np.full(len(angles), settings.instrument.samples)
 
 
-def _candidates(
+def candidates_of(
     model: TableModel, angles: Array, c: Array, settings: TurntableSettings, table_errors: bool
 ) -> Candidates:
     """Candidates with their regressors and covariances, with the table's errors or without."""
     noise = np.full(len(model.channels), settings.instrument.noise)
     std = None if table_errors else np.zeros(len(model.chain.errors))
-    table = weights(model, angles, c, np.zeros_like(noise), std, _samples(settings, angles))
+    table = weights(model, angles, c, np.zeros_like(noise), std, samples_of(settings, angles))
     within = table.within + np.diag(np.square(np.maximum(noise, least_noise(table.within))))
     return Candidates(model.symbols, model.rows(angles), within, table.common if table_errors else None)
 

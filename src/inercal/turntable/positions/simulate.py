@@ -12,9 +12,10 @@ from inercal.instruments.by_angle import channel_model
 from inercal.records.made import record_of
 from inercal.records.record import Record
 from inercal.rigs.chain import Scope
+from inercal.turntable.disturbances import displaced, disturbed, magnetic_field, true_angles
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import TableModel, channels_of, stated_values, table_model
-from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.settings import Disturbances, TurntableSettings
 from inercal.units import parse_unit
 
 
@@ -32,7 +33,8 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
     Parameters
     ----------
     settings : TurntableSettings
-        The stated coefficients are the truth; each error of the table is drawn by its scope.
+        The stated coefficients are the truth; each error of the table is drawn by its scope, and its disturbances
+        are added.
     rng : Generator
 
     Returns
@@ -47,7 +49,8 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
     StudyError
         Too many samples.
     """
-    model, c = truth(settings)
+    other = settings.disturbances
+    model, c = truth(replace(settings, chain=displaced(settings.chain, other)))
     instrument, plan = settings.instrument, settings.plan
     n = len(plan)
     per_dwell = instrument.samples
@@ -56,15 +59,25 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
             "instrument.sample_rate",
             f"found {n * per_dwell:.4g} samples in all, expected at most {LIMITS.most_samples:.0e}",
         )
-    errors = np.repeat(model.chain.draw(rng, n)[:, None, :], per_dwell, axis=1)
+    errors = np.repeat(model.chain.draw(rng, plan.angles)[:, None, :], per_dwell, axis=1)
     for k, error in enumerate(model.chain.errors):
         if error.scope is Scope.SAMPLE:
             errors[..., k] = error.distribution.sample(rng, (n, per_dwell))
-    y = model.outputs(plan.angles[:, None, :], c, errors)
-    if instrument.noise is not None:
-        y = y + rng.normal(0.0, instrument.noise * np.sqrt(per_dwell), y.shape)
     begin = instrument.dwell * np.arange(n)[:, None]
     t = (begin + instrument.dwell * (np.arange(per_dwell) + 0.5) / per_dwell).ravel()
+    true = true_angles(plan.angles, model.chain.joints, other, rng)[:, None, :]
+    y = model.outputs(true, c, errors)
+    if other.magnetic:
+        axes = ["xyz".index(channel.channel[-1]) for channel in model.channels]
+        y = y + magnetic_field(model.chain.attitude(true, errors), other)[..., axes]
+    if other != Disturbances():
+        bias = [
+            channel.regressors(np.zeros(3), np.zeros(3)) @ c[block]
+            for channel, block in zip(model.channels, model.blocks, strict=True)
+        ]
+        y = disturbed(y.reshape(len(t), -1), np.array(bias), t, other, rng).reshape(y.shape)
+    if instrument.noise is not None:
+        y = y + rng.normal(0.0, instrument.noise * np.sqrt(per_dwell), y.shape)
     angles = np.repeat(plan.angles, per_dwell, axis=0)
     columns = [("position", parse_unit("1"), np.repeat(np.arange(1.0, n + 1.0), per_dwell))]
     columns += [

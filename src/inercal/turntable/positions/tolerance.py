@@ -24,13 +24,15 @@ from inercal.turntable.weights import averaged, least_noise, weights_of
 def shifts(fit: Regression) -> tuple[Array, ...]:
     """Shift (p, q) of the linear coefficients by one standard deviation of each error of the table.
 
-    q is 1 for a constant error, and the number of positions for one that is redrawn there.
+    q is the number of values that the error takes: 1 if it is constant, that of the positions if it is redrawn there.
     """
     chain, by_error = fit.model.chain, []
     slopes = averaged(chain, fit.slopes, fit.samples)
-    for k, error in enumerate(chain.errors):
+    for k, (error, numbers) in enumerate(zip(chain.errors, chain.groups(fit.angles), strict=True)):
         each = np.einsum("pnc,nc->pn", fit.gain, slopes[..., k]) * error.distribution.std
-        by_error.append(each.sum(axis=1, keepdims=True) if error.scope.constant else each)
+        by_value = np.zeros((len(each), int(numbers.max()) + 1))
+        np.add.at(by_value.T, numbers, each.T)
+        by_error.append(by_value)
     return tuple(by_error)
 
 
@@ -121,7 +123,7 @@ def alternatives(fit: Regression, slope: Array) -> Alternatives:
     chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
 
     def u(changed: Chain) -> Array:
-        table = weights_of(changed, fit.slopes, fit.beside, np.zeros_like(fit.noise), fit.samples)
+        table = weights_of(changed, fit.slopes, fit.angles, fit.beside, np.zeros_like(fit.noise), fit.samples)
         noise = np.maximum(fit.noise, least_noise(table.within))
         weight = replace(table, within=table.within + np.diag(np.square(noise)))
         root = solve(rows, np.zeros_like(fit.residuals), weight).root

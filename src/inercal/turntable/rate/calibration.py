@@ -17,7 +17,9 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
 from inercal.turntable.limits import LIMITS
+from inercal.turntable.rate.ends import settled
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
+from inercal.turntable.rate.linearity import SEED
 from inercal.turntable.rate.outcome import assemble, unobservable
 from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwells, turning_axis
 from inercal.turntable.settings import TurntableSettings
@@ -66,7 +68,8 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             "the same kind of unit",
         )
     findings = [*record.findings]
-    along = turning_axis(chain, test.joint, readings.angles)
+    still = settled(chain, test.joint, readings.angles)
+    along = turning_axis(still, test.joint, readings.angles)
     taken = []
     for channel in readings.channels:
         if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine:
@@ -120,6 +123,7 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             test.order,
             asymmetry,
             full_scale,
+            np.random.default_rng(SEED),
         )
         for channel, given in zip(taken, inputs, strict=True)
     )

@@ -7,7 +7,7 @@ Of a gyro whose input is the rate x::
 so that its slopes on either side of zero are S (1 ± S_asym/2): their difference over their mean is S_asym, as the
 gyro standards (IEEE 952-style) define the asymmetry. Non-linearity and hysteresis are what a best straight line
 leaves, over the full scale: the largest residual, and the largest difference between readings at one rate that
-was reached from below and from above.
+was reached from below and from above (`inercal.turntable.rate.linearity`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
 from inercal.turntable.limits import LIMITS
-from inercal.turntable.noise import scatter
+from inercal.turntable.noise import ReadingNoise, scatter
+from inercal.turntable.rate.linearity import Deviations, Largest, drawn_errors, largest
 from inercal.turntable.rate.stays import Effect, Input
 from inercal.turntable.regression import FLOOR, Solution, solve
 from inercal.turntable.weights import Weights
@@ -41,6 +42,8 @@ class RateFit:
     names : tuple of str
         Terms, those of the fit first, then what the straight line leaves.
     values : (p,)
+    left_over : tuple of Largest
+        What the straight line leaves, with its bounds.
     gain : (p, n) change of each with each reading
     scale : float
         S as fitted [output per rad/s].
@@ -54,6 +57,7 @@ class RateFit:
     axis: str
     names: tuple[str, ...]
     values: Array
+    left_over: tuple[Largest, ...]
     gain: Array
     scale: float
     residuals: Array
@@ -124,6 +128,7 @@ def fit_rates(
     order: int,
     asymmetry: bool,
     full_scale: float,
+    rng: np.random.Generator,
 ) -> RateFit:
     """Fit one gyro.
 
@@ -140,6 +145,8 @@ def fit_rates(
         Terms; the rates must let them be separated (`separable`).
     full_scale : float
         rad/s
+    rng : Generator
+        Of the draws behind the bounds of what the straight line leaves.
     """
     terms = columns(given.x, order, asymmetry)
     n, p = terms.shape
@@ -159,12 +166,15 @@ def fit_rates(
     residuals = y - terms[:, :2] @ line.c
     values, gain = _relative(c[:p], solution.gain[:p, :, 0])
     span = abs(float(c[1])) * full_scale
-    names, extra, extra_gain = _left_over(axis, rate, residuals, remainder)
+    own = _noise_beside_a_curve(rate, given.x, y, weight, noise, order, asymmetry, floor) or noise_fit
+    errors = drawn_errors(given.effects, float(c[1]), float(own.std[0]), float(own.dof[0]), n, rng)
+    left_over = tuple(largest(each, errors, span) for each in _left_over(axis, rate, residuals, remainder))
     return RateFit(
         axis,
-        (*symbols(axis, order, asymmetry), *names),
-        np.concatenate([values, np.array(extra) / span]),
-        np.vstack([gain, *(row[None] / span for row in extra_gain)]),
+        (*symbols(axis, order, asymmetry), *(each.name for each in left_over)),
+        np.concatenate([values, [each.value for each in left_over]]),
+        left_over,
+        np.vstack([gain, *(each.gain[None] for each in left_over)]),
         float(c[1]),
         residuals,
         remainder,
@@ -193,17 +203,40 @@ def _relative(c: Array, gain: Array) -> tuple[Array, Array]:
     return values, made
 
 
-def _left_over(
-    axis: str, rate: Array, residuals: Array, remainder: Array
-) -> tuple[list[str], list[float], list[Array]]:
-    """Non-linearity and hysteresis [output] where the test shows them: names, values, and rows of gain (n,)."""
-    names, values, rows = [], [], []
+def _noise_beside_a_curve(
+    rate: Array,
+    x: Array,
+    y: Array,
+    weight: Weights,
+    noise: float | None,
+    order: int,
+    asymmetry: bool,
+    floor: float,
+) -> ReadingNoise | None:
+    """Noise of a reading about a cubic, so that a curve that was not asked for does not count as noise.
+
+    None where the noise is stated, the curve was asked for, or the rates leave too little to judge by.
+    """
+    if noise is not None or order == 3 or not _full_rank(rate, asymmetry):
+        return None
+    rows = _with_hysteresis(columns(x, 3, asymmetry), rate)
+    if len(rows) < rows.shape[1] + LIMITS.scatter_dof:
+        return None
+    return scatter(rows[:, None, :], y[:, None], weight, [None], np.array([floor]))
+
+
+def _full_rank(rate: Array, asymmetry: bool) -> bool:
+    """True if the rates separate all terms of a cubic."""
+    identified = separable(rate, "x", 3, asymmetry)
+    return identified.rank == len(identified.names)
+
+
+def _left_over(axis: str, rate: Array, residuals: Array, remainder: Array) -> list[Deviations]:
+    """Non-linearity and hysteresis where the test shows them."""
+    shown = []
     groups, way = levels(rate), approaches(rate)
     if len(groups) > 2:
-        k = int(np.argmax(np.abs(residuals)))
-        names.append(f"S_nl_{axis}")
-        values.append(abs(float(residuals[k])))
-        rows.append(np.sign(residuals[k]) * remainder[k])
+        shown.append(Deviations(f"S_nl_{axis}", residuals, remainder))
     contrasts = []
     for same in groups:
         up, down = same[way[same] > 0], same[way[same] < 0]
@@ -212,12 +245,9 @@ def _left_over(
             contrast[up], contrast[down] = 1.0 / len(up), -1.0 / len(down)
             contrasts.append(contrast)
     if contrasts:
-        largest = max(contrasts, key=lambda contrast: abs(float(contrast @ residuals)))
-        difference = float(largest @ residuals)
-        names.append(f"S_hyst_{axis}")
-        values.append(abs(difference))
-        rows.append(np.sign(difference) * (largest @ remainder))
-    return names, values, rows
+        by_rate = np.array(contrasts)
+        shown.append(Deviations(f"S_hyst_{axis}", by_rate @ residuals, by_rate @ remainder))
+    return shown
 
 
 def _weights(effects: Sequence[Effect], scale: float, n: int) -> Weights:

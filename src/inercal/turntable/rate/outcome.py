@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from inercal.estimate.basis import Basis, conditions_of, studied
-from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.budget import TypeA, TypeB, Uncertainty, combine
 from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import Estimate, coverage_factor
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record
@@ -50,7 +50,7 @@ def assemble(
     names = tuple(name for fit in fits for name in fit.names)
     found_sources = sources(dwells, inputs, fits, unit)
     # stated noise is of type B, but not the same in repeat runs
-    uncertainty = combine(names, found_sources)._replace(common=None)
+    uncertainty = _bounded(names, combine(names, found_sources)._replace(common=None), fits)
     values = np.concatenate([fit.values for fit in fits])
     u = uncertainty.u
     status = Status.OK
@@ -87,6 +87,12 @@ def assemble(
             "plan": _plan(dwells, test, full_scale),
             "tolerance_shares": _shares(settings, names, found_sources),
             "instrument": settings.instrument.kind,
+            "unit": {"gyro": unit},
+            "linearity": [
+                {"name": each.name, "observed": each.observed, "low": each.low, "high": each.high}
+                for fit in fits
+                for each in fit.left_over
+            ],
             "rates": [
                 row
                 for given, fit in zip(inputs, fits, strict=True)
@@ -120,6 +126,7 @@ def unobservable(
             "plan": _plan(dwells, test, test.full_scale or float(np.abs(dwells.rate).max(initial=0.0))),
             "tolerance_shares": {},
             "instrument": settings.instrument.kind,
+            "linearity": [],
             "rates": [],
         },
     )
@@ -159,6 +166,17 @@ def sources(
         if np.any(sensitivity):
             made.append(TypeB(source, effect.u, effect.unit, sensitivity))
     return made
+
+
+def _bounded(names: Sequence[str], linear: Uncertainty, fits: Sequence[RateFit]) -> Uncertainty:
+    """The uncertainty with U of each largest deviation as wide as its bounds; shares and correlations stay."""
+    wider = np.ones(len(names))
+    for each in (each for fit in fits for each in fit.left_over):
+        k = names.index(each.name)
+        expanded = coverage_factor(float(linear.dof[k])) * float(linear.u[k])
+        if expanded > 0.0:
+            wider[k] = each.half / expanded
+    return linear._replace(covariance=linear.covariance * np.outer(wider, wider))
 
 
 def _rows(dwells: RateDwells, given: Input, fit: RateFit, full_scale: float) -> list[dict[str, Any]]:
@@ -203,10 +221,11 @@ def _shares(
     settings: TurntableSettings, names: Sequence[str], components: Sequence[TypeA | TypeB]
 ) -> dict[str, dict[str, float]]:
     """Share of each error of the table, by itself, in the table's part of each term's variance."""
+    of_table = {error.source for error in settings.chain.errors}
     own = [
         each
         for each in components
-        if each.source in settings.chain.factors or each.source.startswith("cosine")
+        if each.source.removesuffix(", at the ends") in of_table or each.source.startswith("cosine")
     ]
     parts = {each.source: np.diag(each.covariance) for each in own}
     whole = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(names))
@@ -220,6 +239,9 @@ def _shares(
 def _basis(record: Record, dwells: RateDwells, settings: TurntableSettings) -> Basis:
     """The basis of every estimate of a rate test."""
     ranges = {"rate_rad_s": [float(dwells.rate.min()), float(dwells.rate.max())]}
-    unit = dwells.unit.symbol
-    conditions = conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=unit)
-    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
+    conditions = conditions_of(
+        settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=dwells.unit.symbol
+    )
+    return studied(
+        COMMAND, settings, (*record.sources, *settings.chain.sources), MODEL, REFERENCES, conditions
+    )

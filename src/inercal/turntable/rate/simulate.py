@@ -9,9 +9,12 @@ from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
 from inercal.records.made import record_of
 from inercal.records.record import Record
+from inercal.rigs.chain import Chain, follows_angle
 from inercal.rigs.outputs import gravity_reference, rate_reference
+from inercal.turntable.disturbances import displaced, disturbed
 from inercal.turntable.model import channels_of, stated_values
 from inercal.turntable.rate.calibration import check_rate_test
+from inercal.turntable.rate.ends import ends, known_change, settled
 from inercal.turntable.rate.fit import approaches
 from inercal.turntable.rate.stays import arc, over_turn, sensed
 from inercal.turntable.settings import TurntableSettings
@@ -47,14 +50,33 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
         raise StudyError("rate_test.rates", 'missing, expected rates such as ["-10 deg/s", "10 deg/s"]')
     if any(symbol.startswith("S_nl") for symbol in instrument.coefficients):
         raise StudyError("instrument.coefficients", "S_nl is not stated but follows, expected S2 or S3")
+    other = settings.disturbances
+    alien = [
+        key for key in ("angle", "harmonics", "magnetic", "dead_zone", "hysteresis") if getattr(other, key)
+    ]
+    if alien:
+        raise StudyError(
+            f"disturbances.{alien[0]}", "found in a study of a rate test, expected one of positions"
+        )
+    chain = displaced(chain, other)
     rate = np.array(test.rates)
     n = len(rate)
+    t = np.asarray(instrument.dwell * (np.arange(n) + 0.5))
     angles = np.tile([test.at.get(joint, 0.0) for joint in chain.joints], (n, 1))
     turning = chain.joints.index(test.joint)
-    errors = chain.draw(rng, n)
+    ended = angles.copy()
+    ended[:, turning] += rate * instrument.dwell
+    both = (
+        chain.draw(rng, np.concatenate([angles, ended])) if any(map(follows_angle, chain.elements)) else None
+    )
+    errors = chain.draw(rng, n) if both is None else both[:n]
     true_rate = rate * (1.0 + test.rate_u * rng.standard_normal())
+    at_ends = None if both is None else _at_ends(chain, test.joint, angles, true_rate, instrument.dwell, both)
+    chain = settled(chain, test.joint, angles)
+    errors = np.where(chain.std > 0.0, errors, 0.0)
     turn = arc(angles[:, turning], true_rate * instrument.dwell)
     w = sensed(chain, test.joint, rate_reference(settings.site.latitude), true_rate, angles, turn, errors)
+    w = w if at_ends is None else w + at_ends
     f_n = -gravity_reference(settings.site.gravity)
     f = over_turn(lambda at: f_n @ chain.attitude(at, errors), angles, turning, turn)
     full_scale = test.full_scale or float(np.abs(rate).max())
@@ -73,6 +95,8 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
         linear = model.linear(values)
         y.append(model.regressors(f, w) @ linear + linear[model.symbols.index(f"S_{axis}")] * bent)
     outputs: Array = np.stack(y, axis=-1)
+    bias = np.array([instrument.coefficients.get(f"D_F_{channel[-1]}", 0.0) for channel in channels])
+    outputs = disturbed(outputs, bias, t, other, rng)
     if instrument.noise is not None:
         outputs = outputs + rng.normal(0.0, instrument.noise, outputs.shape)
     degrees = parse_unit("deg")
@@ -86,5 +110,19 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
                 for k, channel in enumerate(channels)
             ),
         ],
-        np.asarray(instrument.dwell * (np.arange(n) + 0.5)),
+        t,
     )
+
+
+def _at_ends(chain: Chain, joint: str, angles: Array, rate: Array, duration: float, both: Array) -> Array:
+    """Change (n, 3) of the mean rates by what follows the turning joint; ``both`` (2 n, k) errors at start and end."""
+    n, made = len(angles), np.zeros((len(angles), 3))
+    for i, axis in enumerate(np.eye(3)):
+        arcs = (joint, angles, rate * duration, duration, axis)
+        made[:, i] = known_change(chain, *arcs)
+        for each in ends(chain, *arcs):
+            drawn = both[:, chain.factors.index(each.error.name)].reshape(2, n)
+            values = np.zeros(each.change.shape[1])
+            values[each.numbers.ravel()] = drawn.ravel()
+            made[:, i] += each.change @ values
+    return made

@@ -10,7 +10,7 @@ sees the part across.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from inercal.records.record import Record
 from inercal.rigs.chain import Chain, Joint
 from inercal.rigs.outputs import rate_reference
 from inercal.turntable.limits import LIMITS
+from inercal.turntable.rate.ends import ends, known_change, settled
 from inercal.turntable.settings import TurntableSettings
 from inercal.units import Unit
 
@@ -237,11 +238,12 @@ def gyro_input(stays: RateDwells, settings: TurntableSettings, axis: int) -> Inp
     order, whose mean is not zero. It is corrected, and its spread is an effect of its own (GUM F.2.4.4). Errors of
     the table before the turning joint move the axis against the Earth only.
     """
-    test, chain = settings.rate_test, settings.chain
+    test, whole = settings.rate_test, settings.chain
     latitude, latitude_u = settings.site.latitude, settings.site.latitude_u
     assert test is not None
     assert latitude is not None
     w_n, v = rate_reference(latitude), np.eye(3)[axis]
+    chain = settled(whole, test.joint, stays.angles)
     turning = chain.joints.index(test.joint)
 
     def mean(of_angles: Callable[[Array], Array]) -> Array:
@@ -253,14 +255,20 @@ def gyro_input(stays: RateDwells, settings: TurntableSettings, axis: int) -> Inp
     slopes[:, len(chain.errors) - len(after.errors) :] += stays.rate[:, None] * first
     effects = [
         Effect(
-            error.name,
+            error.source,
             error.distribution.std,
             "m" if error.is_offset else "rad",
             slopes[:, [k]] * error.distribution.std,
             not error.scope.constant,
         )
         for k, error in enumerate(chain.errors)
+        if error.distribution.std > 0.0
     ]
+    arcs = (test.joint, stays.angles, stays.rate * settings.instrument.dwell, settings.instrument.dwell, v)
+    change = np.zeros(len(stays.rate)) if stays.assumed else known_change(whole, *arcs)
+    for each in () if stays.assumed else ends(whole, *arcs):
+        std = each.error.distribution.std
+        effects.append(Effect(f"{each.error.source}, at the ends", std, "rad", each.change * std))
     loss = -0.5 * np.einsum("njj,j->n", second, np.square(after.std))
     effects += _cosines(after, second, stays.rate)
     if test.rate_u > 0.0:
@@ -272,7 +280,7 @@ def gyro_input(stays: RateDwells, settings: TurntableSettings, axis: int) -> Inp
         moved = mean(lambda at: by_latitude @ chain.attitude(at) @ v)
         effects.append(Effect("latitude", latitude_u, "rad", (moved * latitude_u)[:, None]))
     ideal = sensed(chain, test.joint, w_n, stays.rate, stays.angles, stays.turn) @ v
-    return Input(ideal - stays.rate * loss, gain, tuple(effects))
+    return Input(ideal + change - stays.rate * loss, gain, tuple(effects))
 
 
 def _gain(after: Chain, angles: Array, e: Array, v: Array) -> tuple[Array, Array, Array]:
@@ -280,7 +288,8 @@ def _gain(after: Chain, angles: Array, e: Array, v: Array) -> tuple[Array, Array
 
     It is linear in cosine and sine of each error, so that differences over ±90 deg are exact.
     """
-    m, right = len(after.errors), 0.5 * np.pi
+    m, right, sizes = len(after.errors), 0.5 * np.pi, after.sizes(angles)
+    after = after.with_errors(*(replace(error, pattern=None) for error in after.errors))
 
     def value(*turned: tuple[int, float]) -> Array:
         errors = np.zeros(m)
@@ -296,7 +305,7 @@ def _gain(after: Chain, angles: Array, e: Array, v: Array) -> tuple[Array, Array
         for k in range(j):
             corners = [a * b * value((j, a * right), (k, b * right)) for a in (1, -1) for b in (1, -1)]
             second[:, j, k] = second[:, k, j] = 0.25 * np.sum(corners, axis=0)
-    return still, first, second
+    return still, first * sizes, second * sizes[:, :, None] * sizes[:, None, :]
 
 
 def _cosines(after: Chain, second: Array, rate: Array) -> list[Effect]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,11 +12,14 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
+from inercal.estimate.rounding import concise
 from inercal.records.places import counted
 from inercal.rigs.outputs import table_outputs
 from inercal.sensitivities import averages
 from inercal.sensitivities.averages import Averages, Flag
-from inercal.sensitivities.indices import Indices
+from inercal.sensitivities.indices import Indices, joined
+from inercal.turntable.sensitivity import drift
+from inercal.turntable.sensitivity.drift import drift_output
 from inercal.turntable.settings import TurntableSettings
 
 _INDICES = (
@@ -126,22 +129,29 @@ def analyse(
             "rig.errors",
             'found no errors of the table, expected some such as default = { uniform = "2 arcmin" }',
         )
-    outputs = table_outputs(how.outputs, settings.site.gravity, settings.site.latitude)
+    of_rig = [name for name in how.outputs if not name.startswith("y_")]
+    drifts = [drift_output(settings, name) for name in how.outputs if name.startswith("y_")]
+    outputs = table_outputs(of_rig, settings.site.gravity, settings.site.latitude)
     angles, note = settings.plan.angles, ""
     if how.method == "exact":
         from inercal._jit import compiling
         from inercal.sensitivities import exact
 
-        with compiling("sensitivity", say):
-            exact.analyse(chain, outputs[:1], angles[:1], second=maps)
+        if outputs:
+            with compiling("sensitivity", say):
+                exact.analyse(chain, outputs[:1], angles[:1], second=maps)
         clock = time.perf_counter()
-        indices = exact.analyse(chain, outputs, angles, shapley=maps, second=maps)
+        parts = [exact.analyse(chain, outputs, angles, shapley=maps, second=maps)] if outputs else []
+        parts += [drift.exact(settings, drifts, angles, maps, maps)] if drifts else []
+        indices = _together(parts)
     elif how.method == "sampled":
         from inercal.sensitivities import sampled
 
         clock = time.perf_counter()
         rng = np.random.default_rng(how.seed)
-        indices = sampled.analyse(chain, outputs, angles, how.samples, rng, how.sampling, progress)
+        indices = sampled.analyse(
+            chain, [*outputs, *drifts], angles, how.samples, rng, how.sampling, progress
+        )
         indices = replace(indices, method={**indices.method, "seed": how.seed})
         taken = indices.method["samples"]
         if taken != how.samples:
@@ -150,27 +160,38 @@ def analyse(
         from inercal.sensitivities import local
 
         clock = time.perf_counter()
-        indices = local.analyse(chain, outputs, angles)
+        indices = local.analyse(chain, [*outputs, *drifts], angles)
     solve = time.perf_counter() - clock
     return Analysed(indices, chain.joints, tuple(error.what for error in chain.errors), note, solve)
+
+
+def _together(parts: Sequence[Indices]) -> Indices:
+    """Indices of several groups of outputs as one."""
+    return joined(
+        parts,
+        axis=0,
+        outputs=tuple(name for part in parts for name in part.outputs),
+        units=tuple(unit for part in parts for unit in part.units),
+        scales=np.concatenate([part.scales for part in parts]),
+    )
 
 
 def result(analysed: Analysed) -> dict[str, Any]:
     """The command's own part of the JSON result: the contract's keys, arrays as arrays."""
     indices = analysed.indices
-    part = analysed.aggregate
     return {
         "factors": indices.factors,
         "outputs": indices.outputs,
         "positions": {joint: analysed.indices.angles[:, k] for k, joint in enumerate(analysed.joints)},
         "mean": {**_plain(analysed.mean), **_shapley(indices, averages.mean)},
         "weighted": {**_plain(analysed.weighted), **_shapley(indices, averages.weighted)},
-        "aggregate": {"outputs": indices.outputs, "first": part.first, "total": part.total},
+        "aggregate": {"outputs": indices.outputs, **_plain(analysed.aggregate)},
         "flagged": [
             {
                 "output": flag.output,
                 **dict(zip(analysed.joints, flag.angles, strict=True)),
                 "sum_first": flag.sum_first,
+                **({} if indices.resampled is None else {"u_sum_first": flag.u}),
             }
             for flag in analysed.flagged
         ],
@@ -181,11 +202,14 @@ def result(analysed: Analysed) -> dict[str, Any]:
 def table(analysed: Analysed) -> str:
     """The errors as aligned text, those with the largest shares first."""
     indices, share, mean = analysed.indices, analysed.aggregate, analysed.mean
+    u_mean = [None] * len(mean.first) if mean.u_first is None else mean.u_first
     head = ("", "S", "ST", *(f"S {output}" for output in indices.outputs), "")
     rows = [
         (
             indices.factors[k],
-            *(_number(x) for x in (share.first[k], share.total[k], *mean.first[:, k])),
+            _number(share.first, share.u_first, k),
+            _number(share.total, share.u_total, k),
+            *(_number(*of_output, k) for of_output in zip(mean.first, u_mean, strict=True)),
             analysed.what[k],
         )
         for k in np.argsort(-share.total, kind="stable")
@@ -205,13 +229,18 @@ def table(analysed: Analysed) -> str:
             f"S, ST: first and total order over {', '.join(indices.outputs)} and all positions, each output in "
             "units of its reference",
             "S of an output: mean of its first-order indices over the positions",
+            *(
+                []
+                if share.u_first is None
+                else ["in brackets the standard uncertainty by sampling, of the last digits"]
+            ),
         ]
     )
 
 
 def _plain(means: Averages) -> Mapping[str, Array]:
-    """Averages by name."""
-    return {"first": means.first, "total": means.total, "total_minus_first": means.total_minus_first}
+    """Averages by name, those there are."""
+    return {name: values for name, values in vars(means).items() if values is not None}
 
 
 def _shapley(indices: Indices, average: Callable[[Indices], Averages]) -> Mapping[str, Array]:
@@ -222,8 +251,11 @@ def _shapley(indices: Indices, average: Callable[[Indices], Averages]) -> Mappin
     return {"shapley": average(replace(indices, first_variance=parts)).first}
 
 
-def _number(share: float) -> str:
-    """An index in a column: three digits, or its size."""
+def _number(shares: Array, u: Array | None, k: int) -> str:
+    """Index k in a column: to its uncertainty where it is sampled, else three digits, or its size."""
+    share = float(shares[k])
     if np.isnan(share):
         return "-"
+    if u is not None and u[k] > 0.0:
+        return concise(share, float(u[k]))
     return f"{share:.4f}" if share >= 5e-5 or share == 0.0 else f"{share:.0e}"

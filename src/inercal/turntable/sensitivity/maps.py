@@ -23,6 +23,7 @@ _MAPS: dict[str, tuple[tuple[str, ...], str]] = {
     "second": (("output", "position", "factor", "other_factor"), "second-order Sobol index"),
     "u_first": (("output", "position", "factor"), "standard uncertainty of first"),
     "u_total": (("output", "position", "factor"), "standard uncertainty of total"),
+    "u_total_minus_first": (("output", "position", "factor"), "standard uncertainty of total_minus_first"),
     "variance": (("output", "position"), "variance of the error of the output, in the square of its unit"),
     "bias": (("output", "position"), "expectation of the error of the output, in its unit"),
 }

@@ -103,12 +103,18 @@ def _of_angles(fit: Fit, motion: Motion, gravity: float, outputs: dict[str, Arra
     for k, joint in enumerate(motion.chain.joints):
         angle = motion.angles[:, k]
         patterns = []
-        for wrong in (np.ones_like(angle), angle, np.sin(angle), np.cos(angle)):
+        turns = [wave(order * angle) for order in (1, 2) for wave in (np.sin, np.cos)]
+        for wrong in (np.ones_like(angle), angle, *turns):
             angles = motion.angles.copy()
             angles[:, k] += STEP * wrong
             moved = replace(motion, angles=angles)
             patterns.append({triad: (_at_fit(fit, moved, triad) - x) / STEP for triad, x in outputs.items()})
-        for name, kind, words in ("zero", (0,), _zero), ("scale", (0, 1), _scale), ("round", (2, 3), _round):
+        for name, kind, words in (
+            ("zero", (0,), _zero),
+            ("scale", (0, 1), _scale),
+            ("round", (2, 3), partial(_round, 1)),
+            ("twice round", (4, 5), partial(_round, 2)),
+        ):
             changes = {
                 triad: np.stack([patterns[each][triad] for each in kind], axis=-1) for triad in outputs
             }
@@ -154,10 +160,13 @@ def _scale(joint: str, a: Array) -> str:
     )
 
 
-def _round(joint: str, a: Array) -> str:
+def _round(order: int, joint: str, a: Array) -> str:
+    times, cause = (
+        ("once", "the levelling, or an encoder off its centre") if order == 1 else ("twice", "the encoder")
+    )
     return (
         f"the angles {joint} are wrong by up to {np.degrees(np.hypot(*a)):.2g} deg, in a way that "
-        "goes with the angle: check the levelling, or an encoder off its centre"
+        f"goes with the angle and comes back {times} in a turn: check {cause}"
     )
 
 
@@ -256,6 +265,8 @@ def _curved(patterns: Patterns, sensor: Sensor, name: str, size: float, power: i
             )
         order = "square" if power == 2 else "cube"
         term = f"{float(a[0]):.2g} {unit} at {size:.3g} {unit}"
-        return f"{name} is not linear: a term with the {order} of the input, of {term}"
+        cure = "; set imu.k2 = true to estimate it" if code == "unmodelled_k2" else ""
+        return f"{name} is not linear: a term with the {order} of the input, of {term}{cure}"
 
-    return f"power {power} of {name}", "saturation" if power == 3 else "contradiction", patterns, words
+    code = "unmodelled_k2" if name.startswith("acc") else "contradiction"
+    return f"power {power} of {name}", "saturation" if power == 3 else code, patterns, words

@@ -1,0 +1,222 @@
+"""A calibration applied to a recording: outputs to truth, and back, with what the results are uncertain by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate
+from inercal.findings import Finding
+from inercal.records.column import Column
+from inercal.records.record import Record
+from inercal.units import Unit, parse_unit
+
+Samples = Mapping[str, Array]
+"""Samples (*batch,) by column."""
+
+BLOCK = 1 << 16
+"""Rows that are corrected at a time, so that long records need no more memory than they take."""
+
+TEMPERATURE_MARGIN = 5.0
+"""Kelvin beyond 3 u of the temperature of a calibration at which a recording is said to be at another one."""
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Correction of columns of a record, or its inverse, sample by sample.
+
+    Attributes
+    ----------
+    work : callable
+        Takes samples (*batch,) of the columns in ``reads``, gives those of all that is written; the digits of a sample
+        do not depend on those beside it.
+    reads : mapping
+        Column -> factor and zero: ``work`` takes ``factor * value + zero``.
+    writes : mapping
+        Column -> name and unit of the one that takes its place.
+    appends : mapping
+        Name -> unit of columns that come behind the others.
+    settings : mapping
+        All that decides the results.
+    findings : tuple of Finding
+        What the record does not hold, so that it is not corrected for.
+    ranges : mapping
+        Column read or written -> lowest and highest value (as ``work`` has it) of the calibration, and their unit.
+    """
+
+    work: Callable[[Samples], Samples]
+    reads: Mapping[str, tuple[float, float]]
+    writes: Mapping[str, tuple[str, Unit]]
+    settings: Mapping[str, object]
+    appends: Mapping[str, Unit] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    ranges: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+
+    def __call__(self, samples: Samples) -> Samples:
+        """All columns written, and those read as ``work`` has them, for samples in the units of the record."""
+        taken = {}
+        for name, (factor, zero) in self.reads.items():
+            taken[name] = samples[name] * factor
+            if zero:
+                taken[name] = taken[name] + zero
+        return {**taken, **self.work(taken)}
+
+    def outside(self, results: Samples) -> tuple[Finding, ...]:
+        """``outside_range``: results of a call that lie beyond what the calibration was made over."""
+        findings = []
+        for name, (low, high, unit) in self.ranges.items():
+            values = np.asarray(results[name])
+            beyond = int(np.sum((values < low) | (values > high)))
+            if beyond:
+                text = (
+                    f"{name} goes from {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit}, and the calibration "
+                    f"holds from {low:.4g} to {high:.4g}: there the corrected values are extrapolated"
+                )
+                findings.append(Finding("outside_range", text))
+        return tuple(findings)
+
+
+class Model(Protocol):
+    """An instrument that a calibration describes."""
+
+    def correction(self, record: Record, invert: bool = False) -> Correction:
+        """The correction of a record, whose columns may be without samples yet; raises `InputError`."""
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """A ``model``, and the same with its coefficients moved up and down along each axis of their covariance.
+
+    The standard uncertainty of a corrected value is the root of the sum of its squared changes: the covariance of the
+    coefficients propagated to first order (GUM 5.2), whatever the model. Noise of the sample itself is not in it.
+    """
+
+    model: Model
+    moved: tuple[tuple[Model, Model], ...]
+
+    def correction(self, record: Record, invert: bool = False) -> Correction:
+        """The correction of the model, with a column ``u_`` for each that it writes."""
+        central = self.model.correction(record, invert)
+        pairs = [(up.correction(record, invert), down.correction(record, invert)) for up, down in self.moved]
+        units = {f"u_{name}": unit for name, unit in central.writes.values()}
+
+        def work(samples: Samples) -> Samples:
+            results = dict(central.work(samples))
+            squares = {name: np.zeros(np.shape(results[name])) for name, _ in central.writes.values()}
+            for up, down in pairs:
+                high, low = up.work(samples), down.work(samples)
+                for name, square in squares.items():
+                    squares[name] = square + np.square(0.5 * (high[name] - low[name]))
+            for name, square in squares.items():
+                u = np.sqrt(square)
+                results[f"u_{name}"] = np.where(np.isfinite(results[name]), u, np.nan)
+            return results
+
+        return replace(
+            central, work=work, appends=units, settings={**central.settings, "uncertainty": len(pairs)}
+        )
+
+
+def uncertain(
+    make: Callable[[Estimate], Model], estimate: Estimate, where: object = "calibration"
+) -> Uncertain:
+    """The model that ``make`` makes of an estimate, with its uncertainty.
+
+    Raises
+    ------
+    InputError
+        The estimate has no covariance, as one that another tool wrote.
+    """
+    u = estimate.u
+    if not np.isfinite(estimate.covariance).all() or not u.any():
+        raise InputError(where, "states no uncertainty of its coefficients, expected one for that of values")
+    scale = np.where(u > 0.0, u, 1.0)
+    lengths, axes = np.linalg.eigh(estimate.covariance / np.outer(scale, scale))
+    steps = scale[:, None] * axes * np.sqrt(np.maximum(lengths, 0.0))
+    taken = steps[:, lengths > 1e-12 * lengths[-1]].T
+    moved = tuple(
+        (make(replace(estimate, values=estimate.values + step)), make(replace(estimate, values=estimate.values - step)))
+        for step in taken
+    )  # fmt: skip
+    return Uncertain(make(estimate), moved)
+
+
+def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
+    """Correct the columns of a record that a model covers, all others unchanged; raises as `Model.correction` does.
+
+    With ``invert`` the record holds true values and the outputs of the instrument are made of them. What of it is not
+    corrected, or lies outside the range of the calibration, is among the findings.
+    """
+    correct = model.correction(record, invert)
+    some = record[next(iter(correct.writes))]
+    rows = len(some.values)
+    blocks = [
+        correct({name: record[name].values[begin : begin + BLOCK] for name in correct.reads})
+        for begin in range(0, max(rows, 1), BLOCK)
+    ]
+    results = {name: np.concatenate([np.atleast_1d(block[name]) for block in blocks]) for name in blocks[0]}
+    columns = {}
+    for name, column in record.columns.items():
+        new, unit = correct.writes.get(name, (name, column.unit))
+        if name in correct.writes:
+            column = Column(new, unit, results[new], column.t, column.source)
+        columns[new] = column
+    for name, unit in correct.appends.items():
+        columns[name] = Column(name, unit, results[name], some.t, some.source)
+    findings = (*record.findings, *correct.findings, *correct.outside(results))
+    return Record(columns, findings, record.sources, record.labels)
+
+
+def one_clock(record: Record, names: Sequence[str]) -> None:
+    """Refuse columns that do not go together row by row; raises `InputError`."""
+    first = record[names[0]]
+    for name in names[1:]:
+        column = record[name]
+        if column.t is not first.t and not np.array_equal(column.t, first.t):
+            raise InputError(
+                column.source.path, f"{name} and {first.name} have different clocks, expected one"
+            )
+
+
+def factor_of(column: Column, wanted: Unit, of: str) -> tuple[float, float]:
+    """Factor and zero by which a column is taken to ``wanted``; raises `InputError`, saying what it is ``of``.
+
+    The factor is exactly 1 for one and the same unit.
+    """
+    if column.unit.dimension != wanted.dimension:
+        raise InputError(
+            column.source.path,
+            f"{column.name} is in {column.unit.symbol}, expected {wanted.symbol} {of}".rstrip(),
+        )
+    return column.unit.factor / wanted.factor, (column.unit.zero - wanted.zero) / wanted.factor
+
+
+def temperature_range(estimate: Estimate) -> tuple[float, float, str] | None:
+    """Lowest and highest temperature [degC] for which a calibration was made; None where it does not say."""
+    conditions = estimate.conditions
+    ranges = conditions.get("ranges") or {}
+    if "temperature_degC" in ranges:
+        low, high = ranges["temperature_degC"]
+        return float(low), float(high), "degC"
+    stated = conditions.get("temperature")
+    if not stated:
+        return None
+    half = 3.0 * float(stated.get("u") or 0.0) + TEMPERATURE_MARGIN
+    return float(stated["value"]) - half, float(stated["value"]) + half, "degC"
+
+
+def watching(correct: Correction, record: Record, span: tuple[float, float, str] | None) -> Correction:
+    """The correction, which also reads the temperature where record and calibration both have one."""
+    column = record.columns.get("temperature")
+    if span is None or column is None or column.unit.dimension != "temperature":
+        return correct
+    first = record[next(iter(correct.writes))]
+    if column.t is not first.t and not np.array_equal(column.t, first.t):
+        return correct
+    read = {"temperature": factor_of(column, parse_unit("degC"), "")}
+    return replace(correct, reads={**correct.reads, **read}, ranges={**correct.ranges, "temperature": span})

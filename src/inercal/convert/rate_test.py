@@ -1,0 +1,120 @@
+"""Gyros that were calibrated by a rate test, in use: each axis by itself, its asymmetry and polynomial undone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.convert.correction import Correction, Samples, factor_of, one_clock
+from inercal.errors import InputError
+from inercal.estimate.result import Estimate
+from inercal.findings import Finding
+from inercal.records.record import Record
+from inercal.units import Unit, parse_unit
+
+_ROUNDS = 30
+
+_APPLIED = ("D_F", "S", "S_asym", "S2", "S3")
+
+
+@dataclass(frozen=True)
+class RateGyros:
+    """Gyros by axis, ``y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3)``, x the rate about each.
+
+    ``values`` (*batch,) by symbol, ``output`` the unit of y, ``rates`` (lowest, highest) of the test [rad/s].
+    """
+
+    axes: str
+    values: Mapping[str, Any]
+    output: Unit
+    rates: tuple[float, float]
+
+    def correction(self, record: Record, invert: bool = False) -> Correction:
+        """The correction of a record: ``gyro_*`` to ``rate_*`` [rad/s], or the other way round; raises `InputError`."""
+        si = parse_unit("rad/s")
+        before, after = ("rate", "gyro") if invert else ("gyro", "rate")
+        present = [axis for axis in self.axes if f"{before}_{axis}" in record]
+        if not present:
+            where = ", ".join(source.path for source in record.sources) or "record"
+            names = ", ".join(record.columns) or "no column"
+            expected = " or ".join(f"{before}_{axis}" for axis in self.axes)
+            raise InputError(where, f"found {names}, expected {expected}")
+        of = "as true values" if invert else "as the instrument was calibrated"
+        wanted, written = (si, self.output) if invert else (self.output, si)
+        reads = {f"{before}_{k}": factor_of(record[f"{before}_{k}"], wanted, of) for k in present}
+        one_clock(record, list(reads))
+        work = self._indicate if invert else self._correct
+
+        def by_axis(samples: Samples) -> Samples:
+            return {f"{after}_{axis}": work(axis, samples[f"{before}_{axis}"]) for axis in present}
+
+        low, high = self.rates
+        return Correction(
+            by_axis,
+            reads,
+            {f"{before}_{axis}": (f"{after}_{axis}", written) for axis in present},
+            {"values": str(dict(self.values)), "axes": "".join(present), "invert": invert},
+            ranges={f"rate_{axis}": (low, high, "rad/s") for axis in present},
+        )
+
+    def _of(self, axis: str) -> tuple[Any, ...]:
+        return tuple(self.values.get(f"{symbol}_{axis}", 0.0) for symbol in _APPLIED)
+
+    def _indicate(self, axis: str, x: Array) -> Array:
+        """Outputs for rates [rad/s]."""
+        bias, scale, asymmetry, second, third = self._of(axis)
+        bent = 0.5 * asymmetry * np.abs(x) + second * x * x + third * x * x * x
+        return np.asarray(bias + scale * (x + bent))
+
+    def _correct(self, axis: str, y: Array) -> Array:
+        """Rates [rad/s] for outputs, by Newton's method; a sample that does not settle is no number."""
+        bias, scale, asymmetry, second, third = self._of(axis)
+        x = (y - bias) / scale
+        moving = np.ones(np.shape(x), bool)
+        with np.errstate(all="ignore"):
+            for _ in range(_ROUNDS):
+                slope = 1.0 + 0.5 * asymmetry * np.sign(x) + 2.0 * second * x + 3.0 * third * x * x
+                step = (y - self._indicate(axis, x)) / (scale * slope)
+                moves = np.abs(step) > 1e-15 * np.abs(x)
+                x = np.where(moving, x + step, x)
+                moving = moving & moves
+                if not moving.any():
+                    break
+        return np.where(moving, np.nan, x)
+
+
+def rate_gyros(estimate: Estimate, where: object = "calibration") -> RateGyros:
+    """The gyros of an estimate of a rate test.
+
+    Raises
+    ------
+    InputError
+        The estimate has no values or no unit, or a scale factor is 0.
+    """
+    values = {name: each.value for name, each in estimate.parameters.items()}
+    axes = "".join(axis for axis in "xyz" if f"S_{axis}" in values)
+    if not axes or not np.isfinite(estimate.values).all():
+        raise InputError(where, "found no coefficients, expected those of gyros in a rate test")
+    if "unit" not in estimate.result:
+        raise InputError(where, "states no unit under result, expected a calibration by this version")
+    dead = [f"S_{axis}" for axis in axes if not values[f"S_{axis}"]]
+    if dead:
+        raise InputError(where, f"{dead[0]} is 0, expected a scale factor that can be inverted")
+    low, high = (estimate.conditions.get("ranges") or {}).get("rate_rad_s", (-np.inf, np.inf))
+    output = parse_unit(str(estimate.result["unit"]["gyro"]), where)
+    return RateGyros(axes, values, output, (float(low), float(high)))
+
+
+def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
+    """``not_held``: what a rate test says of a gyro beside its input and output."""
+    other = [name for name in estimate.names if name.rpartition("_")[0] not in _APPLIED]
+    findings = []
+    if other:
+        text = f"{', '.join(other)}: limits of the error, not applied"
+        findings.append(Finding("not_held", text, str(where)))
+    text = "D_F holds what gravity does at the attitude of the rate test: at another one the bias differs"
+    return (*findings, Finding("not_held", text, str(where)))
