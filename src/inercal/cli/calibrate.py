@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from inercal.cli.options import (
     Files,
@@ -36,7 +36,14 @@ def calibrate_imu(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
-    return _calibrated("imu", files, study, map_file, span, overrides, output, read_repeats)
+    from inercal.imu.task import in_rows
+
+    def read(
+        settings: Any, files: Sequence[Path], map_file: Path | None, output: ReportOutput, span: Span
+    ) -> list[Record]:
+        return read_repeats(files, map_file, output, span, in_rows(settings))
+
+    return _calibrated("imu", files, study, map_file, span, overrides, output, read)
 
 
 def calibrate_turntable(
@@ -51,7 +58,7 @@ def calibrate_turntable(
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
     return _calibrated(
-        "turntable", files, study, map_file, span, overrides, output, lambda *one: [read_record(*one)]
+        "turntable", files, study, map_file, span, overrides, output, lambda _, *one: [read_record(*one)]
     )
 
 
@@ -63,7 +70,7 @@ def _calibrated(
     span: Span,
     overrides: list[str] | None,
     output: ReportOutput,
-    read: Callable[[Sequence[Path], Path | None, ReportOutput, Span], list[Record]],
+    read: Callable[[Any, Sequence[Path], Path | None, ReportOutput, Span], list[Record]],
 ) -> int:
     """Read study and records, calibrate, and hand over."""
     from importlib import import_module
@@ -74,7 +81,7 @@ def _calibrated(
     the_study = read_study(kind, study, overrides or ())
     output.spare(the_study.files)
     clock = time.perf_counter()
-    records = read(files, map_file, output, span)
+    records = read(the_study.settings, files, map_file, output, span)
     read_s = time.perf_counter() - clock
     system = import_module(f"inercal.face.{kind}")
     with working(output) as progress:

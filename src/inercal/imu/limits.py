@@ -93,9 +93,6 @@ class Limits:
 
     # rows of means, known rates and turns
 
-    outlying_risk: float = 5e-3
-    """Probability, over all rows of a test, that one of a sound test is called outlying."""
-
     most_poses: int = 100
     """Rows from which most being like the one before are samples of a recording, not means of poses."""
 
@@ -114,8 +111,11 @@ class Limits:
     turn_margin: float = 0.1
     """Time [s] by which a turn is taken longer at either end than its rate shows."""
 
-    turn_onset: float = 0.02
-    """Rate, as a part of the largest of a turn, at which the turn begins and ends."""
+    turn_noise: float = 4.0
+    """Size of a gyro's smoothed output, over that at rest (rms), from which it turns."""
+
+    turn_onset: float = 1e-3
+    """Rate, as a part of the largest of a turn, from which it turns in any case."""
 
     # Ferraris: sections
 

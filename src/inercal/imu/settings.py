@@ -24,10 +24,14 @@ COMMAND = "calibrate imu"
 
 NOT_NEGATIVE = within(0.0, math.inf, "a size of 0 or more")
 
-_TURN = Bounds(
+TURN = Bounds(
     lambda angle: math.radians(10.0) <= abs(angle) <= math.radians(36000.0),
     "an angle of 10 deg to 36000 deg, negative for turns against the right-hand rule",
 )
+"""Angles of a turn."""
+
+TILT = within(0.0, math.radians(20.0), "a standard uncertainty up to 20 deg")
+"""Standard uncertainties of a direction."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,13 @@ class FerrarisSettings:
 
     turn: float = quantity(
         "angle of the turns, positive about the positive axis by the right-hand rule, perhaps with its standard "
-        "uncertainty", "angle", "360 deg", example="360(0.5) deg", bounds=_TURN, u="turn_u",
+        "uncertainty", "angle", "360 deg", example="360(0.5) deg", bounds=TURN, u="turn_u",
     )  # fmt: skip
     turn_u: float = 0.0
     alignment: float | None = quantity(
         "standard uncertainty of the direction of each position and of the axis of each turn; from the scatter of the "
         "positions if absent", "angle", example="0.5 deg",
-        bounds=within(0.0, math.radians(20.0), "a standard uncertainty up to 20 deg"),
+        bounds=TILT,
     )  # fmt: skip
     sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)
 

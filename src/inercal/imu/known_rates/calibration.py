@@ -10,27 +10,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array, short_repr
-from inercal.errors import RecordError, StudyError
+from inercal.errors import StudyError
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
-from inercal.imu.identified import few_findings, outlying, weakness
+from inercal.imu.identified import weakness
 from inercal.imu.known_rates.fit import NAMES, RateFit, contradiction, fit_rates
 from inercal.imu.known_rates.orientations import Orientations, orientations
+from inercal.imu.known_rates.outlying import outlying
+from inercal.imu.known_rates.vector_sizes import PARAMETERS, SizeFit, curing
 from inercal.imu.limits import LIMITS
 from inercal.imu.recording import unit_words
 from inercal.imu.settings import COMMAND, ImuSettings, KnownRatesSettings
-from inercal.imu.vector_sizes import PARAMETERS, SizeFit
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 
 MODEL = (
-    "y = S T omega + b, S = diag(S), T = 1 + misalignment (upper-triangular; T_ij: response of gyro i to rate about j), b "
+    "y = S T omega + b, S = diag(S), T = 1 + misalignment (upper-triangular; T_ij: response of "
+    "gyro i to rate about j), b "
     "= D_F, with |omega| the rate of the table in every orientation. Frame: z along the input axis of gyro z, y in the "
     "plane of the input axes of gyros y and z."
 )
@@ -87,7 +89,9 @@ def calibrate_known_rates(
     rates, rates_u = np.array(options.rates), np.array(options.rates_u)
     if len(records) != len(rates):
         raise StudyError(
-            "imu.rates", f"found {counted(len(rates), 'rate')} for {counted(len(records), 'file')}, expected one for each FILE, in order"
+            "imu.rates",
+            f"found {counted(len(rates), 'rate')} for {counted(len(records), 'file')}, expected "
+            "one for each FILE, in order",
         )
     if not np.any(rates):
         raise StudyError("imu.rates", "found rates of zero alone, expected one at least that turns")
@@ -101,9 +105,16 @@ def calibrate_known_rates(
     basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
     turning = int(np.count_nonzero(at > 0.0))
     if turning < LIMITS.fewest_poses:
-        text = f"found {counted(turning, 'orientation')} in which the table turned, expected at least {LIMITS.fewest_poses}: each side up and the edges between"
+        text = (
+            f"found {counted(turning, 'orientation')} in which the table turned, expected at least "
+            f"{LIMITS.fewest_poses}: each side up and the edges between"
+        )
         estimate = Estimate.without(
-            basis, Status.TOO_FEW_INTERVALS, text, findings=rows.findings, result={"method": "known_rates", "orientations": []}
+            basis,
+            Status.TOO_FEW_INTERVALS,
+            text,
+            findings=rows.findings,
+            result={"method": "known_rates", "orientations": []},
         )
         return KnownRatesCalibration(timed(estimate, clock), rows)
     progress("fitting the gyro")
@@ -111,16 +122,16 @@ def calibrate_known_rates(
     fit = rate_fit.fit
     uncertainty = combine(NAMES, _sources(rate_fit, rates, rates_u, settings.site))
     words = f"{counted(turning, 'orientation')} at {counted(int(np.count_nonzero(rates)), 'rate')}"
-    weak = weakness(fit, uncertainty.u, words)
+    geometry = rate_fit.geometry
+    cure = curing(fit, geometry.identifiability)
+    weak = weakness(geometry, uncertainty.u, rows.outputs[at > 0.0], cure, words)
     wrong = unit_words(triad, fit.model)
-    ok = f"{PARAMETERS} coefficients of the gyro from {words}; condition {fit.fit.identifiability.condition:.1f}"
+    ok = f"{PARAMETERS} coefficients of the gyro from {words}; condition {geometry.identifiability.condition:.1f}"
     verdict = weak or ((Status.INCONSISTENT, wrong) if wrong else (Status.OK, ok))
     findings = list(rows.findings)
     dof = float(np.sum(rate_fit.dof))
     if weak is None:
-        findings += few_findings(dof, words)
-        numbers = np.arange(1, len(rows.outputs) + 1)
-        findings += outlying(fit, rows.outputs, at, uncertainty.u, 1.0, dof, "outlying_pose", numbers)
+        findings += outlying(fit, rows.outputs, at, uncertainty.u, dof, rows.places)
         findings += _of_rates(rate_fit, rates, rates_u, rows)
     estimate = Estimate.of(
         basis,
@@ -132,7 +143,7 @@ def calibrate_known_rates(
         findings=findings,
         statistics={
             "dof": dof,
-            "condition": fit.fit.identifiability.condition,
+            "condition": geometry.identifiability.condition,
             "residual_rms": float(np.sqrt(np.mean(fit.residuals**2))),
             "orientations": float(len(rows.outputs)),
         },
@@ -155,18 +166,22 @@ def _sources(rate_fit: RateFit, rates: Array, rates_u: Array, site: Site) -> lis
         names = ", ".join(_rpm(rate) for rate in rates[turned]) if turned.any() else "rest"
         covariance = gain @ rate_fit.by_scatter(g) @ gain.T
         sources.append(TypeA(f"scatter at {names}", scatter, "rad/s", covariance, dof))
-    for k in np.flatnonzero(rates_u > 0.0):
-        sources.append(TypeB(f"rate {_rpm(rates[k])}", float(rates_u[k]), "rad/s", gain @ rate_fit.of_rate[:, k]))
+    sources += [
+        TypeB(f"rate {_rpm(rates[k])}", float(rates_u[k]), "rad/s", gain @ rate_fit.of_rate[:, k])
+        for k in np.flatnonzero(rates_u > 0.0)
+    ]
     # earth rate adds to the rate of a table that turns one way, and takes from the other: the way is not known
     vertical = math.hypot(site.vertical_rate, site.vertical_rate_u)
-    turned = rate_fit.of_rate.any(axis=1)
-    sources.append(TypeB("vertical earth rate", vertical, "rad/s", gain @ turned))
-    if not turned.all():
+    spinning = np.asarray(rate_fit.of_rate.any(axis=1))
+    sources.append(TypeB("vertical earth rate", vertical, "rad/s", gain @ spinning))
+    if np.any(~spinning):
         # at rest it may point the same way in all rows; each third of the residuals at rest is of one axis
-        axes = np.zeros((len(turned), 3))
-        at_rest = np.flatnonzero(~turned)
+        axes = np.zeros((len(spinning), 3))
+        at_rest = np.flatnonzero(~spinning)
         axes[at_rest, np.arange(len(at_rest)) % 3] = 1.0
-        sources.append(TypeB("earth rate at rest", EARTH_RATE / math.sqrt(3.0), "rad/s", gain @ axes, redrawn=True))
+        sources.append(
+            TypeB("earth rate at rest", EARTH_RATE / math.sqrt(3.0), "rad/s", gain @ axes, redrawn=True)
+        )
     return sources
 
 
@@ -188,7 +203,8 @@ def _of_rates(rate_fit: RateFit, rates: Array, rates_u: Array, rows: Orientation
         findings.append(
             Finding(
                 "rate_suspect",
-                f"the rates contradict each other: against {_rpm(others[0])} {words} (by chance in {probability:.1g} of "
+                f"the rates contradict each other: against {_rpm(others[0])} {words} (by chance "
+                f"in {probability:.1g} of "
                 "tests): check their order and values, the gyro's linearity, and its g-sensitivity, which on a level "
                 "table adds the same to every rate",
                 harm=EVERYTHING,
@@ -210,8 +226,10 @@ def _of_rates(rate_fit: RateFit, rates: Array, rates_u: Array, rows: Orientation
         findings.append(
             Finding(
                 "g_sensitivity",
-                f"rates of {_rpm(slowest)} and more on a level table cannot tell the gyro's g-sensitivity from its scale "
-                f"factors: {per_g:.2g} deg/s per g would shift them by their u; on a table with a level axis it averages "
+                f"rates of {_rpm(slowest)} and more on a level table cannot tell the gyro's "
+                "g-sensitivity from its scale "
+                f"factors: {per_g:.2g} deg/s per g would shift them by their u; on a table with a "
+                "level axis it averages "
                 "out",
                 harm=(),
             )

@@ -1,15 +1,19 @@
-"""The gyro triad from orientations at known rates, with the scatter of each file estimated and its rate's u allowed for."""
+"""The gyro triad from orientations at known rates, with the scatter of each file estimated and its rate's u allowed
+for."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
+from inercal.estimate.identifiability import identify
+from inercal.estimate.linear import whiten
+from inercal.estimate.nonlinear import NonlinearFit
+from inercal.imu.known_rates.vector_sizes import SizeFit, fit_sizes, residual_rows
 from inercal.imu.limits import LIMITS
-from inercal.imu.vector_sizes import SizeFit, fit_sizes, residual_rows
 
 NAMES = ("D_F_x", "D_F_y", "D_F_z", "S_x", "S_y", "S_z", "T_xy", "T_xz", "T_yz")
 """The parameters."""
@@ -22,12 +26,13 @@ _STEPS = 25
 class RateFit:
     """The ``fit`` with the scatter of its rows.
 
-    ``group`` (N,) of each residual and, for each of the g groups, the standard deviation ``scatter`` (g,) [rad/s] times
-    ``share`` (N,), and its degrees of freedom ``dof`` (g,); ``of_rate`` (N, k) shows which residuals an error of each
-    rate shifts.
+    ``geometry`` is the fit with all rows of equal weight, for the words about what they leave open; ``group`` (N,) of
+    each residual and, for each of the g groups, the standard deviation ``scatter`` (g,) [rad/s] times ``share`` (N,),
+    and its degrees of freedom ``dof`` (g,); ``of_rate`` (N, k) shows which residuals an error of each rate shifts.
     """
 
     fit: SizeFit
+    geometry: NonlinearFit
     group: NDArray[np.int64]
     share: Array
     scatter: Array
@@ -81,22 +86,23 @@ def fit_rates(outputs: Array, file: NDArray[np.int64], rates: Array, rates_u: Ar
                 variance[g] = max(variance[g] * float(weighted @ own) / max(trace, 1e-300), least)
         V = np.diag(variance[group] * share**2) + stated
         fit = fit_sizes(outputs, sizes, NAMES, V, fit.fit.x)
-    return RateFit(fit, group, share, np.sqrt(variance), dof, of_rate.astype(float))
+    geometry = replace(
+        fit.fit, identifiability=identify(fit.jacobian, NAMES, 1.0 / fit.fit.identifiability.scale)
+    )
+    return RateFit(fit, geometry, group, share, np.sqrt(variance), dof, of_rate.astype(float))
 
 
 def _reweighed(fit: SizeFit, V: Array) -> SizeFit:
     """The fit made linear at its parameters, with other weights."""
-    from dataclasses import replace
-
-    from inercal.estimate.identifiability import identify
-    from inercal.estimate.linear import whiten
-
     J, r = whiten(fit.jacobian, V), whiten(fit.residuals, V)
-    linear = replace(fit.fit, jacobian=J, residuals=r, identifiability=identify(J, NAMES))
+    identified = identify(J, NAMES, 1.0 / fit.fit.identifiability.scale)
+    linear = replace(fit.fit, jacobian=J, residuals=r, identifiability=identified)
     return replace(fit, fit=linear, covariance=V)
 
 
-def _groups(file: NDArray[np.int64], at_rest: NDArray[np.bool_], rates: Array) -> tuple[NDArray[np.int64], Array]:
+def _groups(
+    file: NDArray[np.int64], at_rest: NDArray[np.bool_], rates: Array
+) -> tuple[NDArray[np.int64], Array]:
     """Group (N,) of each residual and its share of the group's scatter.
 
     Files at rest are one group, each file in which the table turned is one of its own if all have

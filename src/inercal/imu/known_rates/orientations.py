@@ -1,4 +1,5 @@
-"""The mean outputs of a gyro in each orientation, at each known rate: rows of means, or steady stretches of a recording."""
+"""The mean outputs of a gyro in each orientation, at each known rate: rows of means, or steady stretches of a
+recording."""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ from inercal.records.record import Record
 class Orientations:
     """The orientations of all files.
 
-    ``outputs`` (n, 3) mean outputs, ``file`` (n,) the file of each from 0, ``places`` (n,) where it is: a row, or times;
-    ``left_out`` stretches at rest in files in which the table turned.
+    ``outputs`` (n, 3) mean outputs, ``file`` (n,) the file of each from 0, ``places`` (n,) where it is: a row, or
+    times; ``left_out`` stretches at rest in files in which the table turned.
     """
 
     outputs: Array
@@ -50,7 +51,8 @@ def orientations(records: Sequence[Record], rates: Array) -> Orientations:
         triad = record.triad("gyro")
         if triad.unit != first.unit:
             raise RecordError(
-                triad.source.path, f"gyro in {triad.unit.symbol}, expected {first.unit.symbol} as in {first.source.path}"
+                triad.source.path,
+                f"gyro in {triad.unit.symbol}, expected {first.unit.symbol} as in {first.source.path}",
             )
         if is_counted(record):
             means, numbers, of_rows = rows_of(record, "gyro")
@@ -93,7 +95,9 @@ def _steady(triad: Triad) -> tuple[Array, list[str]]:
     return np.array([dwell.of(triad.values).mean(axis=0) for dwell in dwells]), times
 
 
-def _turning(outputs: Array, file: NDArray[np.int64], rates: Array, counted: Sequence[bool]) -> NDArray[np.bool_]:
+def _turning(
+    outputs: Array, file: NDArray[np.int64], rates: Array, counted: Sequence[bool]
+) -> NDArray[np.bool_]:
     """Rows (n,) in which the table turned at the rate of their file; of files at rest, all."""
     turned = np.ones(len(outputs), dtype=bool)
     at_rest = rates[file] == 0.0
@@ -102,7 +106,11 @@ def _turning(outputs: Array, file: NDArray[np.int64], rates: Array, counted: Seq
         if rate == 0.0 or counted[k]:
             continue
         spread = outputs[own]
-        centre = outputs[at_rest].mean(axis=0) if np.any(at_rest) else 0.5 * (spread.min(axis=0) + spread.max(axis=0))
+        centre = (
+            outputs[at_rest].mean(axis=0)
+            if np.any(at_rest)
+            else 0.5 * (spread.min(axis=0) + spread.max(axis=0))
+        )
         size = np.linalg.norm(spread - centre, axis=1)
         turned[own] = size > 0.5 * np.max(size)
     return turned

@@ -46,6 +46,7 @@ def read(
     paths: str | Path | Sequence[str | Path],
     record_map: str | Path | RecordMap | None = None,
     progress: Callable[[int, int], None] | None = None,
+    counted: bool = False,
 ) -> Record:
     """Read one or several files into a record, and say what is suspicious about them.
 
@@ -61,6 +62,8 @@ def read(
         `sensor_msgs/Imu`.
     progress : callable, optional
         Called with bytes done and bytes in all.
+    counted : bool
+        Rows need no times and are then counted 0, 1, 2, ...: means of poses.
 
     Returns
     -------
@@ -83,13 +86,14 @@ def read(
     array([1.001, 0.999, 1.   ])
     """
     tables, record_map = _tables(paths, record_map, progress)
-    return _record(tables, record_map)
+    return _record(tables, record_map, counted)
 
 
 def read_runs(
     paths: str | Path | Sequence[str | Path],
     record_map: str | Path | RecordMap | None = None,
     progress: Callable[[int, int], None] | None = None,
+    counted: bool = False,
 ) -> list[Record]:
     """Read the records of one or several runs of a test: files with the same channels are repeat runs.
 
@@ -102,7 +106,7 @@ def read_runs(
         if Path(path).resolve() in (Path(other).resolve() for other in given[:index]):
             raise RecordError(path, "found it given twice, expected each run once")
     tables, record_map = _tables(paths, record_map, progress)
-    return [_record(run, record_map) for run in _runs(tables)]
+    return [_record(run, record_map, counted) for run in _runs(tables)]
 
 
 def _runs(tables: Sequence[FileTable]) -> list[list[FileTable]]:
@@ -153,9 +157,9 @@ def _tables(
     return tables, record_map
 
 
-def _record(tables: Sequence[FileTable], record_map: RecordMap | None) -> Record:
+def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: bool) -> Record:
     """The record of tables that belong together."""
-    columns = joined(tables, record_map)
+    columns = joined(tables, record_map, counted)
     sources = [
         *(file.source for file in tables),
         *([] if record_map is None else [source_of(record_map.path)]),

@@ -1,12 +1,13 @@
-"""A triad from vectors of known size in unknown directions: gravity in poses, the rate of a table in orientations.
+"""A triad from vectors of known size in unknown directions: the rate of a table in orientations.
 
-``y = S M x + b`` with M upper-triangular with unit diagonal and |x| known in each row: nine parameters. Rows of size zero
-count with all three axes, for they show the bias itself. Errors of rows may be correlated, as by a rate that a whole
-file has in common.
+``y = S M x + b`` with M upper-triangular with unit diagonal and |x| known in each row: nine parameters. Rows of size
+zero count with all three axes, for they show the bias itself. Errors of rows may be correlated, as by a rate that a
+whole file has in common.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
+from inercal.estimate.identifiability import Identifiability
 from inercal.estimate.linear import whiten
 from inercal.estimate.nonlinear import NonlinearFit, solve
 from inercal.instruments.triad import TriadModel
@@ -28,9 +30,9 @@ _UPPER = ((0, 1), (0, 2), (1, 2))
 class SizeFit:
     """A triad fitted to n rows of known size.
 
-    ``model``; ``x`` (n, 3) [SI] the vectors of the rows; ``row`` (N,) the row of each residual, one a row and three where
-    the size is zero; ``residuals`` (N,) and ``jacobian`` (N, 9) of |x| less its known size, or of x [SI]; ``fit`` the
-    whitened fit behind it and ``covariance`` (N, N) by which it was whitened.
+    ``model``; ``x`` (n, 3) [SI] the vectors of the rows; ``row`` (N,) the row of each residual, one a row and three
+    where the size is zero; ``residuals`` (N,) and ``jacobian`` (N, 9) of |x| less its known size, or of x [SI];
+    ``fit`` the whitened fit behind it and ``covariance`` (N, N) by which it was whitened.
     """
 
     model: TriadModel
@@ -66,7 +68,11 @@ def model_from(theta: Array) -> TriadModel:
 
 
 def fit_sizes(
-    outputs: Array, sizes: Array, names: Sequence[str], covariance: Array | None = None, start: Array | None = None
+    outputs: Array,
+    sizes: Array,
+    names: Sequence[str],
+    covariance: Array | None = None,
+    start: Array | None = None,
 ) -> SizeFit:
     """Fit the nine parameters.
 
@@ -111,7 +117,11 @@ def fit_sizes(
         return np.asarray(-np.einsum("ni,nip->np", w, _sensitivity(model, x)))
 
     fit = solve(
-        lambda theta: whiten(residuals(theta), V), lambda theta: whiten(jacobian(theta), V), start, names, typical
+        lambda theta: whiten(residuals(theta), V),
+        lambda theta: whiten(jacobian(theta), V),
+        start,
+        names,
+        typical,
     )
     model = model_from(fit.x)
     return SizeFit(model, model.correct(outputs), row, residuals(fit.x), jacobian(fit.x), fit, V)
@@ -127,35 +137,30 @@ def residual_rows(sizes: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.array(rows), np.array(axes)
 
 
-def residuals_of(model: TriadModel, x: Array) -> Array:
-    """(n, 9): derivative of |x| less its known size with respect to the parameters, at vectors ``x`` (n, 3)."""
-    along = x / np.linalg.norm(x, axis=1, keepdims=True)
-    return np.asarray(-np.einsum("ni,nip->np", along @ np.linalg.inv(model.gain), _sensitivity(model, x)))
+def without_rows(fit: SizeFit, dof: float) -> Array:
+    """Probability (N,) that each residual is so far off a fit without it by chance: externally studentised.
 
-
-def without_rows(fit: SizeFit, variance: float, dof: float) -> tuple[Array, Array]:
-    """Each residual against a fit without it.
-
-    ``variance`` is the factor of the rows' covariance, with ``dof`` degrees of freedom.
-
-    Returns
-    -------
-    deviation : (N,)
-        What the others foretell of the residual, less the residual, with its sign [SI].
-    probability : (N,)
-        Probability of one so large by chance: externally studentised, of Student's t.
+    ``dof`` are the degrees of freedom of the whole fit.
     """
     from scipy.special import stdtr
 
     P = fit.left()
     diagonal = np.maximum(np.diag(P), 1e-300)
-    deviation = (P @ fit.residuals) / diagonal
-    squared = deviation**2 * diagonal
-    rest = np.maximum(variance * dof - squared, 1e-300) / max(dof - 1.0, 1.0)
+    squared = (P @ fit.residuals) ** 2 / diagonal
+    rest = np.maximum(float(fit.residuals @ P @ fit.residuals) - squared, 1e-300) / max(dof - 1.0, 1.0)
     # a row that alone fixes some combination has no residual, and is not judged
     judged = diagonal * np.diag(fit.covariance) > 1e-6
-    probability = np.where(judged, 2.0 * stdtr(max(dof - 1.0, 1.0), -np.sqrt(squared / rest)), 1.0)
-    return deviation, probability
+    return np.where(judged, 2.0 * stdtr(max(dof - 1.0, 1.0), -np.sqrt(squared / rest)), 1.0)
+
+
+def curing(fit: SizeFit, identified: Identifiability) -> Array:
+    """The direction (3,) along axes, edges and corners of a cube that tells most of the weakest combination."""
+    weak = identified.directions[-1] / identified.scale
+    grid = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    grid /= np.linalg.norm(grid, axis=1, keepdims=True)
+    x = float(np.max(np.linalg.norm(fit.x, axis=1))) * grid
+    gain = np.einsum("ni,nip,p->n", grid @ np.linalg.inv(fit.model.gain), _sensitivity(fit.model, x), weak)
+    return np.asarray(grid[np.argmax(np.abs(gain))])
 
 
 def _start(outputs: Array, sizes: Array) -> Array:
