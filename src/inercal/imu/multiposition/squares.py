@@ -16,17 +16,23 @@ from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
 from inercal.imu.multiposition.joint import Joint, Scatter, radial
-from inercal.imu.multiposition.poses import Poses
 from inercal.instruments.terms import shown_unit
 
 
 def squares_finding(
-    joint: Joint, scatter: Scatter, poses: Poses, gravity: float, u: Array
+    joint: Joint,
+    scatter: Scatter,
+    means: Array,
+    gravity: float,
+    u: Array,
+    noise: float = 0.0,
+    noise_dof: float = 0.0,
 ) -> Iterator[Finding]:
     """A finding where K2 shows, or may shift a value by more than its ``u`` (p,); none where it is fitted.
 
     K2 of each axis is 0 with the standard deviation `LIMITS.ordinary_k2` before the data, which may tell more of it.
-    ``gravity`` [m/s^2] is that of the site.
+    ``means`` (n, 3) are the outputs, ``gravity`` [m/s^2] that of the site; ``noise`` is the variance [(m/s^2)^2] of |f| that
+    the sensors' noise explains, with ``noise_dof`` degrees of freedom, 0 where it is not known.
     """
     from scipy.special import fdtrc
 
@@ -39,13 +45,12 @@ def squares_finding(
     J = acc.fit.jacobian
     unexplained = columns - J @ (acc.fit.unit_covariance @ (J.T @ columns))
     K = unexplained.T @ unexplained
-    allowed = _allowed(acc, poses.means, gravity)
+    allowed = _allowed(acc, means, gravity)
     names, unit = joint.names, shown_unit("1/(m/s^2)")
     if allowed and acc.fit.dof > 3:
         estimate = -np.linalg.solve(K, unexplained.T @ acc.fit.residuals)
         gained = float(estimate @ K @ estimate)
         left, dof = (acc.fit.chi2 - gained) / (acc.fit.dof - 3), float(acc.fit.dof - 3)
-        noise, noise_dof = float(np.mean(poses.noise_variance)), poses.noise_dof
         if noise > 0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
             left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
         if left > 0 and fdtrc(3, dof, gained / 3.0 / left) < LIMITS.k2_probability:
