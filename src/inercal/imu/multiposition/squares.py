@@ -31,8 +31,8 @@ def squares_finding(
     """A finding where K2 shows, or may shift a value by more than its ``u`` (p,); none where it is fitted.
 
     K2 of each axis is 0 with the standard deviation `LIMITS.ordinary_k2` before the data, which may tell more of it.
-    ``means`` (n, 3) are the outputs, ``gravity`` [m/s^2] that of the site; ``noise`` is the variance [(m/s^2)^2] of |f| that
-    the sensors' noise explains, with ``noise_dof`` degrees of freedom, 0 where it is not known.
+    ``means`` (n, 3) are the outputs, ``gravity`` [m/s^2] that of the site; ``noise`` is the variance [(m/s^2)^2] of |f|
+    that the sensors' noise explains, with ``noise_dof`` degrees of freedom, 0 where it is not known.
     """
     from scipy.special import fdtrc
 
