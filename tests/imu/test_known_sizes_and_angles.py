@@ -6,6 +6,7 @@ from recordings import shipped
 
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
+from inercal.imu.figures import page, pictures
 from inercal.imu.settings import (
     Exclusion,
     ImuSettings,
@@ -290,3 +291,22 @@ def test_turns_of_a_real_unit_give_what_ferraris_gives():
     for axis in "xyz":
         here, there = alone[f"S_{axis}"], whole.estimate[f"S_{axis}"]
         assert abs(here.value - there.value) < 3.0 * np.hypot(here.u, there.u)
+
+
+@pytest.mark.parametrize("method", ["means", "known_rates", "known_turns"])
+def test_pages_show_the_method(method):
+    rng = np.random.default_rng(10)
+    if method == "means":
+        records = [record_of("acc", pose_means(rng)[1])]
+        options = MeansSettings()
+    elif method == "known_rates":
+        records = [record_of("gyro", each) for each in platter(rng)[1]]
+        options = KnownRatesSettings(tuple(RATES), tuple(RATES_U))
+    else:
+        records = turns(rng)[1]
+        options = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), TILT)
+    calibration = calibrate_files(records, ImuSettings(SITE, method=options))
+    titles = [picture.title for picture in pictures(calibration)]
+    assert titles[0] == {"means": "Poses", "known_rates": "Orientations", "known_turns": "Turns"}[method]
+    assert len(titles) >= 4
+    assert titles[0] in page(calibration)
