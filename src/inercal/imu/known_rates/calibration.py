@@ -20,7 +20,7 @@ from inercal.geometry.site import Site
 from inercal.imu.identified import weakness
 from inercal.imu.known_rates.fit import NAMES, RateFit, contradiction, fit_rates
 from inercal.imu.known_rates.orientations import Orientations, orientations
-from inercal.imu.known_rates.outlying import outlying
+from inercal.imu.known_rates.outlying import outlying, outlying_finding
 from inercal.imu.known_rates.vector_sizes import PARAMETERS, SizeFit, curing
 from inercal.imu.limits import LIMITS
 from inercal.imu.recording import unit_words
@@ -131,7 +131,12 @@ def calibrate_known_rates(
     findings = list(rows.findings)
     dof = float(np.sum(rate_fit.dof))
     if weak is None:
-        findings += outlying(fit, rows.outputs, at, uncertainty.u, dof, rows.places)
+        off = outlying(rate_fit)
+        if off is not None:
+            kept = np.arange(len(rows.outputs)) != off
+            others = fit_rates(rows.outputs[kept], rows.file[kept], rates, rates_u)
+            u = combine(NAMES, _sources(others, rates, rates_u, settings.site)).u
+            findings.append(outlying_finding(fit.fit.x, others.fit.fit.x, u, rows.places[off]))
         findings += _of_rates(rate_fit, rates, rates_u, rows)
     estimate = Estimate.of(
         basis,

@@ -20,6 +20,7 @@ NAMES = ("D_F_x", "D_F_y", "D_F_z", "S_x", "S_y", "S_z", "T_xy", "T_xz", "T_yz")
 
 _ROUNDS = 4
 _STEPS = 25
+_ROUNDING = 1e-8
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ def fit_rates(outputs: Array, file: NDArray[np.int64], rates: Array, rates_u: Ar
     fit = fit_sizes(outputs, sizes, NAMES)
     count = int(group.max()) + 1
     pooled = fit.fit.chi2 / max(fit.fit.dof, 1)
-    variance = np.array([pooled / np.mean(share[group == g] ** 2) for g in range(count)])
-    least = np.finfo(float).eps * float(np.max(sizes)) ** 2 * 1e-6
+    least = (_ROUNDING * float(np.max(sizes))) ** 2
+    variance = np.array([max(pooled / np.mean(share[group == g] ** 2), least) for g in range(count)])
     dof = np.ones(count)
     for _ in range(_ROUNDS):
         for _ in range(_STEPS):

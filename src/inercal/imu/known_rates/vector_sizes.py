@@ -18,6 +18,7 @@ from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability
 from inercal.estimate.linear import whiten
 from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.imu.limits import LIMITS
 from inercal.instruments.triad import TriadModel
 
 PARAMETERS = 9
@@ -137,20 +138,20 @@ def residual_rows(sizes: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.array(rows), np.array(axes)
 
 
-def without_rows(fit: SizeFit, dof: float) -> Array:
+def without_rows(fit: SizeFit, dof: Array) -> Array:
     """Probability (N,) that each residual is so far off a fit without it by chance: externally studentised.
 
-    ``dof`` are the degrees of freedom of the whole fit.
+    ``dof`` (N,) are the degrees of freedom of the scatter of each residual, which it is part of.
     """
     from scipy.special import stdtr
 
     P = fit.left()
     diagonal = np.maximum(np.diag(P), 1e-300)
     squared = (P @ fit.residuals) ** 2 / diagonal
-    rest = np.maximum(float(fit.residuals @ P @ fit.residuals) - squared, 1e-300) / max(dof - 1.0, 1.0)
+    rest = np.maximum(dof - squared, 1e-6) / np.maximum(dof - 1.0, 1.0)
     # a row that alone fixes some combination has no residual, and is not judged
-    judged = diagonal * np.diag(fit.covariance) > 1e-6
-    return np.where(judged, 2.0 * stdtr(max(dof - 1.0, 1.0), -np.sqrt(squared / rest)), 1.0)
+    judged = (diagonal * np.diag(fit.covariance) > 1e-6) & (dof > LIMITS.outlier_dof)
+    return np.where(judged, 2.0 * stdtr(np.maximum(dof - 1.0, 1.0), -np.sqrt(squared / rest)), 1.0)
 
 
 def curing(fit: SizeFit, identified: Identifiability) -> Array:

@@ -74,7 +74,7 @@ def find_turn(t: Array, values: Array) -> Turn | str:
     moving = np.flatnonzero(speed > max(LIMITS.turn_noise * noise, LIMITS.turn_onset * largest))
     first, last = int(moving[0]) - margin, int(moving[-1]) + margin
     if first < rest or last > len(t) - 1 - rest:
-        return f"{'begins' if first < rest else 'ends'} with less rest than expected: at least {wanted} of the turn"
+        return f"{'begins' if first < rest else 'ends'} with the turn, expected at least {wanted}"
     gaps = np.diff(t[first : last + 1])
     if np.max(gaps) > LIMITS.motion_gap * step or np.min(gaps) < 0.0:
         return "lacks samples within the turn, expected all"
