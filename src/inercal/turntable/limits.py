@@ -26,6 +26,22 @@ class Limits:
     misfit_probability: float = 1e-4
     """Probability of a misfit by chance below which the readings contradict the stated noise and errors."""
 
+    residual_risk: float = 3e-3
+    """Probability that any test of the residuals for a fault (trend, heading, level) names one in a sound record."""
+
+    screen: float = 0.05
+    """Probability by chance of the score of a fault below which it is fitted."""
+
+    doubtful: float = 0.03
+    """Probability by chance of a fault below which its shift counts in u, though it is not significant."""
+
+    harmful_shift: float = 0.5
+    """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
+
+    blind_shift: float = 1.5
+    """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
+    the test would not show it."""
+
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
 

@@ -8,7 +8,8 @@ errors that stay constant over the test are unknowns with the prior variance of 
     [   0    ] = [   0           1     ]  [ chi/s ]
 
 which is the same as weighting with V + J s^2 J^T, and also says what the test tells about chi. J depends on c,
-so that the fit is repeated until c rests.
+so that the fit is repeated until c rests. Effects beside the instrument's terms (a drift, a fault that is tried) are
+more columns of A, free, or more of J, random.
 """
 
 from __future__ import annotations
@@ -24,7 +25,15 @@ from inercal.estimate.identifiability import Identifiability, few_terms, identif
 from inercal.instruments.polynomial import ChannelModel
 from inercal.turntable.model import TableModel
 from inercal.turntable.noise import scatter
-from inercal.turntable.weights import Samples, Weights, beside_inputs, least_noise, weights, whitened
+from inercal.turntable.weights import (
+    Samples,
+    Weights,
+    beside_inputs,
+    least_noise,
+    weights,
+    weights_of,
+    whitened,
+)
 
 ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
@@ -34,6 +43,24 @@ RUNAWAY = 1e3
 
 FLOOR = 1e-12
 """Least standard deviation of a reading, over the rms of the readings: that of a simulation without noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """Effects beside the terms of the instrument: ``free`` (n, c, m) columns, and ``random`` (n, c, q) ones, each times
+    a variable of variance 1."""
+
+    free: Array
+    random: Array
+
+    @classmethod
+    def none(cls, n: int, channels: int) -> Effects:
+        """No effects on so many readings."""
+        return cls(np.zeros((n, channels, 0)), np.zeros((n, channels, 0)))
+
+    def beside(self, free: Array) -> Effects:
+        """These, and more ``free`` ones (n, c, m)."""
+        return Effects(np.concatenate([self.free, free], axis=-1), self.random)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +84,10 @@ class Regression:
     table : (q,) estimated constant errors [rad or m], in the order of ``constant``
     table_u : (q,) their standard uncertainties
     constant : (q,) indices of the constant errors among the chain's
+    effects : the effects beside the terms that were fitted
+    effect : (m,) values of the free ones
+    effect_covariance : (m, m) of them
+    effect_gain : (m, n, c) how each reading enters each
     """
 
     model: TableModel
@@ -75,6 +106,24 @@ class Regression:
     table: Array
     table_u: Array
     constant: NDArray[np.int64]
+    effects: Effects
+    effect: Array
+    effect_covariance: Array
+    effect_gain: Array
+
+    @property
+    def rows(self) -> Array:
+        """Regressors (n, c, p + m) of the terms and of the free effects."""
+        return np.concatenate([self.model.rows(self.angles), self.effects.free], axis=-1)
+
+    def weights(self, noise: Array) -> Weights:
+        """Covariance of the readings with ``noise`` (c,), random effects included."""
+        table = weights_of(self.model.chain, self.slopes, self.beside, noise, self.samples)
+        return table.with_common(self.effects.random)
+
+    def shift(self, columns: Array) -> Array:
+        """Change (p, m) of the linear coefficients by effects ``columns`` (n, c, m) that are not fitted."""
+        return np.asarray(np.einsum("pnc,ncm->pm", self.gain, columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +211,7 @@ def fit(
     noise: Sequence[float | None],
     start: Array | None = None,
     samples: Samples | None = None,
+    effects: Effects | None = None,
 ) -> Regression:
     """Fit all channels together.
 
@@ -174,29 +224,33 @@ def fit(
     noise : (c,) standard deviation of a reading; None where it is to be estimated from the scatter
     start : (p,) coefficients for the first derivatives; from an unweighted fit if absent
     samples : (n,) rows behind each reading, over which errors of scope ``sample`` average; one if absent
+    effects : Effects, optional
+        Beside the terms, which the positions identify with them.
 
     Raises
     ------
     LinAlgError
         Terms so large that errors of the table, which they multiply, drown the readings: their weights do not settle.
     """
-    rows = model.rows(angles)
-    n, channels, p = rows.shape
+    n, channels, p = model.rows(angles).shape
+    effects = Effects.none(n, channels) if effects is None else effects
+    rows = np.concatenate([model.rows(angles), effects.free], axis=-1)
+    m = rows.shape[-1] - p
     samples = np.ones(n, dtype=np.int64) if samples is None else samples
     size = np.sqrt(np.mean(np.square(y), axis=0))
     least = FLOOR * np.where(size > 0.0, size, 1.0)
     y = y - model.outputs(angles, np.zeros(p))  # what is stated
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
-    c = solve(rows, y, plain).c if start is None else start
+    c = solve(rows, y, plain).c[:p] if start is None else start
     u, settled = np.zeros(p), True
     for _ in range(ROUNDS):
         if not np.isfinite(c).all():
             break
-        table = weights(model, angles, c, np.zeros(channels), samples=samples)
+        table = weights(model, angles, c, np.zeros(channels), samples=samples).with_common(effects.random)
         noise_fit = scatter(rows, y, table, noise, np.maximum(least, least_noise(table.within)))
         sigma = noise_fit.std
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
-        change, c = np.abs(solution.c - c), solution.c
+        change, c = np.abs(solution.c[:p] - c), solution.c[:p]
         before, u = u, np.sqrt(np.diag(solution.joint)[:p])
         if np.all(change <= 1e-3 * u):
             break
@@ -207,22 +261,27 @@ def fit(
     ):
         raise np.linalg.LinAlgError("the weights of the readings do not settle")
     constant = np.flatnonzero([error.scope.constant for error in model.chain.errors])
-    std = model.chain.std[constant]
+    std, free = model.chain.std[constant], slice(p, p + m)
+    of_table = np.diag(solution.joint)[p + m : p + m + len(std)]
     return Regression(
         model,
         angles,
         c,
         solution.joint[:p, :p],
-        solution.gain,
-        y - np.einsum("ncp,p->nc", rows, c),
+        solution.gain[:p],
+        y - np.einsum("ncp,p->nc", rows, solution.c),
         solution.chi2,
-        n * channels - p,
+        n * channels - p - m,
         sigma,
         noise_fit.dof,
         model.by_errors(angles, c),
         beside_inputs(model, angles, c),
         samples,
         solution.chi[: len(std)] * std,
-        np.sqrt(np.diag(solution.joint)[p : p + len(std)]) * std,
+        np.sqrt(of_table) * std,
         constant,
+        effects,
+        solution.c[free],
+        solution.joint[free, free],
+        solution.gain[free],
     )

@@ -22,12 +22,13 @@ from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
+from inercal.turntable.positions.examination import examine
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
+from inercal.turntable.positions.shifts import Scale, doubts, findings_of
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression, worst_rank
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.weights import weights
 
 COMMAND = "calibrate turntable"
 
@@ -132,10 +133,16 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
     # stated noise is of type B, but not the same in repeat runs
-    uncertainty = combine(names, sources(fit, terms, unit))._replace(common=None)
-    findings += _too_large(fit) + of_site(
-        names, uncertainty.budget, [each.source for each in fit.model.references]
-    )
+    told = sources(fit, terms, unit)
+    uncertainty = combine(names, told)
+    findings += (bent := _too_large(fit))
+    if not bent:  # squares of table errors would be taken for faults
+        examination = examine(readings, fit, [settings.instrument.noise] * len(readings.channels))
+        scale = Scale(names, terms.slope, uncertainty.u)
+        findings += findings_of(examination, fit, scale, readings.unit)
+        uncertainty = combine(names, [*told, *doubts(examination, fit, scale, readings.unit)])
+    uncertainty = uncertainty._replace(common=None)
+    findings += of_site(names, uncertainty.budget, [each.source for each in fit.model.references])
     return Estimate.of(
         basis,
         names,
@@ -178,7 +185,7 @@ def _verdict(readings: Readings, fitting: Fitting) -> tuple[Status, str]:
 
 def _farthest(readings: Readings, fit: Regression) -> str:
     """The reading with the largest residual for its uncertainty."""
-    std = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).std
+    std = fit.weights(fit.noise).std
     k, c = np.unravel_index(int(np.argmax(np.abs(fit.residuals) / std)), fit.residuals.shape)
     return f"position {k + 1} of {readings.channels[c]}"
 
@@ -186,7 +193,7 @@ def _farthest(readings: Readings, fit: Regression) -> str:
 def _too_large(fit: Regression) -> list[Finding]:
     """A finding where errors of the table bend the readings by more than their noise."""
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
-    within = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).within
+    within = fit.weights(fit.noise).within
     # where no noise is left, squares a thousand times below what changes from position to position do not matter
     # either; errors that stay are found with the terms, and then only their squares are left
     limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.diagonal(within, axis1=1, axis2=2).mean(axis=0)))
