@@ -29,6 +29,9 @@ class Limits:
     residual_risk: float = 3e-3
     """Probability that any test of the residuals for a fault (trend, heading, level) names one in a sound record."""
 
+    dwell_risk: float = 1e-3
+    """Probability that drift within the dwells is named in a sound record."""
+
     screen: float = 0.05
     """Probability by chance of the score of a fault below which it is fitted."""
 
@@ -41,6 +44,9 @@ class Limits:
     blind_shift: float = 1.5
     """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
     the test would not show it."""
+
+    drift_sigmas: float = 4.0
+    """Standard uncertainties by which drift within the dwells may differ from that between them to be used with it."""
 
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""

@@ -71,6 +71,7 @@ class Regression:
     ----------
     model : TableModel
     angles : (n, joints) rad
+    y : (n, c) readings
     c : (p,) linear coefficients [output per monomial]
     covariance : (p, p) of them
     gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less the stated terms
@@ -88,10 +89,14 @@ class Regression:
     effect : (m,) values of the free ones
     effect_covariance : (m, m) of them
     effect_gain : (m, n, c) how each reading enters each
+    random_effect : (q,) values of the random ones, in their standard deviations
+    random_covariance : (q, q) of them
+    likelihood : restricted log-likelihood, but for a constant
     """
 
     model: TableModel
     angles: Array
+    y: Array
     c: Array
     covariance: Array
     gain: Array
@@ -110,6 +115,9 @@ class Regression:
     effect: Array
     effect_covariance: Array
     effect_gain: Array
+    random_effect: Array
+    random_covariance: Array
+    likelihood: float
 
     @property
     def rows(self) -> Array:
@@ -239,7 +247,7 @@ def fit(
     samples = np.ones(n, dtype=np.int64) if samples is None else samples
     size = np.sqrt(np.mean(np.square(y), axis=0))
     least = FLOOR * np.where(size > 0.0, size, 1.0)
-    y = y - model.outputs(angles, np.zeros(p))  # what is stated
+    read, y = y, y - model.outputs(angles, np.zeros(p))  # what is stated
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
     c = solve(rows, y, plain).c[:p] if start is None else start
     u, settled = np.zeros(p), True
@@ -262,10 +270,12 @@ def fit(
         raise np.linalg.LinAlgError("the weights of the readings do not settle")
     constant = np.flatnonzero([error.scope.constant for error in model.chain.errors])
     std, free = model.chain.std[constant], slice(p, p + m)
+    last = slice(len(solution.chi) - effects.random.shape[-1], None)
     of_table = np.diag(solution.joint)[p + m : p + m + len(std)]
     return Regression(
         model,
         angles,
+        read,
         c,
         solution.joint[:p, :p],
         solution.gain[:p],
@@ -284,4 +294,7 @@ def fit(
         solution.c[free],
         solution.joint[free, free],
         solution.gain[free],
+        solution.chi[last],
+        solution.joint[p + m :, p + m :][last, last],
+        noise_fit.likelihood,
     )

@@ -13,7 +13,7 @@ else a fault that is too small for the test, and large for a value, would pass.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,17 +83,20 @@ class _White:
 
 def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> Examination:
     """Ask a fit of the readings for every fault; ``noise`` (c,) as stated."""
+    first_fit = fit
     first, residuals = _seen(fit, faults(means, fit))
     asked, significant = first, list[Tested]()
     while True:
-        tested = _likely(means, fit, noise, asked, residuals)
+        tested = _likely(fit, noise, asked, residuals)
         risk = LIMITS.residual_risk / max(len(first), 1)
         if not tested or tested[0].chance > risk or len(significant) == MOST:
             break
         significant.append(tested[0])
-        fit = _refitted(means, fit, noise, next(each for each in asked if each.fault is tested[0].fault))
+        fit = _refitted(fit, noise, next(each for each in asked if each.fault is tested[0].fault))
         names = {each.fault.name for each in significant}
         asked, residuals = _seen(fit, (each for each in faults(means, fit) if each.name not in names))
+    if not first_fit.effects.free.size + first_fit.effects.random.size:
+        significant += _within_dwells(means, first, {each.fault.code for each in significant})
     codes = {each.fault.code for each in significant}
     doubtful: dict[str, Tested] = {}
     for each in tested:
@@ -102,14 +105,43 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
     return Examination(tuple(significant), tuple(doubtful.values()), tuple(first))
 
 
+def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> Iterator[Tested]:
+    """Drifts that the samples within the dwells show, the likeliest of each code but of ``codes``.
+
+    The slopes scatter from dwell to dwell as they do, whatever the noise: an F-test of one and n - 1 degrees of
+    freedom.
+    """
+    from scipy.special import fdtrc
+
+    slopes = means.slopes * (means.times[-1] - means.times[0])
+    tested = []
+    for fault in (
+        each.fault for each in asked if each.fault.within is not None and each.fault.code not in codes
+    ):
+        assert fault.within is not None
+        k = int(np.argmax(np.abs(fault.within).max(axis=0)))
+        rate, slope = fault.within[:, k], slopes[:, k]
+        if np.isfinite(slope).all() and len(slope) > 2:
+            value = float(rate @ slope / (rate @ rate))
+            left = float(np.square(slope - rate * value).sum()) / (len(slope) - 1)
+            chance = float(fdtrc(1, len(slope) - 1, value**2 * (rate @ rate) / left)) if left else 1.0
+            what = f"{fault.what.rstrip(',')}, as it drifts within the dwells,"
+            tested.append(Tested(replace(fault, what=what), np.array([value]), chance))
+    named: set[str] = set()
+    for each in sorted(tested, key=lambda each: each.chance):
+        if each.chance < LIMITS.dwell_risk / len(tested) and each.fault.code not in named:
+            named.add(each.fault.code)
+            yield each
+
+
 def _likely(
-    means: Readings, fit: Regression, noise: Sequence[float | None], asked: Sequence[Seen], residuals: Array
+    fit: Regression, noise: Sequence[float | None], asked: Sequence[Seen], residuals: Array
 ) -> list[Tested]:
     """Faults whose score is beyond what is usual by chance, with their F-tests, the least by chance first."""
     by_name, tested = {each.fault.name: each for each in asked}, list[Tested]()
 
     def try_all(case: Array, fits: Iterator[Fits[Array]]) -> None:
-        tested.extend(_tested(means, fit, noise, by_name[each[-1].hypothesis.name]) for each in fits)
+        tested.extend(_tested(fit, noise, by_name[each[-1].hypothesis.name]) for each in fits)
 
     table = [_hypothesis(each) for each in asked]
     search(residuals, lambda _: table, _White(), LIMITS.screen * len(table), 1, choose=try_all)
@@ -161,19 +193,19 @@ def _hypothesis(seen: Seen) -> Hypothesis[Array]:
     )
 
 
-def _refitted(means: Readings, fit: Regression, noise: Sequence[float | None], seen: Seen) -> Regression:
+def _refitted(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Regression:
     """The fit with a fault beside its terms."""
     effects = fit.effects.beside(seen.fault.columns @ seen.base)
-    return fitted_anew(fit.model, fit.angles, means.y, noise, fit.c, fit.samples, effects)
+    return fitted_anew(fit.model, fit.angles, fit.y, noise, fit.c, fit.samples, effects)
 
 
-def _tested(means: Readings, fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested:
+def _tested(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested:
     """The F-test of a fault."""
     from scipy.special import chdtrc, fdtrc
 
     before, m = len(fit.effect), seen.base.shape[1]
     try:
-        now = _refitted(means, fit, noise, seen)
+        now = _refitted(fit, noise, seen)
     except np.linalg.LinAlgError:
         return Tested(seen.fault, np.zeros(seen.base.shape[0]), 1.0)
     values, C = now.effect[before:], now.effect_covariance[before:, before:]

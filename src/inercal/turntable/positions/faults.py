@@ -43,6 +43,8 @@ class Fault:
         Of the fault, whatever the channel or joint.
     bend : callable, optional
         Change (n, c) of the readings by values (m,) beyond the linear one.
+    within : (n, c), optional
+        Change of the readings within a dwell by a unit of the fault, over the length of the test.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Fault:
     size: Callable[[Array, tuple[float, str]], str]
     kind: str
     bend: Callable[[Array], Array] | None = None
+    within: Array | None = None
 
     def effect(self, values: Array) -> Array:
         """Change (n, c) of the readings by a fault of these values (m,)."""
@@ -100,14 +103,19 @@ def _one(column: Array, channel: int, channels: int) -> Array:
 
 def _drifts(means: Readings, fit: Regression) -> Iterator[Fault]:
     """Bias and scale factor that change with time, of each channel."""
-    s, fitted = fraction(means.times), means.y - fit.residuals
+    s, fitted = fraction(means.times), fit.y - fit.residuals
     for k, name in enumerate(means.channels):
         what = f"a trend of {name} from first to last position"
-        yield Fault(f"trend {name}", "trend", _on(means, k, s - 0.5), what, _of_output, "trend")
+        one = _on(means, k, np.ones_like(s))[..., 0]
+        column = _on(means, k, s - 0.5)
+        yield Fault(f"trend {name}", "trend", column, what, _of_output, "trend", within=one)
         for tau in WARM_UP:
             column = _on(means, k, np.exp(-s / tau))
             what = f"a warm-up of {name}, with a time constant of {tau:g} of the test,"
-            yield Fault(f"warm-up {tau} {name}", "warm_up", column, what, _of_output, "warm-up")
+            within = -column[..., 0] / tau
+            yield Fault(
+                f"warm-up {tau} {name}", "warm_up", column, what, _of_output, "warm-up", within=within
+            )
         changed = _on(means, k, (s - 0.5) * (fitted[:, k] - fitted[:, k].mean()))
         what = f"a drift of the scale factor of {name} over the test"
         yield Fault(f"scale drift {name}", "trend", changed, what, _of_scale, "scale drift")

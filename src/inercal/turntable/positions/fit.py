@@ -11,8 +11,9 @@ from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.findings import Finding
 from inercal.turntable.model import TableModel, table_model
+from inercal.turntable.positions.drift import Drift, fit_drift
 from inercal.turntable.readings import Readings
-from inercal.turntable.regression import Identified, Regression, fit, identify_channels
+from inercal.turntable.regression import Effects, Identified, Regression, fit, identify_channels
 from inercal.turntable.settings import TurntableSettings
 
 
@@ -21,13 +22,14 @@ class Fitting:
     """The terms that a plan identifies, and the fit if it identifies all.
 
     ``identified`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
-    identified, and where the weights of the readings do not settle.
+    identified, and where the weights of the readings do not settle; with a ``drift`` where the study asks for one.
     """
 
     model: TableModel
     identified: tuple[Identified, ...]
     fit: Regression | None
     findings: tuple[Finding, ...] = ()
+    drift: Drift | None = None
 
 
 def fit_readings(means: Readings, settings: TurntableSettings) -> Fitting:
@@ -53,6 +55,13 @@ def fit_readings(means: Readings, settings: TurntableSettings) -> Fitting:
         with np.errstate(
             over="ignore", divide="ignore", invalid="ignore"
         ):  # what is lost is not finite, and no fit
+            if settings.instrument.bias_drift != "none":
+
+                def with_drift(y: Array, effects: Effects) -> Regression:
+                    return fit(model, means.angles, y, noise, samples=means.samples, effects=effects)
+
+                drift = fit_drift(means, settings.instrument.bias_drift, with_drift, means.unit.si)
+                return Fitting(model, what, drift.fit, (*findings, *drift.findings), drift)
             done = fit(model, means.angles, means.y, noise, samples=means.samples)
     except np.linalg.LinAlgError:
         return Fitting(model, what, None, tuple(findings))

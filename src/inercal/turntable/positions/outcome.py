@@ -22,6 +22,7 @@ from inercal.records.record import Record
 from inercal.records.temperature import recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
+from inercal.turntable.positions.drift import Drift
 from inercal.turntable.positions.examination import examine
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
 from inercal.turntable.positions.shifts import Scale, doubts, findings_of
@@ -133,7 +134,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
     # stated noise is of type B, but not the same in repeat runs
-    told = sources(fit, terms, unit)
+    told = [*sources(fit, terms, unit), *_of_drift(fitting, terms, unit)]
     uncertainty = combine(names, told)
     findings += (bent := _too_large(fit))
     if not bent:  # squares of table errors would be taken for faults
@@ -154,8 +155,27 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         statistics=_statistics(readings, fitting, result["plan"]["condition"]),
         result=result
         | _shares(fit, terms)
-        | {"table_errors": _table_errors(fit), "noise": _noise(readings, fit, unit)},
+        | {"table_errors": _table_errors(fit), "noise": _noise(readings, fit, unit)}
+        | ({"nuisances": _nuisances(fitting.drift)} if fitting.drift else {}),
     )
+
+
+def _of_drift(fitting: Fitting, terms: Terms, unit: str) -> list[TypeA | TypeB]:
+    """The random parts of a drift, those of one name together."""
+    drift = fitting.drift
+    if drift is None:
+        return []
+    shifts = terms.slope @ drift.fit.shift(drift.fit.effects.random)
+    made: list[TypeA | TypeB] = []
+    for name in dict.fromkeys(drift.sources):
+        own = [k for k, each in enumerate(drift.sources) if each == name]
+        made.append(TypeA(name, 1.0, "1", shifts[:, own] @ shifts[:, own].T, drift.dof[own[0]]))
+    return made
+
+
+def _nuisances(drift: Drift) -> list[dict[str, Any]]:
+    """Parameters of the drift, fitted beside the coefficients."""
+    return [{"name": a, "value": b, "u": c, "unit": d, "prior": None} for a, b, c, d in drift.nuisances]
 
 
 def _verdict(readings: Readings, fitting: Fitting) -> tuple[Status, str]:
