@@ -75,7 +75,9 @@ CODES: dict[str, Code] = {
     "turn_doubtful": Code("which motion is a turn is not certain", _NEVER),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
-    "uncertain_site": Code("gravity or earth rate is known so badly that it rules the uncertainties", _NEVER),
+    "uncertain_site": Code(
+        "gravity or earth rate is known so badly that it rules the uncertainties", _BY_SIZE
+    ),
     "whole_turns": Code(
         "the angle of a turning axis is not known, and whole turns are taken for granted", _NEVER
     ),

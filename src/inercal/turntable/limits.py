@@ -48,6 +48,12 @@ class Limits:
     drift_sigmas: float = 4.0
     """Standard uncertainties by which drift within the dwells may differ from that between them to be used with it."""
 
+    straight_part: float = 0.1
+    """Second-order change of a value by an uncertain latitude, over its u, below which first order does."""
+
+    bent_part: float = 0.33
+    """Second-order change of a value by an uncertain latitude, over its u, beyond which no u holds."""
+
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
 

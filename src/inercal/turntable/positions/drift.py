@@ -1,8 +1,8 @@
 """Drift of the biases over a test, as a study asks for it: fitted beside the terms, from positions and within dwells.
 
 Linear: a slope for each channel. Exponential: an amplitude for each, and one time constant for all, found where the
-misfit is least; its uncertainty takes part to first order. Random walk: its size, the same for all channels, by restricted
-likelihood, as that of the noise (`inercal.turntable.noise`), the walk itself by the first terms of its series
+misfit is least; its uncertainty takes part to first order. Random walk: one size for all channels, by restricted
+likelihood, as that of the noise (`inercal.turntable.noise`), and the walk itself by the first terms of its series
 (Karhunen and Loeve). Samples within the dwells tell a slope too: where it agrees with that from dwell to dwell, both
 are used.
 """

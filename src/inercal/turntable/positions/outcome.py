@@ -25,6 +25,7 @@ from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.positions.drift import Drift
 from inercal.turntable.positions.examination import examine
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
+from inercal.turntable.positions.latitude import second_order
 from inercal.turntable.positions.shifts import Scale, doubts, findings_of
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
@@ -135,9 +136,12 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     names = fit.model.symbols
     # stated noise is of type B, but not the same in repeat runs
     told = [*sources(fit, terms, unit), *_of_drift(fitting, terms, unit)]
+    bent, poorly_known = second_order(fit, settings.site, names, terms.slope, combine(names, told).u)
+    told += bent
     uncertainty = combine(names, told)
-    findings += (bent := _too_large(fit))
-    if not bent:  # squares of table errors would be taken for faults
+    findings += poorly_known
+    findings += (large := _too_large(fit))
+    if not large:  # squares of table errors would be taken for faults
         examination = examine(readings, fit, [settings.instrument.noise] * len(readings.channels))
         scale = Scale(names, terms.slope, uncertainty.u)
         findings += findings_of(examination, fit, scale, readings.unit)
@@ -244,7 +248,7 @@ def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collect
         f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(acting)}): with an exact site it would "
         "be less than half"
     )
-    return [Finding("uncertain_site", text)]
+    return [Finding("uncertain_site", text, "", ())]
 
 
 def _dead(fit: Regression, identified: NDArray[np.bool_]) -> str:
