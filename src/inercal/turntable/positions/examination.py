@@ -141,7 +141,7 @@ def _likely(
     by_name, tested = {each.fault.name: each for each in asked}, list[Tested]()
 
     def try_all(case: Array, fits: Iterator[Fits[Array]]) -> None:
-        tested.extend(_tested(fit, noise, by_name[each[-1].hypothesis.name]) for each in fits)
+        tested.extend(f_test(fit, noise, by_name[each[-1].hypothesis.name]) for each in fits)
 
     table = [_hypothesis(each) for each in asked]
     search(residuals, lambda _: table, _White(), LIMITS.screen * len(table), 1, choose=try_all)
@@ -199,8 +199,8 @@ def _refitted(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Reg
     return fitted_anew(fit.model, fit.angles, fit.y, noise, fit.c, fit.samples, effects)
 
 
-def _tested(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested:
-    """The F-test of a fault."""
+def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested:
+    """The F-test of a fault beside a fit, with the ``noise`` (c,) as stated."""
     from scipy.special import chdtrc, fdtrc
 
     before, m = len(fit.effect), seen.base.shape[1]

@@ -1,7 +1,8 @@
 """An uncertain latitude to second order: the fit is made again on either side of it, and a rule says what follows.
 
-With f(L) a value as fitted at latitude L, ``bend = (f(L + u) + f(L - u) - 2 f(L)) / 2``: of a normal L the mean of f is
-off by it, and its variance larger by twice its square (GUM, JCGM 100:2008, 5.1.2, note).
+With f(L) a value as fitted at latitude L and f1, f2, f3 its derivatives, ``bend = (f(L+u) + f(L-u) - 2 f(L)) / 2`` is
+``f2 u^2 / 2``. Of a normal L the mean of f is off by it, and the variance of f larger by ``f2^2 u^4 / 2 + f1 f3 u^4``
+(GUM, JCGM 100:2008, 5.1.2, note).
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ NEAREST = float(np.radians(1.0))
 """Distance from a pole [rad] within which no fit is made."""
 
 
+SMALL = 0.01
+"""Step for the derivative, in u."""
+
+
 def second_order(
     fit: Regression, site: Site, names: Sequence[str], slope: Array, u: Array
 ) -> tuple[list[TypeB], list[Finding]]:
@@ -38,11 +43,17 @@ def second_order(
     """
     if not site.latitude_u or site.latitude is None:
         return [], []
-    ends = [
-        float(np.clip(site.latitude + sign * site.latitude_u, NEAREST - np.pi / 2, np.pi / 2 - NEAREST))
-        for sign in (1.0, -1.0)
-    ]
-    bend = slope @ (0.5 * sum(_refitted(fit, end) for end in ends) - _refitted(fit, site.latitude))
+    at = site.latitude
+
+    def fitted(steps: float) -> Array:
+        """The values at a latitude that is so many u away."""
+        latitude = np.clip(at + steps * site.latitude_u, NEAREST - np.pi / 2, np.pi / 2 - NEAREST)
+        return np.asarray(slope @ _refitted(fit, float(latitude)))
+
+    low, high, middle = fitted(-1.0), fitted(1.0), fitted(0.0)
+    bend = 0.5 * (low + high) - middle
+    first = 0.5 * (fitted(SMALL) - fitted(-SMALL)) / SMALL
+    third = 0.5 * (high - low) - first  # f3 u^3 / 6
     part = np.abs(bend) / np.where(u > 0.0, u, np.inf)
     harm = tuple(name for name, each in zip(names, part, strict=True) if each > LIMITS.bent_part)
     if harm:
@@ -53,7 +64,9 @@ def second_order(
         return [], [Finding("uncertain_site", text, "", harm)]
     if part.max() < LIMITS.straight_part:
         return [], []
-    return [TypeB("latitude, second order", 1.0, "1", np.sqrt(3.0) * bend)], []
+    more = np.sign(first) * np.sqrt(np.maximum(6.0 * first * third, 0.0))
+    shifts = np.stack([np.sqrt(3.0) * bend, more], axis=-1)
+    return [TypeB("latitude, second order", 1.0, "1", shifts)], []
 
 
 def _refitted(fit: Regression, latitude: float) -> Array:
