@@ -37,9 +37,9 @@ def calibrated(name, folder, seeds, faults):
 LARGE = [
     (WHEEL, Faults(heading=np.pi / 2), "heading_suspect"),
     (WHEEL, Faults(warm_up=1.0), "warm_up"),
-    (SHUFFLED, Faults(ramp=0.4), "trend"),
     (SHUFFLED, Faults(hysteresis=0.2), "approach_hysteresis"),
     (FORCE, Faults(tilt_north=20.0 * ARCSEC), "level_suspect"),
+    (SHUFFLED, Faults(ramp=0.4), "trend"),
     (FORCE, Faults(backlash=20.0 * ARCSEC), "approach_hysteresis"),
     (FORCE, Faults(harmonic={(1, 1): 40.0 * ARCSEC}), "angle_harmonic"),
     (FORCE, Faults(warm_up=200.0 * UG), "warm_up"),
@@ -47,17 +47,25 @@ LARGE = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "faults", "code"), LARGE)
-def test_a_fault_that_shifts_a_value_is_named(name, faults, code, tmp_path):
-    """None of 12 ends ok, where one in fifty may; most bear the name, others that of a fault that looks alike."""
-    done = calibrated(name, tmp_path, 12, faults)
-    assert not [each for each in done if each.status.value == "ok"]
-    assert sum(code in {finding.code for finding in each.findings} for each in done) > 6
+@pytest.mark.parametrize(
+    ("name", "faults", "code", "draws"),
+    [
+        *((*each, 8) for each in LARGE[:4]),
+        *(pytest.param(*each, 50, marks=pytest.mark.campaign) for each in LARGE),
+    ],
+)
+def test_a_fault_that_shifts_a_value_is_named(name, faults, code, draws, tmp_path):
+    """Of 50 one may end ok; most bear the name, others that of a fault that looks alike."""
+    done = calibrated(name, tmp_path, draws, faults)
+    assert sum(each.status.value == "ok" for each in done) <= draws // 50
+    assert sum(code in {finding.code for finding in each.findings} for each in done) > draws // 2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", turntable_faults.TESTS)
-@pytest.mark.parametrize("draws", [20, pytest.param(500, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(
+    ("name", "draws"),
+    [(FORCE, 20), *(pytest.param(each, 500, marks=pytest.mark.campaign) for each in turntable_faults.TESTS)],
+)
 def test_sound_records_end_ok(name, draws, tmp_path):
     """At 0.5 % 20 records have more than two others with a probability of 1.5e-4, 500 more than 8 with one of 1e-3."""
     done = calibrated(name, tmp_path, draws, Faults())
@@ -103,12 +111,12 @@ def test_the_sense_of_approach():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", turntable_drift.FAULTS)
-@pytest.mark.parametrize("runs", [6, pytest.param(100, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("runs", [3, pytest.param(100, marks=pytest.mark.campaign)])
 def test_intervals_hold_where_drift_is_fitted(kind, runs):
-    """12 coefficients a run, tied by the table: a design effect of 3 gives 4 standard errors of 18 and 4.4 %."""
+    """12 coefficients a run, tied by the table: a design effect of 3 gives 4 standard errors of 25 and 4.4 %."""
     made = turntable_drift.campaign(kind, runs)
     assert made["covered"] > 0.95 - 4.0 * np.sqrt(0.05 * 0.95 * 3.0 / (12 * runs))
-    assert made["ok"] >= 1.0 - (2 if runs == 6 else 5) / runs
+    assert made["ok"] >= 1.0 - (2 if runs == 3 else 5) / runs
 
 
 def test_drift_within_the_dwells_is_named_and_used(tmp_path):
