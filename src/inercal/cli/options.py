@@ -160,7 +160,7 @@ class Span:
 
     def check(self) -> None:
         """Refuse a time that is none, before anything is read; raises `InputError`."""
-        from inercal.records.span import seconds
+        from inercal.records.record import seconds
 
         for option, text in self.given.items():
             seconds(text, option)

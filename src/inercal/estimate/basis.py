@@ -78,7 +78,7 @@ def conditions_of(
     settings : Settings
         The study.
     recorded : Quantity or None
-        The temperature that was recorded (`inercal.records.temperature.recorded_temperature`); that of the study goes
+        The temperature that was recorded (`inercal.records.record.recorded_temperature`); that of the study goes
         before.
     ranges : mapping
         Smallest and largest input by name, its SI unit at the end of the name.

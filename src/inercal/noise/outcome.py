@@ -21,8 +21,7 @@ from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
 from inercal.noise.rest import Unrest, unrest
-from inercal.records.clocks import usable_interval
-from inercal.records.column import Column
+from inercal.records.column import Column, usable_interval
 from inercal.records.places import counted
 from inercal.records.record import Record
 

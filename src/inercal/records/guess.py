@@ -15,9 +15,8 @@ from inercal.errors import RecordError
 from inercal.records.channels import Origin, of_a_table
 from inercal.records.places import counted_names
 from inercal.records.read import format_of
-from inercal.records.read.canonical import bare
 from inercal.records.read.table import Sample
-from inercal.records.titles import fits, numbered, titled
+from inercal.records.titles import bare, fits, numbered, titled
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)

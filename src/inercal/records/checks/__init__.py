@@ -17,7 +17,6 @@ from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.channels import may_be_empty, of_a_table
 from inercal.records.checks.angles import angle_findings
-from inercal.records.checks.time import time_axis, time_unit
 from inercal.records.checks.values import (
     accelerometer_unit,
     dead_channel,
@@ -25,6 +24,8 @@ from inercal.records.checks.values import (
     outliers,
     saturation,
     temperature_unit,
+    time_axis,
+    time_unit,
 )
 from inercal.records.column import Column
 from inercal.records.places import counted, places

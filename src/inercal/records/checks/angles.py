@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.channels import of_a_table
-from inercal.records.checks.samples import known, plateaus
-from inercal.records.clocks import counted_rows
-from inercal.records.column import Column
+from inercal.records.checks.values import known, plateaus
+from inercal.records.column import Column, counted_rows
 from inercal.records.places import counted, places
 
 _ANGLE = re.compile(r"phi[123]|th_[xyz]|theta_ref")
