@@ -29,7 +29,7 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
     from inercal.estimate.repeat import combine_runs
-    from inercal.face.runs import calibrations, with_span
+    from inercal.face.study import calibrations, with_span
 
     calibrated = calibrations(records, study, progress, calibrate_run)
     runs = [each.estimate for each in calibrated]

@@ -11,8 +11,7 @@ import numpy as np
 from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, of_design, one_run
-from inercal.face.study import Study
+from inercal.face.study import Progress, Study, calibrations, of_design, one_run
 from inercal.records.record import Record
 from inercal.turntable import task
 

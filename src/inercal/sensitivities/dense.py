@@ -25,9 +25,8 @@ from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
 from inercal.rigs.patterns import Known
 from inercal.sensitivities.exact import drop_rounding, positions
-from inercal.sensitivities.indices import Indices, VarianceParts
+from inercal.sensitivities.indices import Indices, VarianceParts, shapley_effects
 from inercal.sensitivities.moments import moments
-from inercal.sensitivities.shapley import shapley_effects
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,8 @@ from inercal.arrays import Array
 from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
 from inercal.rigs.patterns import Known
-from inercal.sensitivities.indices import Indices, VarianceParts, by_position
+from inercal.sensitivities.indices import Indices, VarianceParts, by_position, shapley_effects
 from inercal.sensitivities.moments import moments
-from inercal.sensitivities.shapley import shapley_effects
 
 if TYPE_CHECKING:
     from inercal.sensitivities import kernels

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from inercal._toml import read_toml
 from inercal.errors import StudyError
-from inercal.studies.starting import UNKNOWN
-from inercal.studies.ways import DISTRIBUTIONS, PATHS, POSITIONS
+from inercal.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN
 from inercal.units import shown
 
 # each kind of study brings models that take a tenth of a second to build: those of the others are not wanted

@@ -21,7 +21,7 @@ from inercal.rigs.chain import Chain
 from inercal.rigs.plans import NAMED, Plan, grid, listed, named
 from inercal.studies.fields import refusal
 from inercal.studies.rig import Angle, Limits
-from inercal.studies.ways import POSITIONS
+from inercal.studies.starting import POSITIONS
 from inercal.units import shown
 
 MOST = 200_000

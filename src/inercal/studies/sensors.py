@@ -14,8 +14,17 @@ from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.settings import GYROS, Calibration, Per
 from inercal.errors import InputError, QuantityError, StudyError
 from inercal.findings import Status
-from inercal.studies.fields import QuantityText, Temperature, positive, refusal
-from inercal.studies.ratios import ELECTRIC, ExactText, Ratio, ScaleText, SlopeText
+from inercal.studies.fields import (
+    ELECTRIC,
+    ExactText,
+    QuantityText,
+    Ratio,
+    ScaleText,
+    SlopeText,
+    Temperature,
+    positive,
+    refusal,
+)
 from inercal.units import Quantity, parse_quantity, parse_unit, shown
 
 MOST = 24

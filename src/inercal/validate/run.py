@@ -22,9 +22,7 @@ from inercal.estimate.result import Estimate, timed
 from inercal.estimate.runs import Executor, Processes, Serial
 from inercal.examples import EXAMPLES, shipped
 from inercal.findings import Finding, Status
-from inercal.validate.case import Case, Numbers, Outcome, find, judge
-from inercal.validate.shipped import USED
-from inercal.validate.sources import SOURCES
+from inercal.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge
 
 SYSTEMS: Mapping[str, str] = {
     "foundation": "units, rotations, gravity, least squares",

@@ -60,7 +60,7 @@ def time_axis(t: Array, subject: str = "t") -> list[Finding]:
     ):
         if count := int(np.count_nonzero(wrong)):
             where = places("row", rows[1:][wrong] + 1)
-            findings.append(Finding(code, f"{subject}: {counted(count, noun)}", where))
+            findings.append(Finding(code, f"{subject}: {counted(count, noun)}", where, harm=()))
     if 2 * np.count_nonzero(step > 0) <= step.size:
         return findings
     if rows[-1] - rows[0] > step.size:  # rows without a stamp have been said by the reader
