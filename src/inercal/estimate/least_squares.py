@@ -35,29 +35,13 @@ class LinearFit:
 
 
 def least_squares(A: Array, y: Array, names: Sequence[str], covariance: Array | None = None) -> LinearFit:
-    """Solve ``y = A beta + e`` in the (generalised) least-squares sense.
+    """Solve ``y = A beta + e``, A (n, p), y (n,), in the (generalised) least-squares sense.
 
-    Parameters
-    ----------
-    A : (n, p)
-        Design matrix.
-    y : (n,)
-        Observations.
-    names : sequence of str, length p
-        Terms, for the words about rank and null vectors.
-    covariance : (n,) or (n, n), optional
-        Variances, or the full covariance matrix, of the observations; unit variance if absent.
-
-    Raises
-    ------
-    ValueError
-        Shapes that do not fit, or a covariance that is not positive definite.
-
-    Notes
-    -----
-    Columns are scaled to unit length before the decomposition, so that rank and condition do not depend on
-    units, as long as these leave the columns within some 12 decades of each other (Golub and Van Loan,
-    Matrix Computations, 5.3.7 and 5.5).
+    ``names`` (p,) are terms for the words about rank and null vectors; ``covariance`` the variances (n,) or the matrix
+    (n, n) of the observations, unit variance if absent. Columns are scaled to unit length before the decomposition, so
+    that rank and condition do not depend on units, as long as these leave the columns within some 12 decades of each
+    other (Golub and Van Loan, Matrix Computations, 5.3.7 and 5.5). Raises ValueError for shapes that do not fit, or a
+    covariance that is not positive definite.
     """
     n, p = A.shape
     if y.shape != (n,) or len(names) != p:
@@ -133,29 +117,12 @@ class _NotFiniteError(ArithmeticError):
 def solve(
     residuals: Function, jacobian: Function, start: Array, names: Sequence[str], scale: Array
 ) -> NonlinearFit:
-    """Minimise ``|residuals(x)|^2`` from ``start``.
+    """Minimise ``|residuals(x)|^2`` from ``start`` (p,) by SciPy's `least_squares`, MINPACK's Levenberg-Marquardt (More
+    1978).
 
-    Parameters
-    ----------
-    residuals : callable, (p,) -> (n,)
-        Whitened residuals, n >= p.
-    jacobian : callable, (p,) -> (n, p)
-        Their derivative.
-    start : (p,)
-        First guess.
-    names : sequence of str
-        Terms, for the words about conditioning.
-    scale : (p,)
-        Typical size of each parameter, for the solver and for the condition number.
-
-    Raises
-    ------
-    ValueError
-        Fewer residuals than parameters, or a scale that is not positive.
-
-    Notes
-    -----
-    SciPy's `least_squares` with MINPACK's Levenberg-Marquardt (More 1978) does the iteration.
+    ``residuals``, (p,) -> (n,), are whitened, n >= p; ``jacobian``, (p,) -> (n, p), is their derivative; ``names`` are
+    terms for the words about conditioning; ``scale`` (p,) is the typical size of each parameter, for the solver and the
+    condition number. Raises ValueError for fewer residuals than parameters, or a scale that is not positive.
     """
     from scipy.optimize import least_squares
 

@@ -98,10 +98,7 @@ class Noise:
 def noise_of(record: Record) -> Noise:
     """Allan deviations and noise coefficients of every channel of a record at rest that measures motion.
 
-    Raises
-    ------
-    RecordError
-        No such channel, hardly any samples, or time stamps that do not increase.
+    Raises `RecordError`: no such channel, hardly any samples, or time stamps that do not increase.
     """
     groups = _groups(record)
     noise_coefficients(allan_deviation(np.sin(np.arange(64.0) ** 2), 1.0))  # loads or compiles kernels

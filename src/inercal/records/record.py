@@ -132,10 +132,7 @@ def cut(
 ) -> tuple[dict[str, Column], tuple[str, ...]]:
     """Columns and labels from ``begin`` to ``end`` [s], both from the first stamp of each clock; None: all.
 
-    Raises
-    ------
-    InputError
-        Nothing lies within, or the rows of the recording have no time.
+    Raises `InputError` where nothing lies within, or the rows of the recording have no time.
     """
     if counted_rows(columns):
         raise InputError(WHERE, "found a recording whose rows have no time, expected one with a column t")
@@ -177,14 +174,9 @@ SIMULATED = Source("simulated", "")
 
 
 def record_of(columns: Iterable[tuple[str, Unit, Array]], t: Array, source: Source = SIMULATED) -> Record:
-    """A record of columns on one clock.
+    """A record of (name, unit, (n,) values in that unit) on one clock ``t`` (n,) [s].
 
-    Parameters
-    ----------
-    columns : iterable of (name, unit, (n,) values in that unit)
-    t : (n,) [s]
-    source : Source
-        What it says of where it comes from, in place of a file.
+    ``source`` says where it comes from, in place of a file.
     """
     made = {
         name: Column(name, unit, np.ascontiguousarray(values), t, source) for name, unit, values in columns

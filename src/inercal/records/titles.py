@@ -30,20 +30,9 @@ def name_and_unit(title: str) -> tuple[str, str | None]:
 def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -> tuple[Channel, ...]:
     """The channels among titled columns; columns of other names are none of ours.
 
-    Parameters
-    ----------
-    titles : iterable of (origin, title, unit)
-        Where a column is found, what it is called, and the unit stated beside it, if any; one in brackets
-        within the title wins.
-    where : object
-        Named in the errors.
-
-    Raises
-    ------
-    RecordError
-        A channel twice, without a unit, or with one that it cannot have; or no channel at all.
-    QuantityError
-        Something else than a unit.
+    ``titles`` are (origin, title, unit): where a column is found, what it is called, and the unit stated beside it, if
+    any; one in brackets within the title wins. Raises, naming ``where``, `RecordError` for a channel twice, without a
+    unit, or with one that it cannot have, or no channel at all, and `QuantityError` for something else than a unit.
     """
     channels: dict[str, Channel] = {}
     titles_read = []

@@ -31,22 +31,10 @@ def write_record(
 
     Values, units, time stamps and labels read back the same. HDF5 and NetCDF files hold columns of any number
     of clocks, ``t`` or ``t_<sensor>`` each, and as attributes the sources and findings of the record; the
-    others are tables, of one clock.
+    others are tables, of one clock. ``progress`` is told (rows done, rows in all) of a CSV file, the only slow one.
 
-    Parameters
-    ----------
-    record : Record
-        Its columns must have one clock between them for CSV, NPZ and Parquet.
-    path : str or Path
-    progress : callable, optional
-        Told (rows done, rows in all) of a CSV file, which is the only slow one.
-
-    Raises
-    ------
-    InputError
-        An unknown suffix, no columns, columns on different clocks, or a file that cannot be written.
-    MissingExtraError
-        Parquet, where pyarrow is not installed.
+    Raises `InputError` for an unknown suffix, no columns, columns on different clocks, or a file that cannot be
+    written, `MissingExtraError` for Parquet without pyarrow.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:

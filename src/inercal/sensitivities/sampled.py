@@ -71,10 +71,7 @@ def draw(
 def evaluate(function: Callable[[Array], ArrayLike], A: Array, B: Array) -> tuple[Array, Array, Array]:
     """Outputs (n, o) at A and B (n, k), and (k, n, o) at A with one column after the other taken from B.
 
-    Raises
-    ------
-    ValueError
-        Outputs that are not one row for each row of errors, or not finite.
+    Raises `ValueError`: outputs that are not one row for each row of errors, or not finite.
     """
 
     def outputs(errors: Array) -> Array:
@@ -97,16 +94,9 @@ def evaluate(function: Callable[[Array], ArrayLike], A: Array, B: Array) -> tupl
 def estimate(f_A: Array, f_B: Array, f_AB: Array, resamples: int, rng: np.random.Generator) -> Parts:
     """Saltelli's estimate of V_i and Jansen's of VT_i, and the same from resampled rows.
 
-    The outputs are centred first: a mean far from zero would drown the first order in noise. The bootstrap
-    takes the rows for independent: for Sobol points it states too much, up to some twenty times where the
-    outputs are almost linear.
-
-    Parameters
-    ----------
-    f_A, f_B : (n, o)
-    f_AB : (k, n, o)
-    resamples : int, 2 or more
-    rng : Generator, for the resampled rows
+    ``f_A``, ``f_B`` (n, o) and ``f_AB`` (k, n, o) are centred first: a mean far from zero would drown the first order
+    in noise. The bootstrap, of 2 ``resamples`` or more, takes the rows for independent: for Sobol points it states too
+    much, up to some twenty times where the outputs are almost linear.
     """
     n = len(f_A)
     mean = 0.5 * (f_A.mean(axis=0) + f_B.mean(axis=0))
@@ -150,26 +140,15 @@ def analyse(
     sampling: Sampling = "sobol",
     progress: Callable[[int, int], None] | None = None,
 ) -> Indices:
-    """Estimated indices of outputs of a rig, with rows drawn anew at each position.
+    """Estimated indices of outputs of a rig at ``angles`` (n, joints) [rad], with rows drawn anew at each position.
 
     Parameters
     ----------
-    chain : Chain
-    outputs : sequence of Output
-    angles : (n, joints) positions [rad]
-    samples : int
-        Rows of A and of B. With ``sampling = "sobol"`` rounded up to a power of two; `Indices.method` holds
-        both numbers.
-    rng : Generator
-    sampling : "random" or "sobol"
-        Plain random rows (the paper), or scrambled Sobol points.
+    samples : int, 2 or more
+        Rows of A and of B, rounded up to a power of two for ``sampling = "sobol"`` (scrambled Sobol points; "random"
+        are plain rows, as in the paper); `Indices.method` holds both numbers.
     progress : callable, optional
         Told the positions done and all of them.
-
-    Raises
-    ------
-    ValueError
-        Fewer than two samples.
     """
     positions = np.atleast_2d(np.asarray(angles, dtype=float))
     distributions = [error.distribution for error in chain.errors]

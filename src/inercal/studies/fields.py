@@ -52,16 +52,8 @@ class AsTyped:
 class QuantityText(AsTyped):
     """Makes a pydantic field read a quantity from its text: ``Annotated[Quantity, QuantityText("time")]``.
 
-    Parameters
-    ----------
-    dimension : str
-        Dimension, a key of the unit table: ``"time"``, ``"angle"``, ``"number"``, ...
-    example : str
-        A good value, shown in the JSON Schema.
-    accepts : callable
-        True for a value [SI] that makes sense.
-    expected : str
-        The same in words, for the error message: "a time above zero".
+    ``dimension`` is a key of the unit table, ``example`` a good value for the JSON Schema, ``accepts`` true for a value
+    [SI] that makes sense, and ``expected`` the same in words, for the error message: "a time above zero".
     """
 
     dimension: str
@@ -110,13 +102,7 @@ class Several:
 class SeveralTexts(AsTyped):
     """Makes a pydantic field read a list of quantities: ``Annotated[Several, SeveralTexts(each, "x, y, z")]``.
 
-    Parameters
-    ----------
-    each : QuantityText
-    of : str
-        Their names in order, parted by commas: as many are expected.
-    one : bool
-        True if a single text may stand for all.
+    As many are expected as there are names in ``of``, parted by commas; ``one``: a single text may stand for all.
     """
 
     each: QuantityText

@@ -75,10 +75,7 @@ class AidedTable(Strict):
 def aided_settings(table: AidedTable, where: object) -> AidedSettings:
     """Put the table in SI.
 
-    Raises
-    ------
-    StudyError
-        An error that this kind of table does not have, or one without any distribution.
+    Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
     """
     azimuth = table.rig.base.azimuth
     chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")

@@ -115,10 +115,7 @@ def base_of(table: GimbalsTable) -> Base:
 def limits_of(table: GimbalsTable, where: object) -> dict[str, tuple[float, float]]:
     """Allowed range (low, high) [rad] of the gimbal angles that have one, by name.
 
-    Raises
-    ------
-    StudyError
-        Ends out of order.
+    Raises `StudyError` for ends out of order.
     """
     limits: dict[str, tuple[float, float]] = {}
     for name, joint in zip(JOINTS, GimbalLimitsTable.model_fields, strict=True):
@@ -206,12 +203,9 @@ class PlanTable(Strict):
 
 
 def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
-    """The plan.
+    """The plan; its angles within the ``limits`` [rad].
 
-    Raises
-    ------
-    StudyError
-        Neither or both of turns and path, too few or too many rows, or angles beyond the ``limits`` [rad].
+    Raises `StudyError` for neither or both of turns and path, too few or too many rows, or angles beyond the limits.
     """
     match table:
         case PlanTable(turns=None, path=str(name)):

@@ -72,10 +72,8 @@ def custom_chain(
 ) -> Chain:
     """The chain of a study, its known attitude of the base [rad] before it, the instrument's ``mounting`` after it.
 
-    Raises
-    ------
-    StudyError
-        No joint, joints that are not phi1, phi2, phi3 in order, an error without a distribution, a name twice.
+    Raises `StudyError` for no joint, joints that are not phi1, phi2, phi3 in order, an error without a distribution, a
+    name twice.
     """
     joints = [element.joint for element in elements if element.joint is not None]
     if not joints or joints != list(JOINTS[: len(joints)]):
@@ -250,12 +248,8 @@ def chain_of(
 ) -> Chain:
     """The chain of a table with the errors that are given for it, and an instrument ``mounting`` (3, 3) on it.
 
-    ``key`` is that of the table in the study, for errors.
-
-    Raises
-    ------
-    StudyError
-        An error that this kind of table does not have, or one without any distribution.
+    Raises `StudyError`, with the ``key`` of the table in the study, for an error that this kind of table does not have,
+    or one without any distribution.
     """
     angles = (table.base.azimuth, table.base.tilt_north, table.base.tilt_west)
     base = [0.0 if angle is None else angle.value for angle in angles]
@@ -321,10 +315,7 @@ def _after_joint(kind: str) -> frozenset[str]:
 def limits_of(table: RigTable, chain: Chain, where: object) -> dict[str, tuple[float, float]]:
     """Allowed range (low, high) [rad] of the joints that have one.
 
-    Raises
-    ------
-    StudyError
-        Limits of a joint the table does not have, or ends out of order.
+    Raises `StudyError` for limits of a joint the table does not have, or ends out of order.
     """
     limits = {}
     for joint in LimitsTable.model_fields:

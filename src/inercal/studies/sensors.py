@@ -202,10 +202,8 @@ def layout_of(table: SensorsTable) -> Layout:
 def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, Calibration]:
     """The calibration of each sensor that the study names.
 
-    Raises
-    ------
-    StudyError
-        A bias that is none of this sensor, a calibration that cannot be read or does not hold the sensor.
+    Raises `StudyError` for a bias that is none of this sensor, a calibration that cannot be read or does not hold the
+    sensor.
     """
     return {
         name: _calibration(name, one, where)

@@ -159,20 +159,13 @@ def template(
 
     Parameters
     ----------
-    kind : str
-    record_paths : sequence of str or Path
-        The recordings that the next command in the header names.
-    study_path, map_path : str or Path
-        The study and, if there is one, the column map that it names.
+    record_paths, study_path, map_path
+        Files that the next command in the header names; no map if there is none.
     channels : mapping
         Those of the recordings with their units, where known: they tell the method and the kind of instrument.
     overrides : iterable of str
-        Keys to state, as in `inercal.studies.load.load_imu_study`.
-
-    Raises
-    ------
-    StudyError
-        A key that the study does not have, or a value that it cannot have.
+        Keys to state, as in `inercal.studies.load.load_imu_study`; raises `StudyError` for one that the study cannot
+        have.
     """
     given = channels or {}
     study = _starting(kind, given)

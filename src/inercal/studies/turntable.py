@@ -85,10 +85,8 @@ class TableDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
 def disturbances_of(table: Any, unit: Unit, chain: Chain, where: object) -> Disturbances:
     """The disturbances in SI; those of outputs in the SI unit of ``unit``.
 
-    Raises
-    ------
-    StudyError
-        A quantity of another kind than the outputs, a size below zero, or a joint that the table does not have.
+    Raises `StudyError` for a quantity of another kind than the outputs, a size below zero, or a joint that the table
+    does not have.
     """
     of_outputs = {}
     for key in _OF_OUTPUTS:

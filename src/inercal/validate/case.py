@@ -77,20 +77,9 @@ def study_of(name: str) -> Path:
 class Case:
     """One comparison.
 
-    Attributes
-    ----------
-    name
-        Short, of small letters, digits and hyphens.
-    shows
-        What a pass says, in a sentence without a full stop.
-    source
-        Where the expected numbers are from: a key of `SOURCES`.
-    expected, limit
-        The numbers (n,) and the largest difference allowed (n,), or one number for all of them.
-    find
-        The numbers (n,) as the package has them.
-    unit
-        Of the numbers; empty where they have none.
+    ``name`` is short, of small letters, digits and hyphens; ``shows`` says what a pass says, in a sentence without a
+    full stop; ``source`` is a key of `SOURCES`. The numbers ``expected`` (n,) may be off by ``limit`` (n,), or one
+    number for all; ``find`` gives them as the package has them, in ``unit``.
     """
 
     name: str

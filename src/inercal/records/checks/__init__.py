@@ -35,12 +35,9 @@ _MEASURED = re.compile(r"acc_[xyz]|a\d+|gyro\w*|y_[xy]|temperature")
 
 
 def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
-    """Everything suspicious about the columns of a record, apart from what their readers have said.
+    """Everything suspicious about the ``columns`` of a record, by name, apart from what their readers have said.
 
-    Parameters
-    ----------
-    columns : mapping of str to Column
-        Those of a record, by name; each time axis they share is looked at once.
+    Each time axis that they share is looked at once.
     """
     clocks = {id(column.t): column for column in columns.values()}
     sampled = not of_a_table(columns)

@@ -158,10 +158,7 @@ def is_rounded(text: str, value: float) -> bool:
 def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layout:
     """Find out from the first lines of a file what ``options`` leave open.
 
-    Raises
-    ------
-    RecordError
-        There are no rows, or the header does not fit them.
+    Raises `RecordError` where there are no rows, or the header does not fit them.
     """
     comments = comment_marks(options)
     written = (
