@@ -17,9 +17,9 @@ from inercal.studies.aoa import aoa_study
 from inercal.studies.imu import imu_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
+from inercal.studies.starting import PATHS, POSITIONS
 from inercal.studies.template import template
 from inercal.studies.turntable import turntable_study
-from inercal.studies.ways import PATHS, POSITIONS
 from inercal.units import parse_unit
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")

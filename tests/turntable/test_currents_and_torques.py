@@ -12,7 +12,7 @@ from inercal.errors import StudyError
 from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.records.channels import misfit
-from inercal.records.made import record_of
+from inercal.records.record import record_of
 from inercal.rigs.plans import grid
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.positions.calibration import calibrate_positions

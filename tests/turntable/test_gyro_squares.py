@@ -11,7 +11,7 @@ from inercal.convert.models import model_of
 from inercal.errors import StudyError
 from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
-from inercal.records.made import record_of
+from inercal.records.record import record_of
 from inercal.rigs.plans import grid
 from inercal.studies.load import load_turntable_study
 from inercal.turntable.positions.calibration import calibrate_positions

@@ -1,11 +1,13 @@
-"""``inercal calibrate``."""
+"""``inercal calibrate`` and ``inercal temperature``."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from inercal.cli.options import (
     MapFile,
@@ -14,10 +16,15 @@ from inercal.cli.options import (
     RunFiles,
     Span,
     StudyFile,
+    read_record,
     read_repeats,
     working,
 )
 from inercal.cli.outcome import WHOLE, give
+from inercal.errors import InputError
+
+if TYPE_CHECKING:
+    from inercal.imu.temperature.model import TemperatureModel
 
 
 def calibrate_imu(
@@ -75,3 +82,50 @@ def _calibrated(
     with working(output) as progress:
         result = system.calibrate(records, the_study, progress=progress)
     return give(result, output, read_s)
+
+
+def temperature(
+    files: Annotated[
+        list[Path], Parameter(help="A static recording over a sweep, or calibrations (.json, .toml).")
+    ],
+    /,
+    *,
+    map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
+    at: Annotated[
+        str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
+    ] = "25 degC",
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Fit what a sensor's output or its calibration does with temperature."""
+    from dataclasses import replace
+
+    from inercal.face.imu import of_temperature
+    from inercal.units import parse_quantity
+
+    reference = parse_quantity(at, "temperature", "--at").value
+    output.check(WHOLE, (*files, map_file))
+    clock = time.perf_counter()
+    if all(file.suffix.lower() in WHOLE for file in files):
+        if map_file is not None:
+            raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
+        span.refuse("calibrations")
+        model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
+    else:
+        from inercal.imu.temperature.sweep import fit_recording
+
+        record = read_record(files, map_file, output, span)
+        read_s = time.perf_counter() - clock
+        model = fit_recording(record, reference)
+    solve_s = time.perf_counter() - clock - read_s
+    result = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
+    return give(result, output, read_s, "temperature model")
+
+
+def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
+    """The model of saved calibrations, in the order given."""
+    from inercal.estimate.files import load
+    from inercal.imu.temperature.calibrations import fit_calibrations
+    from inercal.records.read import source_of
+
+    return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)

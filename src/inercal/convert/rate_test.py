@@ -90,10 +90,7 @@ class RateGyros:
 def rate_gyros(estimate: Estimate, where: object = "calibration") -> RateGyros:
     """The gyros of an estimate of a rate test.
 
-    Raises
-    ------
-    InputError
-        The estimate has no values or no unit, or a scale factor is 0.
+    Raises `InputError`: the estimate has no values or no unit, or a scale factor is 0.
     """
     values = {name: each.value for name, each in estimate.parameters.items()}
     axes = "".join(axis for axis in "xyz" if f"S_{axis}" in values)

@@ -93,24 +93,12 @@ def _welch(weights: Array, squares: float, dof: Array) -> float:
 
 
 def combine_runs(runs: Sequence[Estimate]) -> Estimate:
-    """Combine estimates of the same coefficients from independent runs.
+    """Combine estimates of the same coefficients from independent runs, two at least.
 
-    Parameters
-    ----------
-    runs : sequence of Estimate, at least two
-        Runs whose status is neither ok nor suspect are left out and give the status of the whole.
-
-    Returns
-    -------
-    Estimate
-        Its ``result`` holds ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones)
-        and ``between`` (standard deviation from run to run and its probability by chance), and what is the same in
-        the results of all.
-
-    Raises
-    ------
-    InputError
-        The runs have other coefficients or units than the first.
+    Runs whose status is neither ok nor suspect are left out and give the status of the whole. The ``result`` holds
+    ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones) and ``between`` (standard
+    deviation from run to run and its probability by chance), and what is the same in the results of all. Raises
+    `InputError` where runs have other coefficients or units than the first.
     """
     sound = [run for run in runs if run.status.done]
     bad = next((run for run in runs if not run.status.done), None)

@@ -29,7 +29,7 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
     from inercal.estimate.repeat import combine_runs
-    from inercal.face.runs import calibrations, of_files, with_span
+    from inercal.face.study import calibrations, of_files, with_span
     from inercal.imu.task import calibrate_files, in_order
 
     if in_order(study.settings):

@@ -16,8 +16,8 @@ from inercal.inputs import Source
 from inercal.records.channels import is_channel, misfit, nearest, needs_unit
 from inercal.records.checks import check
 from inercal.records.column import Column
-from inercal.records.read.canonical import titled
 from inercal.records.record import Record
+from inercal.records.titles import name_and_unit
 from inercal.units import Unit, parse_quantity, parse_unit
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def _of_table(table: Any) -> Iterator[tuple[str, ArrayLike, str | None]]:
         raise RecordError("record", f"found {kind}, expected a DataFrame, a Dataset, or arrays by keyword")
     numeric = 0
     for title in table.keys():  # noqa: SIM118  (of a DataFrame too)
-        name, unit = titled(str(title))
+        name, unit = name_and_unit(str(title))
         if is_channel(name) or _is_triad(name):
             numeric += 1
             yield name, np.asarray(table[title]), unit

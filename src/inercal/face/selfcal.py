@@ -11,8 +11,7 @@ import numpy as np
 from inercal.errors import InputError
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, designed_by, with_span
-from inercal.face.study import Study
+from inercal.face.study import Progress, Study, calibrations, designed_by, with_span
 from inercal.records.record import Record
 from inercal.selfcal import task
 

@@ -11,8 +11,7 @@ import numpy as np
 from inercal.estimate.result import without_coefficients
 from inercal.face.imu import of_coefficients
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, designed_by
-from inercal.face.study import Study
+from inercal.face.study import Progress, Study, calibrations, designed_by
 from inercal.records.record import Record
 from inercal.turntable import task
 
@@ -49,7 +48,7 @@ def calibrate(
 def _combined(calibrated: Sequence[Any], first: Record) -> Result:
     """The result of repeat runs."""
     from inercal.estimate.repeat import combine_runs
-    from inercal.face.runs import with_span
+    from inercal.face.study import with_span
     from inercal.turntable.display import displayed
 
     estimate = with_span(combine_runs([each.estimate for each in calibrated]), first)

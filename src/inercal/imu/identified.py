@@ -6,7 +6,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import WORST_BY_SIZE
-from inercal.estimate.nonlinear import NonlinearFit
+from inercal.estimate.least_squares import NonlinearFit
 from inercal.estimate.rounding import rounded
 from inercal.findings import Status
 from inercal.imu.limits import LIMITS

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import StudyError
-from inercal.estimate.suspicion import judged
+from inercal.estimate.result import judged
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.settings import (

@@ -21,8 +21,7 @@ from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
 from inercal.noise.rest import Unrest, unrest
-from inercal.records.clocks import usable_interval
-from inercal.records.column import Column
+from inercal.records.column import Column, usable_interval
 from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.units import RAW
@@ -100,10 +99,7 @@ class Noise:
 def noise_of(record: Record) -> Noise:
     """Allan deviations and noise coefficients of every channel of a record at rest that measures motion.
 
-    Raises
-    ------
-    RecordError
-        No such channel, hardly any samples, or time stamps that do not increase.
+    Raises `RecordError`: no such channel, hardly any samples, or time stamps that do not increase.
     """
     groups = _groups(record)
     noise_coefficients(allan_deviation(np.sin(np.arange(64.0) ** 2), 1.0))  # loads or compiles kernels

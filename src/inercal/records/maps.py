@@ -181,17 +181,9 @@ class RecordMap:
 
 
 def read_map(path: str | Path) -> RecordMap:
-    """Read a column map.
+    """Read a column map, a TOML file as in the reference of records.
 
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file as in the reference of records.
-
-    Raises
-    ------
-    MapError
-        Naming the key, what was found and what was expected.
+    Raises `MapError`, naming the key, what was found and what was expected.
     """
     data = read_toml(path, MapError)
     if data.keys() & {"site", "rig", "imu"} and not data.keys() & {"columns", "file"}:

@@ -10,18 +10,22 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from inercal._toml import Strict, check
-from inercal.errors import StudyError
+from inercal.errors import QuantityError, StudyError
+from inercal.imu.ferraris.names import NAMES
 from inercal.imu.settings import (
     TILT,
     TURN,
+    AidedSettings,
     Disturbances,
     Exclusion,
+    FerrarisSettings,
     ImuSettings,
     KnownRatesSettings,
     KnownTurnsSettings,
     MeansSettings,
     Method,
     Simulation,
+    mounting_of,
 )
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.studies.common import (
@@ -34,11 +38,132 @@ from inercal.studies.common import (
     site_of,
 )
 from inercal.studies.fields import QuantityText, refusal
-from inercal.studies.imu_aided import AidedTable, aided_settings
-from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
+from inercal.studies.rig import RigTable, chain_of
 from inercal.studies.tables import as_typed, settings_of, table_of
-from inercal.units import Quantity, parse_unit, shown
+from inercal.units import Quantity, parse_quantity, parse_unit, shown
+
+SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+class AidedTable(Strict):
+    """Reference-aided calibration: the table, and the instrument on it."""
+
+    rig: RigTable = Field(
+        default=RigTable(kind="two_axis_turntable"),
+        title="Rig",
+        description="the table, as in a study of a turntable; of two axes and without errors if absent, "
+        "its azimuth unknown unless given",
+    )
+    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = Field(
+        default=("+x", "+y", "+z"),
+        examples=[["+x", "+y", "+z"]],
+        description="axes of the table, at zero angles, along which the instrument's x, y and z point",
+    )
+
+    @model_validator(mode="after")
+    def _right_handed(self) -> AidedTable:
+        """Refuse axes that make no frame."""
+        if mounting_of(self.mounting) is None:
+            raise refusal(
+                f"found the mounting {', '.join(self.mounting)}, expected three axes that make a right-handed frame"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _no_limits(self) -> AidedTable:
+        """Refuse what would change nothing."""
+        if self.rig.limits.model_fields_set:
+            raise refusal("found rig.limits, expected none: the angles are those of the record")
+        return self
+
+
+def aided_settings(table: AidedTable, where: object) -> AidedSettings:
+    """Put the table in SI.
+
+    Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
+    """
+    azimuth = table.rig.base.azimuth
+    chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")
+    return AidedSettings(chain, None if azimuth is None else azimuth.u)
+
+
+_EXPECTED = (
+    'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a '
+    "label"
+)
+
+
+def _ends(value: object) -> object:
+    """A section: two times, two sample numbers, or the label of its rows."""
+    match value:
+        case str() if value.strip():
+            return value
+        case [int(start), int(end)] if not isinstance(start, bool) and not isinstance(end, bool):
+            if 0 <= start < end - 1:
+                return value
+        case [str(start), str(end)]:
+            begin, stop = seconds_of(start), seconds_of(end)
+            if begin < stop:
+                return value
+    raise refusal(f"found {shown(value)}, {_EXPECTED}, the end after the start")
+
+
+def seconds_of(text: str) -> float:
+    """A time [s]."""
+    try:
+        return parse_quantity(text, "time", "time").value
+    except QuantityError as error:
+        raise refusal(error.message) from error
+
+
+_Ends = Field(min_length=2, max_length=2)
+
+Section = Annotated[
+    Annotated[list[str], _Ends] | Annotated[list[int], _Ends] | str,
+    BeforeValidator(_ends),
+    Field(examples=[["5.2 s", "12.4 s"], [540, 1271], "X up"]),
+]
+
+
+class SectionsTable(Strict):
+    """Places of the sections: times of the record's time axis, samples from 0, the end not included, or labels."""
+
+    x_p: Section | None = Field(default=None, description="+x up: accelerometer x reads +g")
+    x_a: Section | None = Field(default=None, description="-x up: accelerometer x reads -g")
+    y_p: Section | None = Field(default=None, description="+y up: accelerometer y reads +g")
+    y_a: Section | None = Field(default=None, description="-y up: accelerometer y reads -g")
+    z_p: Section | None = Field(default=None, description="+z up: accelerometer z reads +g")
+    z_a: Section | None = Field(default=None, description="-z up: accelerometer z reads -g")
+    x_rot: Section | None = Field(default=None, description="the turn about x, from rest to rest")
+    y_rot: Section | None = Field(default=None, description="the turn about y, from rest to rest")
+    z_rot: Section | None = Field(default=None, description="the turn about z, from rest to rest")
+
+
+class FerrarisTable(table_of(FerrarisSettings)):  # type: ignore[misc]
+    """Options of the Ferraris calibration: six positions, each axis up and down, and a turn about each axis."""
+
+    sections: SectionsTable = Field(
+        default=SectionsTable(),
+        title="Sections",
+        description="where the sections are; by the labels of the record if absent, or else detected",
+    )
+
+
+def ferraris_settings(table: FerrarisTable) -> FerrarisSettings:
+    """The options in SI."""
+    given = {name: ends for name in NAMES if (ends := getattr(table.sections, name)) is not None}
+    sections = {name: _span(ends) for name, ends in given.items()}
+    return settings_of(FerrarisSettings, table, sections=sections)
+
+
+def _span(ends: list[str] | list[int] | str) -> tuple[float, float] | str:
+    """A section as the settings have it: seconds, samples or a label."""
+    if isinstance(ends, str):
+        return ends
+    start, end = (seconds_of(each) if isinstance(each, str) else each for each in ends)
+    return start, end
+
 
 #: keys that not all methods heed -> those that do
 _METHODS = {

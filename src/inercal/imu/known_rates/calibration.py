@@ -27,8 +27,7 @@ from inercal.imu.recording import unit_words
 from inercal.imu.settings import COMMAND, ImuSettings, KnownRatesSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 MODEL = (
     "y = S T omega + b, S = diag(S), T = 1 + misalignment (upper-triangular; T_ij: response of "

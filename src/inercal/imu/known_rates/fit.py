@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import identify
-from inercal.estimate.linear import whiten
-from inercal.estimate.nonlinear import NonlinearFit
+from inercal.estimate.least_squares import NonlinearFit, whiten
 from inercal.imu.known_rates.vector_sizes import SizeFit, fit_sizes, residual_rows
 from inercal.imu.limits import LIMITS
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability
-from inercal.estimate.linear import whiten
-from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.estimate.least_squares import NonlinearFit, solve, whiten
 from inercal.imu.limits import LIMITS
 from inercal.instruments.triad import TriadModel
 

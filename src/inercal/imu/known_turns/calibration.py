@@ -28,8 +28,7 @@ from inercal.instruments.terms import GYRO_TRIAD, TERMS
 from inercal.instruments.triad import TriadModel
 from inercal.noise.dwell_means import AllanFit
 from inercal.records.column import Triad
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 MODEL = (
     "y = S T omega + b, S = diag(S), T = 1 + misalignment (full; T_ij: response of gyro i to rate about j), b = D_F. "

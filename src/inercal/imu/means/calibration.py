@@ -33,8 +33,7 @@ from inercal.imu.rows import rows_of
 from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted, counted_names
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 MODEL = (
     "y = S (l + K2 l^2) + b, l = M f along the input axes, S = diag(K1), M = 1 + misalignment (upper-triangular; M_ij: "

@@ -19,8 +19,8 @@ from inercal.errors import InercalError, RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel
 from inercal.records.checks import missing, too_long
-from inercal.records.read.canonical import bare, canonical
 from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
+from inercal.records.titles import bare, canonical
 from inercal.units import parse_unit
 
 _LISTED = 20

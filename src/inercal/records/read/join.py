@@ -40,14 +40,8 @@ def joined(
 ) -> dict[str, Column]:
     """Columns by name, sign, scale and unit applied; tables whose time stamps are equal share one time axis.
 
-    ``counted``: rows without times are counted, as means of poses.
-
-    Raises
-    ------
-    MapError
-        A mapped column is in none of the files.
-    RecordError
-        Two files hold the same channel, or a file has no time axis.
+    ``counted``: rows without times are counted, as means of poses. Raises `MapError` where a mapped column is in none
+    of the files, `RecordError` where two files hold the same channel, or one has no time axis.
     """
     if record_map is not None:
         check_present(files, record_map.path)

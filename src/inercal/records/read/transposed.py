@@ -10,8 +10,7 @@ import numpy as np
 from inercal.errors import RecordError
 from inercal.records.channels import Channel
 from inercal.records.read.arrays import Contents, held, tables
-from inercal.records.read.layout import find_layout
-from inercal.records.read.lines import blocks
+from inercal.records.read.layout import blocks, find_layout
 from inercal.records.read.table import FileOptions, Table
 
 

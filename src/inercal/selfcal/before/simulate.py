@@ -8,8 +8,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import all_angles, attitude
 from inercal.selfcal.platform.model import Truth, simulate_truth

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.estimate.least_squares import NonlinearFit, solve
 from inercal.geometry.rotations import (
     boxminus,
     boxplus,

@@ -18,8 +18,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.inputs import Source
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import divisor, names, units
 from inercal.selfcal.platform.kinematics import all_angles

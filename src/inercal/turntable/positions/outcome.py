@@ -18,8 +18,7 @@ from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 from inercal.rigs.chain import Scope
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal

@@ -13,8 +13,7 @@ from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME
 from inercal.turntable.positions.outcome import COMMAND, of_site, unit_of_term

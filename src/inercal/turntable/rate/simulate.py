@@ -8,8 +8,7 @@ from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
 from inercal.instruments.terms import TERMS
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.rigs.chain import Chain, follows_angle
 from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.turntable.disturbances import displaced, disturbed
