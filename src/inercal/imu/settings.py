@@ -115,7 +115,6 @@ Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRate
 """Options of a method other than multi-position."""
 
 
-@short_repr
 @dataclass(frozen=True)
 class Simulation:
     """A simulated recording: the instrument lies still, then is turned from pose to pose by hand.
@@ -175,6 +174,7 @@ class Exclusion:
         return any(begin < last and first < end for first, last in self.times)
 
 
+@short_repr
 @dataclass(frozen=True)
 class ImuSettings:
     """Settings of a calibration, in SI.

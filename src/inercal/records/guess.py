@@ -63,7 +63,8 @@ def guess_map(
 
     ``rate`` is the sample rate, as text with its unit, where there is no time column. The map is TOML that reads these
     files, with a comment on each guess and on columns not used. Where no sensor was recognised, there are only
-    comments, to write the map by. Raises `RecordError` where a file cannot be read, or nothing in it looks like a channel.
+    comments, to write the map by. Raises `RecordError` where a file cannot be read, or nothing in it looks like a
+    channel.
     """
     files: list[_File] = []
     for path in [paths] if isinstance(paths, str | Path) else paths:
