@@ -100,6 +100,14 @@ def test_counts_need_the_scale_factor_and_a_gyro_without_one_is_left_out():
     )
 
 
+def test_without_the_angle_of_the_turning_axis_the_earth_is_not_known_across_it():
+    whole = record(readings(np.random.default_rng(1)))
+    blind = replace(whole, columns={name: each for name, each in whole.columns.items() if name != "phi2"})
+    found = calibrate(blind, settings()).estimate
+    assert "T_xz" not in found.names
+    assert "with the angle phi2 where each stay begins its T_xz is found" in found.findings[0].message
+
+
 def test_u_is_that_of_mounting_wobble_scale_factor_and_rate_written_out():
     """T is off by the mounting about the other axis, by wobble / sqrt(its weights), by (T - mounting) u(S)/S."""
     y = readings(np.random.default_rng(1))

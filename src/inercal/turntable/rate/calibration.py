@@ -84,12 +84,13 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             text = f"{channel} reads the same at all rates and is left out: is it dead?"
             findings.append(Finding("dead_channel", text, harm=()))
             continue
-        if about and instrument.coefficients.get(S):
+        wanted = [] if instrument.coefficients.get(S) else [f"{S} under [instrument.coefficients]"]
+        if readings.assumed:
+            wanted.append(f"the angle {test.joint} where each stay begins")
+        if about and not wanted:
             across.append(channel)
             continue
-        hint = (
-            f": with {S} under [instrument.coefficients] its T_{channel[-1]}{about} is found" if about else ""
-        )
+        hint = f": with {' and '.join(wanted)} its T_{channel[-1]}{about} is found" if about else ""
         text = f"{channel} lies across the turning axis {test.joint} and is left out{hint}"
         findings.append(Finding("weak_term", text))
 
