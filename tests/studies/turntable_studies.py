@@ -113,3 +113,8 @@ def wheel_output(axis, c, a, w):
     for first, second in ("XX", "YY", "ZZ", "XY", "XZ", "YZ"):
         drift = drift + c.get(f"{D}_{first}{second}", 0.0) * a["XYZ".index(first)] * a["XYZ".index(second)]
     return drift + sum(c[f"{k}_{i}"] * w[j] for j, i in enumerate("xyz"))
+
+
+def codes_of(estimate):
+    """Codes of the findings but that of faults that no test would show, which most plans have."""
+    return [finding.code for finding in estimate.findings if finding.code != "weak_test"]

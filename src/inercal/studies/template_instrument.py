@@ -78,6 +78,7 @@ def instrument_lines(channels: Mapping[str, Unit | None]) -> str:
         _example(*terms),
         example(*noise) if not raw else _example(*noise[:2], "of a reading; from the scatter if absent"),
         _example("dwell", '"60 s"', "time in each position [s]"),
+        _example("bias_drift", '"linear"', "that is fitted: or exponential, random_walk; none if absent"),
         _example("sample_rate", '"10 Hz"', "of a simulated recording [Hz]; one row a position if absent"),
     ]
     if kind in _RESPONSE:
