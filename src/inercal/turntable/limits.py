@@ -70,6 +70,10 @@ class Limits:
     turning_cosine: float = 0.1
     """Cosine of turning axis and gyro axis below which a gyro takes no part in a rate test."""
 
+    across_cosine: float = 1e-3
+    """Cosine of turning axis and a gyro axis below which the gyro lies across: of a misalignment of 10 mrad towards a
+    third axis 2 arcsec pass for one towards the turning axis."""
+
     scatter_dof: int = 3
     """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""
 

@@ -23,7 +23,8 @@ from inercal.turntable.settings import RateTest, TurntableSettings
 
 MODEL = (
     "y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3), x the rate about the gyro's axis: the table's rate times the "
-    "cosine of the axes, and the mean of earth rate over the stay; D_F holds what gravity does at this attitude"
+    "cosine of the axes, and the mean of earth rate over the stay; D_F holds what gravity does at this attitude; of a "
+    "gyro i across the turning axis k: y = D_F + S (x + T_ik w_k), S as stated"
 )
 
 REFERENCES = (
@@ -53,7 +54,7 @@ def assemble(
     u = uncertainty.u
     status = Status.OK
     message = f"{counted(len(names), 'term')} from {counted(len(dwells.rate), 'stay')} at rates"
-    for fit in fits:
+    for fit in (each for each in fits if f"S_{each.axis}" in names):
         k = names.index(f"S_{fit.axis}")
         if abs(values[k]) < LIMITS.scale_sigmas * u[k]:
             status = Status.INCONSISTENT
