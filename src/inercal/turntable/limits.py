@@ -41,7 +41,7 @@ class Limits:
     harmful_shift: float = 0.5
     """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
 
-    blind_shift: float = 1.5
+    blind_shift: float = 1.2
     """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
     the test would not show it."""
 
