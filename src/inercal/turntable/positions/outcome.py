@@ -25,7 +25,7 @@ from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.positions.drift import Drift
 from inercal.turntable.positions.examination import examine
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
-from inercal.turntable.positions.latitude import second_order
+from inercal.turntable.positions.latitude import second_order, stated_exact
 from inercal.turntable.positions.shifts import Scale, doubts, findings_of
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
@@ -144,6 +144,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     if not large:  # squares of table errors would be taken for faults
         examination = examine(readings, fit, [settings.instrument.noise] * len(readings.channels))
         scale = Scale(names, terms.slope, uncertainty.u)
+        findings += stated_exact(fit, settings.site, scale)
         findings += findings_of(examination, fit, scale, readings.unit)
         uncertainty = combine(names, [*told, *doubts(examination, fit, scale, readings.unit)])
     uncertainty = uncertainty._replace(common=None)
