@@ -60,6 +60,8 @@ CODES: dict[str, Code] = {
     "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),
     "bias_drift": Code("a bias drifts over the recording", _BY_SIZE),
     "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
+    "several_instruments": Code("repeat runs look like runs of different instruments", _ALWAYS),
+    "rate_suspect": Code("a stated rate of a table does not fit the others", _BY_SIZE),
     "rate_without_u": Code("a sample rate was typed without an uncertainty", _BY_SIZE),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),

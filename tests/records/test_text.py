@@ -247,7 +247,8 @@ def test_of_many_strange_columns_whole_names_are_said(tmp_path):
     names = [f"Drehrate {i} [mdeg/s]" for i in range(12)]
     path = written(tmp_path / "a.csv", ";".join(names) + "\n" + ";".join("1" * 12) + "\n")
     said = (
-        r"Drehrate 7 \[mdeg/s\] and 4 more, expected known ones .* or a map \(`inercal new imu` writes one\)"
+        r"Drehrate 7 \[mdeg/s\] and 4 more, expected known ones .* or a map "
+        r"\(`inercal new` imu, turntable, selfcal or aoa writes one\)"
     )
     with pytest.raises(RecordError, match=said):
         read(path)

@@ -132,6 +132,10 @@ def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
     for other in INSTEAD.get(table, ()) if key in INSTEAD.get(table, ()) else ():
         place.pop(other, None)
     place |= tomllib.loads(line.removeprefix("# "))
+    if (table, key) == ("imu", "rates"):
+        place["method"] = "known_rates"
+    if (table, key) in (("imu", "turns"), ("imu", "alignment")):
+        place |= {"method": "known_turns", "turns": dict.fromkeys("xyz", "360 deg")}
     if key == "channel":
         place["calibration"] = "calibration.json"
     if key == "clip":

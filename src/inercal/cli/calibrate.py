@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from inercal.cli.options import (
     MapFile,
@@ -19,9 +19,6 @@ from inercal.cli.options import (
 )
 from inercal.cli.outcome import WHOLE, give
 
-if TYPE_CHECKING:
-    from inercal.records.record import Record
-
 
 def calibrate_imu(
     files: RunFiles,
@@ -34,7 +31,9 @@ def calibrate_imu(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
-    return _calibrated("imu", files, study, map_file, span, overrides, output, read_repeats)
+    from inercal.imu.task import in_rows
+
+    return _calibrated("imu", files, study, map_file, span, overrides, output, in_rows)
 
 
 def calibrate_turntable(
@@ -48,7 +47,7 @@ def calibrate_turntable(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
-    return _calibrated("turntable", files, study, map_file, span, overrides, output, read_repeats)
+    return _calibrated("turntable", files, study, map_file, span, overrides, output)
 
 
 def _calibrated(
@@ -59,9 +58,9 @@ def _calibrated(
     span: Span,
     overrides: list[str] | None,
     output: ReportOutput,
-    read: Callable[[Sequence[Path], Path | None, ReportOutput, Span], list[Record]],
+    in_rows: Callable[[Any], bool] = lambda _: False,
 ) -> int:
-    """Read study and records, calibrate, and hand over."""
+    """Read study and records, calibrate, and hand over; ``in_rows`` of the settings: the rows need no times."""
     from importlib import import_module
 
     from inercal.face.study import read_study
@@ -70,7 +69,7 @@ def _calibrated(
     the_study = read_study(kind, study, overrides or ())
     output.spare(the_study.files)
     clock = time.perf_counter()
-    records = read(files, map_file, output, span)
+    records = read_repeats(files, map_file, output, span, in_rows(the_study.settings))
     read_s = time.perf_counter() - clock
     system = import_module(f"inercal.face.{kind}")
     with working(output) as progress:

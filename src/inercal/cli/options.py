@@ -200,16 +200,23 @@ def read_record(
 
 
 def read_repeats(
-    files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
+    files: Sequence[Path],
+    map_file: Path | None,
+    output: FileOutput,
+    span: Span = Span(),
+    counted: bool = False,
 ) -> list[Record]:
-    """As `read_record`, but files with the same channels are the records of repeat runs."""
+    """As `read_record`, but files with the same channels are the records of repeat runs.
+
+    ``counted``: rows need no times, as means of poses.
+    """
     from inercal.records.maps import read_map
     from inercal.records.read import read_runs
 
     span.check()
     record_map = None if map_file is None else read_map(map_file)
     with reading(output) as progress:
-        records = read_runs(files, record_map, progress)
+        records = read_runs(files, record_map, progress, counted)
     output.spare(source.path for record in records for source in record.sources)
     return [span.of(record) for record in records]
 

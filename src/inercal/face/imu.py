@@ -29,9 +29,13 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
     from inercal.estimate.repeat import combine_runs
-    from inercal.face.runs import calibrations, with_span
+    from inercal.face.runs import calibrations, of_files, with_span
+    from inercal.imu.task import calibrate_files, in_order
 
-    calibrated = calibrations(records, study, progress, calibrate_run)
+    if in_order(study.settings):
+        calibrated = [of_files(records, study, progress, calibrate_files)]
+    else:
+        calibrated = calibrations(records, study, progress, calibrate_run)
     runs = [each.estimate for each in calibrated]
     estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
     shown = estimate.shown()

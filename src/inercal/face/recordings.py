@@ -37,6 +37,7 @@ def read(
     *,
     begin: str | float | None = None,
     end: str | float | None = None,
+    counted: bool = False,
 ) -> Record:
     """Read one or several files into a record, with findings about whatever is suspicious.
 
@@ -50,6 +51,8 @@ def read(
         ``t [s],acc_x [m/s^2]``.
     begin, end : str, float or None
         Part of the recording, from the first stamp of each clock: ``"12.5 s"``, or seconds.
+    counted : bool
+        Rows need no times and are then counted 0, 1, 2, ...: means of poses.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def read(
     """
     from inercal.records.read import read as read_files
 
-    return read_files(paths, map).between(begin, end)
+    return read_files(paths, map, counted=counted).between(begin, end)
 
 
 def record(

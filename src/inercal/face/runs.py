@@ -37,6 +37,18 @@ def calibrations(
     return calibrated
 
 
+def of_files(
+    records: Sequence[Record],
+    study: Study,
+    progress: Progress,
+    calibrate: Callable[[Sequence[Record], Any, Progress], T],
+) -> T:
+    """The one calibration of records in order, its inputs with the files of the study."""
+    with study.at_fault():
+        calibrated: T = _traced(calibrate(records, study.settings, progress), records[0], study)
+    return calibrated
+
+
 def one_run(records: Sequence[Record], instead: str) -> Record:
     """The record, where there is one; else a refusal that says what to do ``instead``. Raises `InputError`."""
     if len(records) > 1:

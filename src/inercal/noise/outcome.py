@@ -25,6 +25,7 @@ from inercal.records.clocks import usable_interval
 from inercal.records.column import Column
 from inercal.records.places import counted
 from inercal.records.record import Record
+from inercal.units import RAW
 
 COMMAND = "allan"
 
@@ -55,7 +56,7 @@ _IN_ORDER = 0.9
 """Share of the rows whose time stamps go forward, from which the others are left out."""
 
 _CHANNELS = re.compile(r"acc_[xyz]|a[1-9]\d*|gyro(_[xyz]|_roll|_yaw)?|y_[xy]")
-_DIMENSIONS = ("acceleration", "rate", "count", "voltage", "number")
+_DIMENSIONS = ("acceleration", "rate", "number", *RAW)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError
 from inercal.inputs import Source
 from inercal.records.channels import sensor_and_axis
-from inercal.units import Unit
+from inercal.units import RAW, Unit
 
 
 @short_repr
@@ -43,7 +43,7 @@ class Column:
 
     def si(self) -> Array:
         """Values (n,) in SI units; raises `RecordError` for raw counts and volts."""
-        if self.unit.dimension in ("count", "voltage"):
+        if self.unit.dimension in RAW:
             raise RecordError(
                 self.source.path, f"{self.name} is in {self.unit.symbol}, expected physical units"
             )

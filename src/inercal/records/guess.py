@@ -49,7 +49,10 @@ class _File:
 
 @np.errstate(over="ignore", invalid="ignore")
 def guess_map(
-    paths: str | Path | Sequence[str | Path], on_table: bool = False, of_model: bool = False
+    paths: str | Path | Sequence[str | Path],
+    on_table: bool = False,
+    of_model: bool = False,
+    rate: str | None = None,
 ) -> str:
     """Guess a column map from the files themselves.
 
@@ -66,6 +69,8 @@ def guess_map(
     of_model : bool
         A model that pitches: accelerometers go by their numbers, ``a1`` to ``an``, and columns without names are not
         guessed.
+    rate : str, optional
+        Sample rate, as text with its unit, where there is no time column.
 
     Returns
     -------
@@ -99,8 +104,10 @@ def guess_map(
             lines += _columns(file, f"{table}.columns")
     for file in files:
         lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
+    if rate is not None and all("t" in file.guesses for file in files):
+        raise RecordError(files[0].path, "found a column of times, expected none beside a sample rate")
     if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
-        lines += _rate([line for file in files for line in file.leading])
+        lines += _rate([line for file in files for line in file.leading], rate)
     return "\n".join(lines) + "\n"
 
 
@@ -345,8 +352,10 @@ def _options(file: _File, table: str) -> list[str]:
     return ["", f"[{table}]", *lines] if table else lines
 
 
-def _rate(leading: Iterable[str]) -> list[str]:
-    """The sample rate as TOML, where there is no time column."""
+def _rate(leading: Iterable[str], rate: str | None) -> list[str]:
+    """The sample rate as TOML, where there is no time column: as stated, or as a line of the file says."""
+    if rate is not None:
+        return ["", "# there is no time column", "[time]", f"rate = {_quoted(rate)}"]
     sentence = next((line for line in leading if _RATE.search(line)), None)
     match = _RATE.search(sentence) if sentence is not None else None
     if sentence is not None and match:

@@ -12,11 +12,15 @@ from pydantic import BeforeValidator, Field, model_validator
 from inercal._toml import Strict, check
 from inercal.errors import StudyError
 from inercal.imu.settings import (
-    AidedSettings,
+    TILT,
+    TURN,
     Disturbances,
     Exclusion,
-    FerrarisSettings,
     ImuSettings,
+    KnownRatesSettings,
+    KnownTurnsSettings,
+    MeansSettings,
+    Method,
     Simulation,
 )
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
@@ -29,20 +33,24 @@ from inercal.studies.common import (
     Version,
     site_of,
 )
-from inercal.studies.fields import refusal
+from inercal.studies.fields import QuantityText, refusal
 from inercal.studies.imu_aided import AidedTable, aided_settings
 from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
 from inercal.studies.tables import as_typed, settings_of, table_of
-from inercal.units import parse_unit, shown
+from inercal.units import Quantity, parse_unit, shown
 
 #: keys that not all methods heed -> those that do
 _METHODS = {
     "static_start": ("multiposition",),
     "g_sensitivity": ("multiposition", "aided"),
     "bias_drift": ("multiposition",),
-    "exclude": ("multiposition",),
-    "k2": ("multiposition", "aided"),
+    "exclude": ("multiposition", "means"),
+    "k2": ("multiposition", "means", "aided"),
+    "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
+    "rates": ("known_rates",),
+    "turns": ("known_turns",),
+    "alignment": ("known_turns",),
     "ferraris": ("ferraris",),
     "aided": ("aided",),
 }
@@ -72,13 +80,44 @@ def exclusion_of(texts: list[str]) -> Exclusion:
     return Exclusion(times, poses)
 
 
+Rate = Annotated[Quantity, QuantityText("rate", "33.333(15) rpm")]
+
+TurnAngle = Annotated[Quantity, QuantityText("angle", "361.338(5) deg", TURN.accept, TURN.words)]
+
+
+class TurnsTable(Strict):
+    """Angles of three turns, positive about the positive axis by the right-hand rule."""
+
+    x: TurnAngle = Field(description="angle of the turn about x, perhaps with its standard uncertainty")
+    y: TurnAngle = Field(description="angle of the turn about y")
+    z: TurnAngle = Field(description="angle of the turn about z")
+
+
 class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     """Settings of the calibration."""
 
-    method: Literal["multiposition", "ferraris", "aided"] = Field(
+    method: Literal["multiposition", "ferraris", "aided", "means", "known_rates", "known_turns"] = Field(
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
-        "turns by a known angle; aided: on a table whose angles are in the record",
+        "turns by a known angle; aided: on a table whose angles are in the record; means: a row of mean outputs for "
+        "each pose, accelerometers; known_rates: a gyro on a platter or rate table, in unknown orientations; "
+        "known_turns: a gyro, a turn by a known angle about each axis",
+    )
+    rates: list[Rate] = Field(
+        default=[],
+        examples=[["0 rpm", "33.333(15) rpm", "45.00(2) rpm"]],
+        description="of known_rates: rate of the table in each FILE, in their order",
+    )
+    turns: TurnsTable | None = Field(
+        default=None,
+        title="Turns",
+        examples=[{"x": "361.338(5) deg", "y": "367.160(5) deg", "z": "363.670(5) deg"}],
+        description="of known_turns: angle of the turn in each FILE, or in the rows of each label",
+    )
+    alignment: Annotated[Quantity, QuantityText("angle", "0.1 deg", TILT.accept, TILT.words)] | None = Field(
+        default=None,
+        description="of known_turns: standard uncertainty of the direction of the axis of each turn; taken as square "
+        "to each other if absent",
     )
     exclude: list[Left] = Field(
         default=[],
@@ -94,6 +133,9 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuTable:
         """Refuse what the method does not heed."""
+        for key in ("rates", "turns"):
+            if self.method == f"known_{key}" and not getattr(self, key):
+                raise refusal(f"{key}: missing, expected it with method = {self.method!r}")
         for key in self.model_fields_set - {"method"}:
             methods = _METHODS.get(key, ())
             if methods and self.method not in methods:
@@ -139,17 +181,33 @@ class ImuStudyFile(Strict):
     conditions: Conditions = ConditionsTable()
 
 
+def _method(table: ImuTable, path: str | Path) -> Method | None:
+    """The options of a method other than multi-position, in SI."""
+    match table.method:
+        case "ferraris":
+            return ferraris_settings(table.ferraris)
+        case "aided":
+            return aided_settings(table.aided, path)
+        case "means":
+            return MeansSettings()
+        case "known_rates":
+            return KnownRatesSettings(
+                tuple(rate.value for rate in table.rates), tuple(rate.u for rate in table.rates)
+            )
+        case "known_turns":
+            assert table.turns is not None
+            x, y, z = table.turns.x, table.turns.y, table.turns.z
+            alignment = None if table.alignment is None else table.alignment.value
+            return KnownTurnsSettings((x.value, y.value, z.value), (x.u, y.u, z.u), alignment)
+    return None
+
+
 def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
     """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
     ``path`` is where it came from; files that the study names lie beside it.
     """
     file = check(ImuStudyFile, data, path, StudyError)
-    method: FerrarisSettings | AidedSettings | None = None
-    if file.imu.method == "ferraris":
-        method = ferraris_settings(file.imu.ferraris)
-    elif file.imu.method == "aided":
-        method = aided_settings(file.imu.aided, path)
     site, count = site_of(file.site, path), parse_unit("count")
     known = (*ACCELEROMETER_TRIAD, *GYRO_TRIAD, *GYRO_G_SENSITIVITY)
     truth = {}
@@ -170,7 +228,7 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),
         traceability=file.traceability.model_dump(),
-        method=method,
+        method=_method(file.imu, path),
         temperature=file.conditions.temperature,
         exclude=exclusion_of(file.imu.exclude),
         given=as_typed(data),

@@ -176,6 +176,8 @@ def _forms(symbol: str, kind: str, unit: Unit) -> tuple[list[_Form], str]:
         case "output/(m/s^2)":
             pure = [_Form("number")] if own == "acceleration" else []
             return [*pure, _Form(own, "acceleration", 1)], '"1.00(2)"' if pure else f'"1.5 {out}/g"'
+        case "output/(m/s^2)^2":
+            return [_Form(own, "acceleration", 2)], f'"1.5 {out}/g^2"'
         case "rad":
             return [_Form("angle")], '"20 arcsec"'
         case "1":

@@ -27,7 +27,7 @@ class Readings:
     channels : (c,) names
     unit : Unit
         Of the record.
-    y : (n, c) readings, means over the dwells; in the SI unit of ``unit`` (count, V and 1 stay what they are)
+    y : (n, c) readings, means over the dwells; in the SI unit of ``unit`` (count, V, A, N*m and 1 stay what they are)
     samples : (n,) rows behind each reading
     u_mean : (c,) standard deviation of a reading that the scatter within the dwells explains if it is white,
         in the unit of y; NaN where a reading is a single row

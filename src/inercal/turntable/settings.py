@@ -44,7 +44,7 @@ class Instrument:
         As their keys say; the kind is a key of `inercal.instruments.by_angle.CHANNELS`.
     unit : Unit
         Of its outputs in a record that is simulated. Coefficients and noise are in its SI unit where it is one of
-        rate or acceleration (then k_x is a pure number), else in the unit itself (count, V, 1).
+        rate or acceleration (then k_x is a pure number), else in that of their dimension (count, V, A, N*m, 1).
     terms : tuple of str or None
         Terms to be estimated, for any of its channels; None: those usual for the kind.
     coefficients : mapping

@@ -68,6 +68,6 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
         raise RecordError(
             where,
             f"found the columns {counted_names(titles_read, 8)}, expected known ones as in {EXAMPLE}, or a map "
-            "(`inercal new imu` writes one)",
+            "(`inercal new` imu, turntable, selfcal or aoa writes one)",
         )
     return tuple(channels.values())

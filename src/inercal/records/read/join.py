@@ -35,8 +35,12 @@ class FileTable:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def joined(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, Column]:
+def joined(
+    files: Sequence[FileTable], record_map: RecordMap | None, counted: bool = False
+) -> dict[str, Column]:
     """Columns by name, sign, scale and unit applied; tables whose time stamps are equal share one time axis.
+
+    ``counted``: rows without times are counted, as means of poses.
 
     Raises
     ------
@@ -52,7 +56,7 @@ def joined(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str
     columns: dict[str, Column] = {}
     axes: list[Array] = []
     for file in files:
-        t = _time_axis(file, files, rate)
+        t = _time_axis(file, files, 1.0 if rate is None and counted else rate)
         t = next((axis for axis in axes if np.array_equal(axis, t, equal_nan=True)), t)
         axes.append(t)
         stamped = any("t" in other.table.values for other in files if other.part is file.part)

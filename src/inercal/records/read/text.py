@@ -138,7 +138,7 @@ def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, .
         raise RecordError(
             path,
             f"line {line + 1}: found {shown(lines[line])}, expected a header such as {EXAMPLE}, "
-            "or a map (`inercal new imu` writes one)",
+            "or a map (`inercal new` imu, turntable, selfcal or aoa writes one)",
         )
     return canonical(((index, title, None) for index, title in enumerate(layout.header)), where)
 

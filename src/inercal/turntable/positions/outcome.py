@@ -42,8 +42,8 @@ MODELS = {
         "in units of the site's gravity (an accelerometer reads -a); w the earth rate"
     ),
     "gyro": (
-        "y_i = D_F_i + S_i (w_i + T_ij w_j + T_ik w_k) + G_ij f_j, f the specific force (+g up at rest), w the earth "
-        "rate"
+        "y_i = D_F_i + S_i (w_i + T_ij w_j + T_ik w_k) + G_ij f_j (+ G_ijk f_j f_k), f the specific force (+g up at "
+        "rest), w the earth rate"
     ),
     "accelerometer": (
         "y_i = K0 + K1 (f_i + M_ip f_p + M_io f_o + K2 f_i^2 + K3 f_i^3 + Koq f_i |f_i| + Kip f_i f_p + Kio f_i f_o "
