@@ -100,7 +100,7 @@ def calibrated(name: str, seed: list[int], faults: Faults, path: Path):
     return ic.calibrate(ic.read(record), path / "study.toml")
 
 
-def campaign(draws: int, folder: Path, only: str) -> dict[str, dict]:
+def campaign(draws: int, folder: Path, only: str, fault_only: str) -> dict[str, dict]:
     """All faults of all tests, each drawn so often."""
     folder.mkdir(parents=True, exist_ok=True)
     results = {}
@@ -111,6 +111,8 @@ def campaign(draws: int, folder: Path, only: str) -> dict[str, dict]:
         sound = [calibrated(name, [SEED, number, k], Faults(), folder).estimate for k in range(draws)]
         faults = OF_GYROS if TESTS[name][0] == "gyrowheel" else OF_FORCE
         for fault, sizes in faults.items():
+            if fault_only not in fault:
+                continue
             for entry in sizes:
                 size, what = ("", entry) if isinstance(entry, Faults) else entry
                 done = [calibrated(name, [SEED, number, k], what, folder).estimate for k in range(draws)]
@@ -175,13 +177,14 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=50)
     parser.add_argument("--out", type=Path, default=Path("build/faults.json"))
     parser.add_argument("--only", default="")
+    parser.add_argument("--fault", default="")
     parser.add_argument("--before", type=Path)
     parser.add_argument("--after", type=Path)
     given = parser.parse_args()
     if given.after:
         print(table(json.loads(given.before.read_text()), json.loads(given.after.read_text())))
         return
-    results = campaign(given.draws, given.out.parent / f"{given.out.stem}-files", given.only)
+    results = campaign(given.draws, given.out.parent / f"{given.out.stem}-files", given.only, given.fault)
     given.out.write_text(json.dumps(results, indent=1))
 
 

@@ -116,5 +116,6 @@ def wheel_output(axis, c, a, w):
 
 
 def codes_of(estimate):
-    """Codes of the findings but that of faults that no test would show, which most plans have."""
-    return [finding.code for finding in estimate.findings if finding.code != "weak_test"]
+    """Codes of the findings but those of what no test would show, which most plans have."""
+    usual = ("weak_test", "stated_exact")
+    return [finding.code for finding in estimate.findings if finding.code not in usual]

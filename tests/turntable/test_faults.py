@@ -153,3 +153,16 @@ def test_a_latitude_that_is_hardly_known(degrees, status):
         assert k.u == pytest.approx(np.sqrt(np.mean(np.square(drawn - k.value))), rel=0.06)
     else:
         assert any(each.code == "uncertain_site" and "k_x" in each.harm for each in done.findings)
+
+
+def test_a_latitude_without_an_uncertainty_is_said_with_what_it_would_do():
+    """The error that is named shifts the value that is named by 2 u, where the test is made again at that latitude."""
+    settings = study(coefficients=WHEEL_X, noise=0.01 * DEG_H)
+    record = simulate(settings, np.random.default_rng(5))
+    done = calibrate(record, settings).estimate
+    assert not [each for each in done.budget if "not excluded" in each.source]  # which would make u larger
+    (said,) = (each.message for each in done.findings if each.code == "stated_exact")
+    size, name = float(said.split(" deg")[0].split()[-1]), said.split("shift ")[1].split()[0]
+    other = study(site=Site(9.8, (), LATITUDE + np.radians(size)), coefficients=WHEEL_X, noise=0.01 * DEG_H)
+    shift = calibrate(record, other).estimate[name].value - done[name].value
+    assert abs(shift) / done[name].u == pytest.approx(2.0, rel=0.35)  # the size is said in one digit

@@ -45,7 +45,7 @@ class Limits:
     harmful_shift: float = 0.5
     """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
 
-    blind_shift: float = 1.5
+    blind_shift: float = 1.0
     """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
     the test would not show it."""
 
@@ -57,6 +57,12 @@ class Limits:
 
     bent_part: float = 0.33
     """Second-order change of a value by an uncertain latitude, over its u, beyond which no u holds."""
+
+    latitude_off: float = math.radians(0.1)
+    """Error [rad] of a latitude that is stated without uncertainty up to which a finding says what it would do."""
+
+    gravity_off: float = 1e-3
+    """Error [m/s^2] of gravity, likewise."""
 
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""

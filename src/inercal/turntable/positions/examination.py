@@ -96,12 +96,17 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
         asked, residuals = _seen(fit, (each for each in faults(means, fit) if each.name not in names))
     if not first_fit.effects.free.size + first_fit.effects.random.size:
         significant += _within_dwells(means, first, {each.fault.code for each in significant})
-    codes = {each.fault.code for each in significant}
-    doubtful: dict[str, Tested] = {}
+    named = {_place(each.fault) for each in significant}
+    doubtful: dict[tuple[str, bytes], Tested] = {}
     for each in tested:
-        if each.chance < LIMITS.doubtful and each.fault.code not in codes:
-            doubtful.setdefault(each.fault.code, each)
+        if each.chance < LIMITS.doubtful and _place(each.fault) not in named:
+            doubtful.setdefault(_place(each.fault), each)
     return Examination(tuple(significant), tuple(doubtful.values()), tuple(first))
+
+
+def _place(fault: Fault) -> tuple[str, bytes]:
+    """Code of a fault with the channels that it acts on."""
+    return fault.code, np.any(fault.columns, axis=(0, 2)).tobytes()
 
 
 def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> Iterator[Tested]:

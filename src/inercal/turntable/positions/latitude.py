@@ -15,9 +15,11 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeB
 from inercal.findings import Finding
+from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
 from inercal.rigs.outputs import rate_reference
 from inercal.turntable.limits import LIMITS
+from inercal.turntable.positions.shifts import Scale
 from inercal.turntable.regression import Regression, solve
 
 NEAREST = float(np.radians(1.0))
@@ -66,6 +68,27 @@ def of_latitude(
     more = np.sign(first) * np.sqrt(np.maximum(6.0 * first * third, 0.0))
     shifts = np.stack([np.sqrt(3.0) * bend, more], axis=-1)
     return [TypeB("latitude, second order", 1.0, "1", shifts)], []
+
+
+def stated_exact(fit: Regression, site: Site, scale: Scale) -> list[Finding]:
+    """A finding where latitude or gravity has no uncertainty, and an ordinary error of it would shift a value by 2 u:
+    no residual shows either."""
+    still, latitude = np.zeros(3), site.latitude or 0.0
+    north = EARTH_RATE * np.array([-np.sin(latitude), 0.0, np.cos(latitude)])
+    asked = [] if site.latitude_u else [("latitude", LIMITS.latitude_off, "deg", 180.0 / np.pi, still, north)]
+    if not site.inputs and np.linalg.norm(fit.model.a_n) > 2.0:  # not in units of the site's gravity
+        asked.append(("gravity", LIMITS.gravity_off, "m/s^2", 1.0, fit.model.a_n / site.gravity, still))
+    texts = []
+    for what, ordinary, unit, factor, a_n, w_n in asked:
+        column = fit.model.by_references(fit.angles, fit.c, a_n, w_n)
+        shift = np.abs(scale.shift(fit, column[..., None])[:, 0])
+        worst = int(np.argmax(shift))
+        if ordinary * shift[worst] > 2.0:
+            size = 2.0 / shift[worst] * factor
+            texts.append(
+                f"{what} has no uncertainty, and {size:.1g} {unit} would shift {scale.names[worst]} by 2 u"
+            )
+    return [Finding("stated_exact", "; ".join(texts))] if texts else []
 
 
 def _refitted(fit: Regression, latitude: float) -> Array:

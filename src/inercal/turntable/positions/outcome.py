@@ -25,7 +25,7 @@ from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.positions.application import in_use
 from inercal.turntable.positions.examination import examine
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
-from inercal.turntable.positions.latitude import of_latitude
+from inercal.turntable.positions.latitude import of_latitude, stated_exact
 from inercal.turntable.positions.shifts import Scale, doubts, findings_of
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
@@ -153,6 +153,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
     if not large:  # cubes of the table's errors would be taken for faults
         examination = examine(readings, fit, [settings.instrument.noise] * len(readings.channels))
         scale = Scale(names, terms.slope, uncertainty.u)
+        findings += stated_exact(fit, settings.site, scale)
         findings += findings_of(examination, fit, scale, readings.unit)
         uncertainty = combine(names, [*stated, *doubts(examination, fit, scale, readings.unit)])
     findings += of_site(names, uncertainty.budget, [each.source for each in fit.model.references])
