@@ -11,7 +11,7 @@ from turntable_studies import LATITUDE, study
 from inercal.convert.models import worth_knowing
 from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
-from inercal.records.made import record_of
+from inercal.records.record import record_of
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
 from inercal.turntable.rate.cross_axis import axis_about
