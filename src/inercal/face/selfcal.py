@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import InputError
-from inercal.face.imu import of_coefficients
-from inercal.face.result import Result, View
+from inercal.face.result import Result, View, of_coefficients
 from inercal.face.study import Progress, Study, calibrations, designed_by, with_span
 from inercal.records.record import Record
 from inercal.selfcal import task

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.estimate.result import without_coefficients
-from inercal.face.imu import of_coefficients
-from inercal.face.result import Result, View
+from inercal.face.result import Result, View, of_coefficients
 from inercal.face.study import Progress, Study, calibrations, designed_by
 from inercal.records.record import Record
 from inercal.turntable import task
