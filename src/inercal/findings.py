@@ -93,15 +93,15 @@ CODES: dict[str, Code] = {
     "weak_term": Code("a term is hardly known", _NEVER),
     "noise_misfit": Code("the noise is not of the kinds that are fitted", _NEVER),
     "large_errors": Code("errors of the table are so large that more than their squares matters", _ALWAYS),
-    "trend": Code("outputs or scale factors change over the test", _BY_SIZE, rank=9),
-    "warm_up": Code("outputs settle over the test", _BY_SIZE, rank=9),
-    "heading_suspect": Code("outputs respond to the east rate", _BY_SIZE, rank=4),
-    "level_suspect": Code("the base looks tilted", _BY_SIZE, rank=9),
-    "angle_harmonic": Code("an angle errs with its own harmonics", _BY_SIZE, rank=9),
+    "trend": Code("outputs or scale factors change over the test", _BY_SIZE, rank=18),
+    "warm_up": Code("outputs settle over the test", _BY_SIZE, rank=19),
+    "heading_suspect": Code("outputs respond to the east rate", _BY_SIZE, rank=17),
+    "level_suspect": Code("the base looks tilted", _BY_SIZE, rank=20),
+    "angle_harmonic": Code("an angle errs with its own harmonics", _BY_SIZE, rank=21),
     "approach_hysteresis": Code(
-        "readings depend on the sense in which a position is reached", _BY_SIZE, rank=9
+        "readings depend on the sense in which a position is reached", _BY_SIZE, rank=22
     ),
-    "ground_field": Code("outputs respond to a field that is fixed to the ground", _BY_SIZE, rank=9),
+    "ground_field": Code("outputs respond to a field that is fixed to the ground", _BY_SIZE, rank=23),
     "weak_test": Code("faults that would shift a value and that the residuals would not show", _NEVER),
     "not_stated": Code("a file does not state what a calibration should", _BY_SIZE),
     "not_held": Code("something of a calibration is not taken along", _NEVER),
