@@ -207,9 +207,10 @@ def _averaged(
         missing += int((~finite).sum())
         y[k] = np.where(finite, values[rows], 0.0).sum(axis=0) / count
         times[k] = t[rows].mean()
-        if len(rows) > 2 and finite.all() and np.ptp(t[rows]) > 0.0:
-            away = t[rows] - times[k]
-            slopes[k] = away @ values[rows] / (away @ away)
+        away = t[rows] - times[k]
+        spread = away @ away  # 0.0 also of times so near each other that their squares vanish
+        if len(rows) > 2 and finite.all() and spread > 0.0:
+            slopes[k] = away @ values[rows] / spread
         scatter += np.square(np.where(finite, values[rows] - y[k], 0.0)).sum(axis=0)
         freedom += count - 1
     samples = np.array([len(rows) for rows in groups])
