@@ -42,7 +42,7 @@ def recorded(seed=1, name="paper", step=0.2, **changes):
     settings = study(plan=path(name, step), **changes)
     prepared = experiment(settings)
     simulated = simulate(prepared, np.random.default_rng(seed))
-    return simulated.recording, problem(settings), prepared.truth[: settings.size]
+    return simulated.recording, problem(settings), prepared.truth[: len(settings.states.names)]
 
 
 def sigmas(found):

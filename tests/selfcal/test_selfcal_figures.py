@@ -64,6 +64,7 @@ def filtered(kind="error-state", p=18, seed=1, **changes):
     return replace(
         FilterResult(
             kind=kind,
+            names=names(p),
             coefficients=course[-1],
             covariance=np.diag(u[-1] ** 2),
             attitude=history.attitude[-1],

@@ -146,6 +146,20 @@ _SELF_CALIBRATION = (
         Term(f"beta_{i}", f"zero of the encoders: turn of their frame about {i} of the base", "rad")
         for i in _AXES
     ),
+    *(
+        Term(f"gamma_{i}", f"turn of the sensors about {i} of the platform, against the last gimbal", "rad")
+        for i in _AXES
+    ),
+    Term("nonorth_xy", "non-orthogonality: turn of the inner axis, against the outer", "rad"),
+    Term("nonorth_yz", "non-orthogonality: turn of the platform's axis, against the inner", "rad"),
+    Term("zero_y", "reading of the inner encoder at zero", "rad"),
+    Term("tau_enc", "delay of the encoders against the rates", "s"),
+    Term("tau_a", "delay of the accelerometers against the rates", "s"),
+    *(
+        Term(f"r_{i}{j}", f"place of accelerometer {i} from the centre of the gimbals, along {j}", "m")
+        for i in _AXES
+        for j in _AXES
+    ),
 )
 
 #: every term, in the order results list them

@@ -24,9 +24,9 @@ from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.filters.gaps import taken_anew
 from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
-from inercal.selfcal.platform.coefficients import BETA, names
+from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.reading import recording_of
+from inercal.selfcal.reading import recording_of, told_apart
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.result.tables import side_by_side
@@ -82,6 +82,7 @@ def calibrate(
         progress("looking for the heading" if settings.heading_unknown else "looking for the base")
         settings = with_base(recording, settings)
         recording = recording_of(record, settings)  # rates over gaps depend on it
+    settings, left_out = told_apart(settings, recording.th)
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
     filtered = filtering.estimate(recording, of)
@@ -89,12 +90,16 @@ def calibrate(
     along = filtered.history.attitude, filtered.coefficients
     bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
     progress("looking for faults")
-    faults = [*diagnose(recording, of, filtered, stated_errors(settings)), *taken_anew(recording, filtered)]
+    faults = [
+        *diagnose(recording, of, filtered, stated_errors(settings)),
+        *taken_anew(recording, filtered),
+        *left_out,
+    ]
     compared: dict[FilterKind, FilterResult] = {}
     for kind in KINDS if compare else ():
         if kind != filtered.kind:
             progress(f"filtering ({kind})")
-            compared[kind] = filtering.estimate(recording, of, kind)
+            compared[kind] = filtering.estimate(recording, of.for_kind(kind), kind)
     progress("assembling")
     estimate = assemble(recording, settings, filtered, bounds, faults)
     result, message = dict(estimate.result), estimate.message
@@ -104,7 +109,7 @@ def calibrate(
     for name, other in compared.items():
         result["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
     timed = replace(estimate, result=result, message=message, timing={"solve": time.perf_counter() - clock})
-    truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
+    truth = None if settings.true_values is None else settings.true_values[of.states.index]
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
     return Calibration(timed, of, recording, filtered, bounds, settings, compared, truth)
@@ -113,7 +118,7 @@ def calibrate(
 def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
     """An estimator's part of a comparison."""
     values, u = product_form(other)
-    each = zip(names(len(values)), values, u, strict=True)
+    each = zip(other.names, values, u, strict=True)
     return {
         "parameters": {name: {"value": value, "u": own} for name, value, own in each},
         "status": status.value,

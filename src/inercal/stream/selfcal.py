@@ -21,8 +21,8 @@ from inercal.findings import Finding
 from inercal.selfcal.filters.filter_result import Estimates, History, State, Trace, estimate_of
 from inercal.selfcal.filters.gaps import advance, held_rate, usual
 from inercal.selfcal.filters.problem import FilterProblem
+from inercal.selfcal.filters.run import initial, recursive
 from inercal.selfcal.filters.run import load_kernels as load_filter
-from inercal.selfcal.filters.run import recursive
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import KA1
 from inercal.selfcal.platform.recording import Steps
@@ -118,7 +118,7 @@ class Selfcal:
         self._places = [names.index(column.name) for column in channels]
         self._factors = [column.unit.factor for column in channels]
         self._gained = np.array([column.increment for column in channels[:3]])
-        self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(len(problem.prior))]]
+        self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(problem.names)]]
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -158,11 +158,12 @@ class Selfcal:
         state = self._after(state, sample.t, dt)
         state, over, guessed = self._rate(state, sample.t, over)
         doubt, seen = guessed or state.doubt, bool(np.isfinite(th).all())
+        later = np.where(np.isfinite(following), following, over)
         filter_, trace = advance(
             self._module,
             state.filter,
             self._problem,
-            Steps(np.array([dt]), over[None], acc[None], th[None]),
+            Steps(np.array([dt]), over[None], acc[None], th[None], later[None]),
             (0,) if doubt else (),
         )
         if trace.restarts:
@@ -188,7 +189,7 @@ class Selfcal:
         begun = bool(np.isfinite(th).all() and (np.isfinite(rate) | self._gained).all())
         if not begun:
             return state._replace(begun=False), ()
-        filter_ = self._module.initial(self._problem, th)
+        filter_ = initial(self._module, self._problem, th, np.where(np.isfinite(rate), rate, 0.0))
         state = state._replace(begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th)
         return self._line(state, estimate_of(filter_, self._problem), math.nan)
 

@@ -9,6 +9,7 @@ from types import ModuleType
 
 import numpy as np
 
+from inercal.arrays import Array
 from inercal.estimate.factor import NEGATIVE
 from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters import error_state, gimbal, multiplicative, quaternion
@@ -58,13 +59,14 @@ def estimate(
         return whole(recording, problem, start, history)
     load_kernels(kind, problem)
     began = time.perf_counter()
-    state: State = module.initial(problem, recording.th[0], start)
+    state = initial(module, problem, recording.th[0], recording.rate[0], start)
     first = estimate_of(state, problem)
     state, trace = advance(module, state, problem, recording.steps, recording.held, history)
     seconds = time.perf_counter() - began
     size = len(problem.prior)
     result = FilterResult(
         kind=kind,
+        names=problem.names,
         coefficients=state.coefficients,
         covariance=state.covariance[-size:, -size:],
         attitude=attitude_of(state, problem),
@@ -83,12 +85,23 @@ def estimate(
     return replace(result, converged=False, message=message) if message else result
 
 
+def initial(
+    module: ModuleType, problem: FilterProblem, th: Array, rate: Array, start: Start | None = None
+) -> State:
+    """The state of a recursive filter at a first row: angles ``th`` (3,) [rad], rate (3,) [rad/s] from there on."""
+    of_rig = (rate,) if problem.states.of_rig else ()
+    state: State = module.initial(problem, th, start, *of_rig)
+    return state
+
+
 def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
     """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
     module = recursive(kind)
     if module is not None and kind not in _LOADED:
         none = np.empty((0, 3))
-        module.advance(module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none))
+        module.advance(
+            module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none, none)
+        )
         _LOADED.add(kind)
 
 
