@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from inercal.estimate.kalman import empty_row
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.considered import sensitivities
 from inercal.selfcal.filters.problem import encoders_at, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform import linearised, model
@@ -17,6 +19,8 @@ from inercal.selfcal.platform.coefficients import to_linear, to_product
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.platform.states import ALL, RIG, STATES
+from inercal.selfcal.reading import told_apart
+from inercal.selfcal.result.outcome import assemble
 from inercal.selfcal.settings import Model
 
 WHOLE = (*RIG, "k2", "levers", "scale_asymmetry")
@@ -276,3 +280,68 @@ def test_uncertainties_of_rig_states_hold():
         total += error @ np.linalg.solve(found.covariance, error)
     low, high = chi2.ppf([5e-5, 1 - 5e-5], 12 * len(posed.names))
     assert low < total < high
+
+
+def test_sensitivities_are_those_of_the_filter_run_again():
+    """Each error of the rig that is no state: one run of the sensitivity, and two of the filter with it stated."""
+    posed, rng = problem(BASE), np.random.default_rng(14)
+    recording = recorded(BASE, drawn(BASE, rng, PAPER_KINDS), rng)
+    found = estimate(recording, posed, "error-state")
+    names = ("kg1_z", "gamma_y", "nonorth_yz", "zero_y", "tau_enc", "tau_a", "K2_x", "r_yy", "S_asym_z")
+    slopes = sensitivities(recording, posed, found.history.attitude, found.coefficients, names)
+    u = np.sqrt(np.diag(found.covariance))
+    for name, slope in zip(names, slopes.T, strict=True):
+        step = 0.01 * BASE.priors[ALL.index(name)]
+        ends = [
+            estimate(
+                recording,
+                problem(replace(BASE, model=Model(None, {name: (by, 0.0)}))),
+                "error-state",
+                None,
+                False,
+            )
+            for by in (step, -step)
+        ]
+        # a value that is taken out acts as its opposite in the recording
+        by_runs = (ends[1].coefficients - ends[0].coefficients) / (2.0 * step)
+        # of delays the two sides differ where a turn begins
+        assert np.abs((slope - by_runs) / u).max() < 0.03 * np.abs(slope / u).max(), name
+
+
+def test_what_is_stated_but_not_estimated_enters_u():
+    """gamma stated as 0(5) arcsec: u of the coefficients covers errors of so much, which the paper's model does not."""
+    gamma = dict.fromkeys(STATES["gamma"].parameters, (0.0, 5 * ARCSEC))
+    settings = replace(BASE, model=Model(None, gamma))
+    rng = np.random.default_rng(15)
+    c = drawn(BASE, rng, PAPER_KINDS)
+    c[[ALL.index(name) for name in gamma]] = 5 * ARCSEC
+    recording = recorded(BASE, c, rng)
+    results = {}
+    for key, each in (("stated", settings), ("exact", BASE)):
+        posed = problem(each)
+        found = estimate(recording, posed, "error-state")
+        path = recorded_bounds(
+            recording, posed, found.history.attitude, found.coefficients, contributions=True
+        )
+        results[key] = assemble(recording, each, found, path)
+    stated = results["stated"]
+    error = np.abs(stated.values - to_product(c[:18]))
+    assert (error / stated.u).max() < 4.0
+    assert not results["exact"].names or (error / results["exact"].u).max() > 15.0
+    assert {"gamma_x", "gamma_y", "gamma_z"} <= {item.source for item in stated.budget}
+    (told,) = (f.message for f in stated.findings if "are no states" in f.message)
+    assert "non_orthogonality" in told
+    assert "gamma" not in told.split(" are no states")[0]
+
+
+def test_joints_that_stand_still_leave_states_out():
+    th = np.zeros((10, 3))
+    th[:, 0] = np.linspace(0.0, 1.0, 10)
+    th[:, 2] = np.linspace(0.0, 2.0, 10)
+    settings, said = told_apart(replace(BASE, model=Model(RIG)), th)
+    assert not {"nonorth_xy", "nonorth_yz"} & set(settings.states.names)
+    assert len(settings.states.names) == 30
+    assert said[0].message.startswith("nonorth_xy, nonorth_yz: th_y stands still")
+    assert told_apart(BASE, th) == (BASE, ())
+    th[:, 1] = np.linspace(0.0, 0.5, 10)
+    assert told_apart(replace(BASE, model=Model(RIG)), th)[1] == ()

@@ -117,7 +117,7 @@ def undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> fl
         read.after[1] - read.before[1],
         read.after[2] - read.before[2],
     )
-    return P[at, at] * (x * x + y * y + z * z)
+    return float(P[at, at] * (x * x + y * y + z * z))
 
 
 @kernel
@@ -170,7 +170,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
     intervals, rates, acc, th, later = steps
-    index, place, axes, signs = layout.index, layout.place, world.axes, world.signs
+    index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
     c = layout.stated.copy()
     for j in range(len(index)):
         c[index[j]] = estimated[j]

@@ -258,7 +258,7 @@ def _advance(
         for j in range(p):
             c[j] += x[3 + j]
         if history:
-            remember(out, k, attitude(th, world.axes, world.signs), c, layout.index, P)
+            remember(out, k, attitude(th, world.axes, world.signs), c, layout.chosen, P)
     return points.health[0], int(points.health[1]), cosine
 
 

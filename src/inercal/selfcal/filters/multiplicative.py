@@ -146,7 +146,7 @@ def _advance(
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
     intervals, rates, acc, th, later = steps
-    index, place, axes, signs = layout.index, layout.place, world.axes, world.signs
+    index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
     c = layout.stated.copy()
     for j in range(len(index)):
         c[index[j]] = estimated[j]

@@ -102,7 +102,7 @@ def centripetal(i: int, w: Vector) -> Vector:
 @kernel
 def squared(signal: float, i: int, c: Array) -> float:
     """Output [m/s^2] of accelerometer ``i`` per K2, at its ``signal`` [m/s^2] without bias."""
-    return signal * signal / (1.0 + c[15 + i])
+    return float(signal * signal / (1.0 + c[15 + i]))
 
 
 @kernel

@@ -128,10 +128,10 @@ ASYM: Final = ALL.index("S_asym_x")
 
 
 class Layout(NamedTuple):
-    """States as kernels take them: ``index`` (p,) places in the full vector; ``place`` (K,) of each parameter in the
-    error state, -1 where it is no state; ``stated`` (18, 24 or K,) values of the full vector without the states."""
+    """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
+    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states."""
 
-    index: NDArray[np.int64]
+    chosen: NDArray[np.int64]
     place: NDArray[np.int64]
     stated: Array
 
@@ -160,7 +160,7 @@ class StateVector:
     def full(self, c: Array) -> Array:
         """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
         whole = self.layout.stated.copy()
-        whole[self.layout.index] = c
+        whole[self.layout.chosen] = c
         return whole
 
     @property
