@@ -116,8 +116,8 @@ def calibrated(name: str, seed: list[int], faults: Faults, path: Path):
     return ic.calibrate(ic.read(record), path / "study.toml")
 
 
-def campaign(draws: int, folder: Path, only: str, fault_only: str) -> dict[str, dict]:
-    """All faults of all tests, each drawn so often."""
+def campaign(draws: int, folder: Path, only: str, fault_only: str, out: Path) -> None:
+    """All faults of all tests, each drawn so often, into a file that grows row by row."""
     folder.mkdir(parents=True, exist_ok=True)
     results = {}
     for number, name in enumerate(TESTS):
@@ -132,7 +132,7 @@ def campaign(draws: int, folder: Path, only: str, fault_only: str) -> dict[str, 
             for size, what in sizes:
                 done = [calibrated(name, [SEED, number, k], what, folder).estimate for k in range(draws)]
                 results[f"{name}|{fault}|{size}"] = summary(sound, done, fault)
-    return results
+                out.write_text(json.dumps(results, indent=1))
 
 
 def told(estimate, fault: str) -> bool:
@@ -240,8 +240,7 @@ def main() -> None:
     if given.after:
         print(table(json.loads(given.before.read_text()), json.loads(given.after.read_text())))
         return
-    results = campaign(given.draws, given.out.parent / f"{given.out.stem}-files", given.only, given.fault)
-    given.out.write_text(json.dumps(results, indent=1))
+    campaign(given.draws, given.out.parent / f"{given.out.stem}-files", given.only, given.fault, given.out)
 
 
 if __name__ == "__main__":
