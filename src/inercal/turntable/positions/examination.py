@@ -40,7 +40,7 @@ MANY = 1e6
 """Degrees of freedom from which a variance counts as known."""
 
 SEEN = 0.01
-"""Part of a fault's effect outside the terms below which it counts as no more than this."""
+"""Part of a fault's effect outside the terms below which it does not show."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,9 @@ from inercal.units import Unit
 SHOWN = 4
 """Coefficients and faults named at most in a sentence."""
 
+ROUNDING = 1e-9
+"""Part of what a fault does to the values below which a direction of it does nothing."""
+
 DRIFTS = frozenset({"trend", "warm-up", "scale drift"})
 """Kinds of faults that are others in each run."""
 
@@ -59,15 +62,13 @@ def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: U
             f"{each.chance:.1g}): it shifts {_largest(scale.names, shift)}; {REMEDY[each.fault.code]}"
         )
         yield Finding(each.fault.code, text, "", harm)
-    blind: dict[str, Blind] = {}
+    worst: dict[str, Blind] = {}
     for seen in examination.asked:
-        each = _blind(seen, fit, scale, shown)
-        if each.shift > max(
-            LIMITS.blind_shift, blind[seen.fault.kind].shift if seen.fault.kind in blind else 0.0
-        ):
-            blind[seen.fault.kind] = each
-    if blind:
-        yield Finding("weak_test", _weak(blind.values()))
+        blind, kind = _blind(seen, fit, scale, shown), seen.fault.kind
+        if blind.shift > worst.get(kind, Blind(LIMITS.blind_shift, "")).shift:
+            worst[kind] = blind
+    if worst:
+        yield Finding("weak_test", _weak(worst.values()))
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) 
         shift = effect @ base
         size = np.linalg.norm(shift, axis=1)
         worst = int(np.argmax(size))
-        if size[worst] > 0.0:
+        if size[worst] > ROUNDING * np.linalg.norm(effect):
             values = base @ shift[worst] * 2.0 / size[worst] ** 2
             words = f"{seen.fault.what} of {seen.fault.size(values, shown)} ({scale.names[worst]})"
             return Blind(reach * float(size[worst]), words)
