@@ -81,7 +81,7 @@ class Blind:
 
 
 def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) -> Blind:
-    """What a test may miss of a fault: the part that does not show, if that shifts any value, or else what shows."""
+    """The part of a fault that a test may miss: one that does not show, if it shifts any value, or else all of it."""
     effect = scale.shift(fit, seen.fault.columns)
     for base, reach in ((seen.hidden, np.inf), (seen.base, seen.reach)):
         shift = effect @ base
@@ -95,7 +95,7 @@ def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) 
 
 
 def _weak(blind: Collection[Blind]) -> str:
-    """What would shift a value by 2 u, and hardly show, or not at all."""
+    """Sentence on faults that would shift a value by 2 u, and hardly show, or not at all."""
     hardly = "; ".join(each.words for each in blind if np.isfinite(each.shift))
     never = "; ".join(each.words for each in blind if not np.isfinite(each.shift))
     texts = []
