@@ -183,8 +183,12 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start, g_sensitivity, bias_drift, k2, time_base_u
+    static_start, g_sensitivity, bias_drift, time_base_u
         As their keys say.
+    k2 : bool
+        Second-order coefficients of the accelerometers are estimated.
+    k2_u : float or None
+        Their standard deviation about 0 [1/(m/s^2)] where they are not; as usual for such sensors if absent.
     exclude : Exclusion
         Poses and turns to be left out.
     traceability : mapping
@@ -206,10 +210,8 @@ class ImuSettings:
     )  # fmt: skip
     g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
     bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
-    k2: bool = option(
-        "also estimate the second-order coefficients of the accelerometers: K1 (f + K2 f^2), f along the input axis",
-        False,
-    )
+    k2: bool = False
+    k2_u: float | None = None
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="time_base",

@@ -171,7 +171,7 @@ _METHODS = {
     "g_sensitivity": ("multiposition", "aided"),
     "bias_drift": ("multiposition",),
     "exclude": ("multiposition", "means"),
-    "k2": ("multiposition", "means", "aided"),
+    "k2": ("multiposition", "ferraris", "means", "aided"),
     "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
@@ -243,6 +243,13 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default=None,
         description="of known_turns: standard uncertainty of the direction of the axis of each turn; taken as square "
         "to each other if absent",
+    )
+    k2: bool | Typed = Field(
+        default=False,
+        description="second-order coefficients of the accelerometers, K1 (f + K2 f^2), f along the input axis: true to "
+        "estimate them, or 0 with the standard uncertainty they have where they are not; by default 30 ug/g^2 where "
+        "the mean specific force scatters by 20 ug at most from pose to pose, else 150 ug/g^2",
+        examples=["0(50) ug/g^2"],
     )
     exclude: list[Left] = Field(
         default=[],
@@ -327,6 +334,27 @@ def _method(table: ImuTable, path: str | Path) -> Method | None:
     return None
 
 
+def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
+    """True where K2 is estimated, and its standard deviation about 0 [1/(m/s^2)] where that is stated."""
+    if isinstance(table.k2, bool):
+        if table.k2 and table.method == "ferraris":
+            raise StudyError(
+                path,
+                "imu.k2: found true with method = 'ferraris', expected \"0(50) ug/g^2\": its six "
+                "positions do not tell K2 from K0",
+            )
+        return table.k2, None
+    if table.method == "aided":
+        raise StudyError(path, "imu.k2: found an uncertainty with method = 'aided', expected true or false")
+    value, u = coefficient_of(table.k2, "K2_x", "accelerometer", parse_unit("count"), gravity, "imu.k2", path)
+    if value != 0.0:
+        raise StudyError(
+            path,
+            f'imu.k2: found {shown(table.k2)}, expected true or 0 with an uncertainty, such as "0(50) ug/g^2"',
+        )
+    return False, u
+
+
 def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
     """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
@@ -346,9 +374,12 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         k2, _ = coefficient_of(
             other.k2, "K2_x", "accelerometer", count, site.gravity, "disturbances.k2", path
         )
+    fitted, k2_u = _k2(file.imu, site.gravity, path)
     return settings_of(
         ImuSettings,
         file.imu,
+        k2=fitted,
+        k2_u=k2_u,
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),
