@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from recordings import shipped
+from scipy.stats import binom
 
+from inercal.errors import StudyError
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.figures import page, pictures
@@ -20,6 +22,7 @@ from inercal.instruments.terms import GYRO_TRIAD
 from inercal.records.column import Column
 from inercal.records.record import Record
 from inercal.units import parse_unit
+from rows import for_each
 
 G = 9.81
 SITE = Site(G, (GravityInput("gravity", 2e-4, "m/s^2", 1.0),), 0.8, 0.0)
@@ -94,10 +97,10 @@ def by_means(values, **more):
     return calibrate(record_of("acc", values), ImuSettings(SITE, method=MeansSettings(), **more)).estimate
 
 
-def by_rates(rows, rates=RATES, u=RATES_U):
+def by_rates(rows, rates=RATES, u=RATES_U, **more):
     records = [record_of("gyro", each) for each in rows]
     return calibrate_files(
-        records, ImuSettings(SITE, method=KnownRatesSettings(tuple(rates), tuple(u)))
+        records, ImuSettings(SITE, method=KnownRatesSettings(tuple(rates), tuple(u)), **more)
     ).estimate
 
 
@@ -221,7 +224,58 @@ def test_an_orientation_that_moved_is_named():
     estimate = by_rates(rows)
     (finding,) = [each for each in estimate.findings if each.code == "outlying_pose"]
     assert "row 4" in finding.message
+    assert 'imu.exclude = ["pose 10"]' in finding.message
     assert estimate.status is Status.SUSPECT
+    without = by_rates(rows, exclude=Exclusion(poses=(10,)))
+    assert without.status is Status.OK
+    numbers = [row["pose"] for row in without.result["orientations"]]
+    assert numbers == [n for n in range(1, 37) if n != 10]
+    alone = by_rates([rows[0], np.delete(rows[1], 3, axis=0), rows[2]])
+    np.testing.assert_allclose(without.values, alone.values, rtol=1e-9)
+
+
+@for_each(
+    ("exclude", "sentence"),
+    [
+        (Exclusion(poses=(40,)), "found pose 40, expected one of the orientations 1 to 36"),
+        (Exclusion(((3.0, 4.0),)), "each FILE has times of its own"),
+    ],
+)
+def test_an_orientation_that_is_not_there_gets_a_sentence(exclude, sentence):
+    _, rows = platter(np.random.default_rng(6))
+    with pytest.raises(StudyError, match=sentence):
+        by_rates(rows, exclude=exclude)
+
+
+def drifting(rng, bias=0.0, scale=0.0):
+    """Rows of a gyro whose bias [output] or scale factor (relative) drifts through all of them."""
+    truth, rows = platter(rng)
+    count, seen = sum(map(len, rows)), 0
+    for row in rows:
+        passed = (seen + np.arange(len(row)))[:, None] / count
+        row += bias * passed + scale * passed * (row - truth[:3])
+        seen += len(row)
+    return truth, rows
+
+
+@for_each(
+    ("drift", "words"),
+    [({"bias": 8.0}, "the biases drift"), ({"scale": 2e-3}, "the rate or the scale factors change by")],
+)
+def test_what_changes_over_the_orientations_is_named(drift, words):
+    _, rows = drifting(np.random.default_rng(14), **drift)
+    estimate = by_rates(rows)
+    assert estimate.status is Status.SUSPECT
+    (finding,) = [each for each in estimate.findings if each.code == "trend"]
+    assert words in finding.message
+    assert finding.harm
+
+
+def test_trends_are_named_falsely_as_rarely_as_stated():
+    """30 sound tests: two tests of 1e-3 each, at 99.99 %."""
+    rng = np.random.default_rng(15)
+    named = sum("trend" in {each.code for each in by_rates(platter(rng)[1]).findings} for _ in range(30))
+    assert named <= binom.ppf(0.9999, 30, 2e-3)
 
 
 def test_steady_stretches_of_a_recording_are_the_orientations():

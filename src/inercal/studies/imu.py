@@ -170,7 +170,7 @@ _METHODS = {
     "static_start": ("multiposition",),
     "g_sensitivity": ("multiposition", "aided"),
     "bias_drift": ("multiposition",),
-    "exclude": ("multiposition", "means"),
+    "exclude": ("multiposition", "means", "known_rates"),
     "k2": ("multiposition", "ferraris", "means", "aided"),
     "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
     "rates": ("known_rates",),
@@ -255,7 +255,8 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default=[],
         examples=[["249 s .. 253 s", "pose 12"]],
         description="what no fit uses: turns that a time of the record's clock touches and poses of which it holds the "
-        "middle, and poses by their numbers, which stay as without this key",
+        "middle, and poses by their numbers, which stay as without this key; of known_rates orientations, counted "
+        "through all files",
     )
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
