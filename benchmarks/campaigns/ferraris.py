@@ -11,9 +11,9 @@ from inercal.arrays import Array
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.simulate import Session, draw_full_truth, simulate_session, true_values
+from inercal.imu.ferraris.simulate import Session, simulate_session, true_values
 from inercal.imu.settings import FerrarisSettings, ImuSettings
-from inercal.imu.simulate import ImuTruth, Noise
+from inercal.imu.simulate import ImuTruth, Noise, draw_full_truth
 
 ALIGNMENT = math.radians(0.5)
 """Standard deviation of each direction of a position and of the axis of a turn, in either direction across it [rad]."""

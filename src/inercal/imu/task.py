@@ -160,22 +160,38 @@ def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
 
 
 def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
-    """A simulated record of the study: an IMU held by hand in one pose after the other.
+    """A simulated record of the study: an IMU held by hand in one pose after the other, or as its method asks for.
 
     Coefficients that the study does not state are drawn.
 
     Raises
     ------
     StudyError
-        Another method than multi-position, or no latitude for the earth rate.
+        A method of which there is no simulation, or no latitude for the earth rate.
     """
+    if settings.site.latitude is None:
+        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
+    match settings.method:
+        case None:
+            return _by_hand(settings, settings.site.latitude, rng)
+        case FerrarisSettings():
+            from inercal.imu.ferraris.simulate import simulate_study as simulate_session
+
+            return simulate_session(settings, settings.method, rng)
+        case AidedSettings():
+            from inercal.imu.aided.simulate import simulate_study as simulate_table
+
+            return simulate_table(settings, settings.method, rng)
+    raise StudyError(
+        "imu.method", 'found another method, expected "multiposition", "ferraris" or "aided" for a simulation'
+    )
+
+
+def _by_hand(settings: ImuSettings, latitude: float, rng: np.random.Generator) -> Record:
+    """A simulated record of poses held by hand."""
     from inercal.imu.simulate import Noise, draw_truth, hand_poses, with_values
     from inercal.imu.simulate import simulate as simulate_poses
 
-    if settings.method is not None:
-        raise StudyError("imu.method", 'found another method, expected "multiposition" for a simulation')
-    if settings.site.latitude is None:
-        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
     of, site = settings.simulation, settings.site
     truth = replace(
         with_values(draw_truth(rng), of.coefficients),
@@ -186,7 +202,7 @@ def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
         truth,
         hand_poses(rng, of.poses),
         site.gravity,
-        settings.site.latitude,
+        latitude,
         rng,
         rate=of.sample_rate,
         start=of.start,
