@@ -19,11 +19,12 @@ from campaigns import imu as by_hand
 
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import Processes, run
-from inercal.imu.aided.coefficients import names_of
+from inercal.imu.aided.coefficients import circumstances_of, names_of
 from inercal.imu.ferraris.method import NAMES
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 
 SEED = 20261121
+TRIADS = ("acc", "gyro")
 BY_HAND = ACCELEROMETER_TRIAD + GYRO_TRIAD
 CAMPAIGNS = {
     "multiposition": (by_hand.one_calibration, BY_HAND),
@@ -33,7 +34,7 @@ CAMPAIGNS = {
     ),
     "ferraris": (ferraris.one_calibration, NAMES),
     "ferraris, by scatter": (ferraris.one_calibration_by_scatter, NAMES),
-    "aided": (aided.one_calibration, names_of(("acc", "gyro"), False)),
+    "aided": (aided.one_calibration, (*names_of(TRIADS, False), *circumstances_of(TRIADS))),
 }
 
 

@@ -89,8 +89,8 @@ def calibrate_files(
     if rate_u and not settings.time_base_u:
         settings = replace(settings, time_base_u=rate_u)
     calibration = _by_method(records, settings, progress)
-    if rate_u == 0.0 and not settings.time_base_u and not in_rows(settings):
-        calibration = _with_exact_rate(calibration)
+    if not rate_u and not settings.time_base_u and not in_rows(settings):
+        calibration = _with_exact_clock(calibration, typed=rate_u is not None)
     if settings.site.inputs or in_order(settings):
         return calibration
     return _with_exact_gravity(calibration, settings.site.gravity)
@@ -128,19 +128,23 @@ def _by_method(
             return calibrate_multiposition(record, settings, progress)
 
 
-def _with_exact_rate(calibration: Calibrated) -> Calibrated:
-    """The calibration, saying what an ordinary error of a sample rate typed without an uncertainty would do."""
+def _with_exact_clock(calibration: Calibrated, typed: bool) -> Calibrated:
+    """The calibration, saying what an ordinary error of the clock would do: of a rate that was ``typed`` without an
+    uncertainty in any case, of time stamps where it would matter."""
     estimate = calibration.estimate
     scales = [estimate[f"S_{axis}"] for axis in "xyz" if f"S_{axis}" in estimate.names]
-    if not scales:
+    shifts = {p.name: LIMITS.ordinary_clock * abs(p.value) / p.u for p in scales if p.u > 0.0}
+    if not shifts or (not typed and max(shifts.values()) < 1.0):
         return calibration
-    shifts = {p.name: LIMITS.ordinary_clock * abs(p.value) / p.u for p in scales}
+    what, cure = "time stamps are taken as exact", "imu.time_base"
+    if typed:
+        what, cure = "sample rate is typed without an uncertainty", 'rate = "100.00(1) Hz", or imu.time_base'
     text = (
-        f"the sample rate is typed without an uncertainty: an error of {1e6 * LIMITS.ordinary_clock:.0f} ppm, ordinary "
-        f"for a clock, shifts the scale factors of the gyro by as much, {max(shifts.values()):.2g} of their u: state "
-        'its uncertainty, such as rate = "100.00(1) Hz", or imu.time_base'
+        f"the {what}: an error of {1e6 * LIMITS.ordinary_clock:.0f} ppm, ordinary for a clock, shifts the scale "
+        f"factors of the gyro by as much, {max(shifts.values()):.2g} of their u: state its uncertainty, "
+        f"{'such as ' if typed else 'by '}{cure}"
     )
-    harm = tuple(name for name, shift in shifts.items() if shift > 1.0)
+    harm = tuple(name for name, shift in shifts.items() if typed and shift > 1.0)
     findings, (status, message) = judged(
         (estimate.status, estimate.message),
         (*estimate.findings, Finding("rate_without_u", text, harm=harm)),

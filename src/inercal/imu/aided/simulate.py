@@ -156,6 +156,8 @@ def _values(truth: Truth, biases: Mapping[str, Array]) -> dict[str, float]:
             for j, other in enumerate("xyz"):
                 if i != j:
                     values[f"{cross}_{axis}{other}"] = float(model.misalignment[i, j])
+    values |= {f"r_{i}{j}": float(truth.arms[a, b]) for a, i in enumerate("xyz") for b, j in enumerate("xyz")}
+    values |= {"tau_a": -truth.late, "tau_g": -truth.late}
     values |= {
         f"G_{i}{j}": float(truth.g_sensitivity[a, b])
         for a, i in enumerate("xyz")
