@@ -21,6 +21,7 @@ from inercal.imu.simulate import draw_full_truth
 from inercal.imu.task import calibrate
 from inercal.imu.temperature.sweep import fit_recording
 from inercal.studies.load import load_imu_study
+from inercal.validate import rows
 from inercal.validate.case import Case, record_of, study_of
 
 _AXES = "xyz"
@@ -332,4 +333,5 @@ CASES = (
         )
         for tool in ("imu_tk", "imucal", "kalibr", "psins")
     ),
+    *rows.CASES,
 )
