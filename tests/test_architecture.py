@@ -149,8 +149,8 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "imu": (
-        "limits identified rest recording rows turns settings simulate multiposition means known_rates known_turns "
-        "ferraris aided temperature task figures"
+        "limits identified rest recording rows turns settings second_order simulate multiposition means known_rates "
+        "known_turns ferraris aided temperature task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "

@@ -62,7 +62,9 @@ CODES: dict[str, Code] = {
     "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
     "several_instruments": Code("repeat runs look like runs of different instruments", _ALWAYS),
     "rate_suspect": Code("a stated rate of a table does not fit the others", _BY_SIZE),
-    "rate_without_u": Code("a sample rate was typed without an uncertainty", _BY_SIZE),
+    "rate_without_u": Code(
+        "a sample rate was typed without an uncertainty, or time stamps are taken as exact", _BY_SIZE
+    ),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
     "hysteresis": Code("values on rising and on falling temperature differ", _NEVER),
@@ -80,7 +82,7 @@ CODES: dict[str, Code] = {
     "outlying_pose": Code("a static pose lies off what all others say", _BY_SIZE),
     "outlying_turn": Code("a turn lies off what all others say", _BY_SIZE),
     "unmodelled_k2": Code(
-        "second-order coefficients of the accelerometers are not fitted, and would matter", _BY_SIZE
+        "second-order coefficients of the accelerometers are not fitted, and show or rule u", _BY_SIZE
     ),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),

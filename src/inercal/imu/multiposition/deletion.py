@@ -118,8 +118,8 @@ class LinearFit:
         return math.exp(float(brentq(surplus, math.log(least), math.log(most), xtol=1e-4)))
 
 
-def outlying(fit: LinearFit) -> list[int]:
-    """Items that do not belong to the others, at a risk of `LIMITS.outlier_risk` that any is named falsely."""
+def outlying(fit: LinearFit, risk: float) -> list[int]:
+    """Items that do not belong to the others, at that ``risk`` that any is named falsely."""
     from scipy.special import fdtrc
 
     d = fit.residuals.shape[1]
@@ -139,7 +139,7 @@ def outlying(fit: LinearFit) -> list[int]:
         p = fdtrc(d, left, (gain / d) / np.maximum((total - gain) / left, 1e-300))
         worst = int(np.argmin(p))
         removed.append(int(np.flatnonzero(alive)[worst]))
-        if p[worst] * len(part) < LIMITS.outlier_risk:
+        if p[worst] * len(part) < risk:
             named = step
         alive[removed[-1]] = False
     return sorted(removed[:named])
