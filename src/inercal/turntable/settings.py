@@ -10,7 +10,17 @@ from typing import Any, Literal
 from inercal.arrays import short_repr
 from inercal.designs.tolerances import Price
 from inercal.geometry.site import Site
-from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity, within
+from inercal.keys import (
+    FREQUENCY,
+    RATE,
+    RELATIVE_U,
+    TIME,
+    above_zero,
+    option,
+    quantities,
+    quantity,
+    within,
+)
 from inercal.rigs.chain import Chain
 from inercal.rigs.plans import Plan
 from inercal.units import Quantity, Unit
@@ -153,6 +163,27 @@ class RateTest:
 
 
 @dataclass(frozen=True)
+class StepTest:
+    """A test of accelerometers by small steps about level; all but its being there is for a simulation.
+
+    ``at`` holds angles [rad] at which the table is level; 0 where absent.
+    """
+
+    joint: str = option("axis that tilts; for simulate", "phi1")
+    largest: float = quantity(
+        "largest tilt to either side; for simulate", "angle", "60 arcsec", bounds=above_zero("an angle")
+    )
+    step: float = quantity(
+        "change of the tilt from step to step; for simulate",
+        "angle",
+        "2 arcsec",
+        bounds=above_zero("an angle"),
+    )
+    cycles: int = option("times up, down and back; for simulate", 2, least=1, most=1000)
+    at: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Disturbances:
     """Disturbances that a simulation adds to table and instrument, and no calibration knows; none if absent.
 
@@ -224,6 +255,7 @@ class TurntableSettings:
     instrument: Instrument = Instrument()
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rate_test: RateTest | None = None
+    step_test: StepTest | None = None
     disturbances: Disturbances = Disturbances()
     tolerances: Tolerances = Tolerances()
     traceability: Mapping[str, str] = field(default_factory=dict)
