@@ -27,7 +27,8 @@ def table_instrument(estimate: Estimate, where: object = "calibration") -> Table
     result = estimate.result
     if "steps" in result:
         raise InputError(
-            where, "is of small steps about level, which tell threshold and dead zone, expected one by positions"
+            where,
+            "is of small steps about level, which tell threshold and dead zone, expected one by positions",
         )
     needed = ("instrument", "unit", "stated", "attitude", "gravity_m_s2")
     missing = [key for key in needed if key not in result]

@@ -32,6 +32,7 @@ from inercal.turntable.settings import (
     Constraint,
     Design,
     Disturbances,
+    Leg,
     RateTest,
     StepTest,
     TurntableSettings,
@@ -172,6 +173,12 @@ class AnglesTable(Strict):
     phi3: Angle | None = Field(default=None, description="of the inner axis of three; 0 if absent")
 
 
+class LegTable(AnglesTable):
+    """A part of a rate test: the axis that turns, and angles at which it begins."""
+
+    joint: Literal["phi1", "phi2", "phi3"] = Field(description="axis that turns")
+
+
 class RateTestTable(table_of(RateTest)):  # type: ignore[misc]
     """A rate test of gyros: the table turns at each rate in turn."""
 
@@ -180,6 +187,11 @@ class RateTestTable(table_of(RateTest)):  # type: ignore[misc]
         title="At",
         description="angles of a simulation, where each stay begins",
         examples=[{"phi1": "90 deg"}],
+    )
+    legs: list[LegTable] = Field(
+        default=[],
+        description="axes of a simulation that turn one after the other; joint alone if absent",
+        examples=[[{"joint": "phi1"}, {"joint": "phi1", "phi2": "90 deg"}, {"joint": "phi2"}]],
     )
 
 
@@ -285,7 +297,12 @@ def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> 
 def _rate_test(table: RateTestTable, chain: Chain, where: object) -> RateTest:
     """A rate test."""
     _known([table.joint], chain.joints, "rate_test.joint", where)
-    return settings_of(RateTest, table, at=_at(table.at, chain, "rate_test.at", where))
+    for k, leg in enumerate(table.legs):
+        _known([leg.joint], chain.joints, f"rate_test.legs.{k}.joint", where)
+    legs = tuple(
+        Leg(leg.joint, _at(leg, chain, f"rate_test.legs.{k}", where)) for k, leg in enumerate(table.legs)
+    )
+    return settings_of(RateTest, table, at=_at(table.at, chain, "rate_test.at", where), legs=legs)
 
 
 def _step_test(table: StepTestTable, chain: Chain, where: object) -> StepTest:

@@ -140,13 +140,22 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
+class Leg:
+    """A part of a rate test: the ``joint`` that turns, and angles [rad] ``at`` which it begins; 0 where absent."""
+
+    joint: str
+    at: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class RateTest:
     """A rate test of gyros: the table turns at each rate in turn, by whole turns or not.
 
     ``at`` holds angles [rad] of a simulation: where the other joints stand and each stay begins; 0 where absent.
+    ``legs`` are those of a simulation in which several axes turn, one after the other, each at all rates.
     """
 
-    joint: str = option("axis that turns", "phi2")
+    joint: str = option("axis that turns, where no column joint of the record says", "phi2")
     full_scale: float | None = quantity(
         "rate that non-linearity is stated against; the largest if absent", "rate", example="100 deg/s",
         bounds=RATE,
@@ -160,6 +169,7 @@ class RateTest:
         bounds=RELATIVE_U, name="rate_uncertainty",
     )  # fmt: skip
     at: Mapping[str, float] = field(default_factory=dict)
+    legs: tuple[Leg, ...] = ()
 
 
 @dataclass(frozen=True)
