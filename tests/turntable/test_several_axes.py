@@ -2,13 +2,17 @@
 
 from dataclasses import replace
 
+import hypothesis
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy import stats
 from scipy.spatial.transform import Rotation
 from turntable_studies import LATITUDE, codes_of, study
 
 from inercal.convert.models import model_of, worth_knowing
+from inercal.convert.rate_test import RateGyros
 from inercal.errors import RecordError
 from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
@@ -104,13 +108,13 @@ def test_applied_to_a_recording_it_gives_the_rates_of_the_triad():
     bias = np.array([estimate[f"D_F_{axis}"].value for axis in "xyz"])
     outputs = np.array([S[k] for k in "xyz"]) * (true @ GAIN.T) + bias
     columns = [(f"gyro_{axis}", parse_unit("rad/s"), outputs[:, k]) for k, axis in enumerate("xyz")]
-    given = record_of(columns, np.arange(50.0))
-    correction = model_of(estimate).correction(given)
+    log = record_of(columns, np.arange(50.0))
+    correction = model_of(estimate).correction(log)
     made = correction({f"gyro_{axis}": outputs[:, k] for k, axis in enumerate("xyz")})
     np.testing.assert_allclose(np.stack([made[f"rate_{axis}"] for axis in "xyz"], axis=-1), true, atol=4e-6)
     # and back
     truth = record_of(
-        [(f"rate_{axis}", parse_unit("rad/s"), true[:, k]) for k, axis in enumerate("xyz")], given["gyro_x"].t
+        [(f"rate_{axis}", parse_unit("rad/s"), true[:, k]) for k, axis in enumerate("xyz")], log["gyro_x"].t
     )
     back = model_of(estimate).correction(truth, invert=True)
     again = back({f"rate_{axis}": made[f"rate_{axis}"] for axis in "xyz"})
@@ -120,6 +124,29 @@ def test_applied_to_a_recording_it_gives_the_rates_of_the_triad():
     alone = model_of(estimate).correction(record_of(columns[:1], np.arange(50.0)))
     assert [each.code for each in alone.findings] == ["not_held"]
     assert "T_xy, T_xz" in alone.findings[0].message
+
+
+@given(st.integers(0, 2**32 - 1))
+@hypothesis.settings(max_examples=30, deadline=None)
+def test_a_triad_of_a_rate_test_goes_there_and_back(seed):
+    """Whatever the coefficients, a sample alone has the digits it has among others."""
+    rng = np.random.default_rng(seed)
+    sizes = {"D_F": 1e-3, "S_asym": 1e-3, "S2": 1e-3, "S3": 1e-3}
+    values = {f"{symbol}_{i}": size * rng.standard_normal() for symbol, size in sizes.items() for i in "xyz"}
+    values |= {f"S_{i}": rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 2.0) for i in "xyz"}
+    values |= {name: 0.03 * rng.standard_normal() for name in T}
+    gyros = RateGyros("xyz", values, parse_unit("rad/s"), (-2.0, 2.0))
+    true = {f"rate_{i}": rng.uniform(-2.0, 2.0, 20) for i in "xyz"}
+    rates = record_of([(name, parse_unit("rad/s"), each) for name, each in true.items()], np.arange(20.0))
+    outputs = gyros.correction(rates, invert=True)(true)
+    given = {name: outputs[name] for name in ("gyro_x", "gyro_y", "gyro_z")}
+    log = record_of([(name, parse_unit("rad/s"), each) for name, each in given.items()], np.arange(20.0))
+    correction = gyros.correction(log)
+    made = correction(given)
+    alone = correction({name: each[3:4] for name, each in given.items()})
+    for name, each in true.items():
+        np.testing.assert_allclose(made[name], each, rtol=1e-11, atol=1e-13)
+        assert made[name][3] == alone[name][0]
 
 
 def test_one_leg_with_a_column_joint_is_the_test_without_it():

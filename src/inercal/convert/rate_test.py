@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert.correction import Correction, Samples, factor_of, one_clock
+from inercal.convert.correction import Correction, Samples, factor_of, one_clock, widened
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -66,7 +66,7 @@ class RateGyros:
             {f"{before}_{axis}": (f"{after}_{axis}", written) for axis in present},
             {"values": str(dict(self.values)), "axes": "".join(present), "invert": invert},
             findings=findings,
-            ranges={f"rate_{axis}": (low, high, "rad/s") for axis in present},
+            ranges={f"rate_{axis}": widened(low, high, "rad/s") for axis in present},
         )
 
     def _misalignments(self) -> list[str]:

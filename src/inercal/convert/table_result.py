@@ -45,7 +45,13 @@ def table_instrument(estimate: Estimate, where: object = "calibration") -> Table
     units = {str(unit) for unit in result["unit"].values()}
     output = parse_unit(units.pop(), where)
     attitude = tuple(result["attitude"])
-    instrument = TableInstrument(kind, channels, values, output, float(result["gravity_m_s2"]), attitude)
+    ranges = estimate.conditions.get("ranges") or {}
+    readings = {
+        c: tuple(map(float, ranges[f"reading_of_{c}"])) for c in channels if f"reading_of_{c}" in ranges
+    }
+    instrument = TableInstrument(
+        kind, channels, values, output, float(result["gravity_m_s2"]), attitude, readings
+    )
     _check_axes(instrument, where)
     return instrument
 
