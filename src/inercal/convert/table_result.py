@@ -46,9 +46,10 @@ def table_instrument(estimate: Estimate, where: object = "calibration") -> Table
     output = parse_unit(units.pop(), where)
     attitude = tuple(result["attitude"])
     ranges = estimate.conditions.get("ranges") or {}
-    readings = {
-        c: tuple(map(float, ranges[f"reading_of_{c}"])) for c in channels if f"reading_of_{c}" in ranges
-    }
+    readings = {}
+    for channel in (c for c in channels if f"reading_of_{c}" in ranges):
+        low, high = ranges[f"reading_of_{channel}"]
+        readings[channel] = (float(low), float(high))
     instrument = TableInstrument(
         kind, channels, values, output, float(result["gravity_m_s2"]), attitude, readings
     )
