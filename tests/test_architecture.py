@@ -154,7 +154,7 @@ WITHIN = {
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
-        "positions rate task figures"
+        "positions rate steps task figures"
     ),
     "aoa": (
         "limits layout settings angles motion reading fusion paper diagnosis reference result simulate task "

@@ -67,7 +67,8 @@ CODES: dict[str, Code] = {
     ),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
-    "hysteresis": Code("values on rising and on falling temperature differ", _NEVER),
+    "hysteresis": Code("values on rising and on falling temperature or input differ", _NEVER),
+    "dead_zone": Code("an output does not follow small changes of its input", _NEVER),
     "outside_range": Code("a value is stated outside the range it was measured over", _ALWAYS),
     "excess_scatter": Code(
         "the scatter of the residuals exceeds what the sensor noise explains", _BY_SIZE, rank=12

@@ -115,6 +115,9 @@ _ACCELEROMETER_BY_ANGLE = (
             ("Kpo", "cross-coupling of pendulous and output axis", "1/(m/s^2)"),
             ("Kpp", "cross-axis coefficient, of the square along the pendulous axis", "1/(m/s^2)"),
             ("Koo", "cross-axis coefficient, of the square along the output axis", "1/(m/s^2)"),
+            ("K_dz", "dead zone: width of the inputs about level to which there is no response", "m/s^2"),
+            ("K_th", "threshold: input from the middle of the dead zone with half of its response", "m/s^2"),
+            ("K_hyst", "hysteresis: output after the input was raised less after lowered, over K1", "m/s^2"),
         )
     ),
 )

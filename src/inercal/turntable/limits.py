@@ -84,6 +84,18 @@ class Limits:
     """Cosine of turning axis and a gyro axis below which the gyro lies across: of a misalignment of 10 mrad towards a
     third axis 2 arcsec pass for one towards the turning axis."""
 
+    small_step: float = 0.5
+    """Specific force [m/s^2] along the axis of an accelerometer up to which a tilt is a small one about level."""
+
+    fewest_steps: int = 10
+    """Steps of a test of threshold and dead zone, and distinct angles among them, at least."""
+
+    edge_at_end: float = 0.05
+    """Probability that a dead zone reaches as far as the steps beyond which nothing bounds it."""
+
+    term_sigmas: float = 3.0
+    """Dead zone and hysteresis, over their standard uncertainties, from which a finding names them."""
+
     scatter_dof: int = 3
     """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""
 
