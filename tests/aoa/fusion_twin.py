@@ -126,9 +126,9 @@ def _off(x, k):
 
 
 def believed_of(twin, x, P):
-    """(n,) how much of a derivative by each state is kept: of positions and the gyro's scale as much as moves."""
+    """(n,) how much of a derivative by each state is kept: of positions, gyro scale and delay as much as moves."""
     rate, acceleration = (max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0 for j in (1, 2))
-    by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate}
+    by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate, "tau": acceleration}
     return np.array([by.get(name.partition("_")[0], 1.0) for name in twin.names])
 
 

@@ -140,11 +140,11 @@ class Calibration:
 class Timing:
     """Delays [s], positive where outputs come late.
 
-    ``gyro_delay`` of the gyro against the accelerometers, None where it is to be estimated; ``common_delay`` of all
+    ``gyro_delay`` of the gyro against the accelerometers, None where it is estimated; ``common_delay`` of all
     sensors against the stamps, with its standard uncertainty ``common_delay_u``: no sensor sees it.
     """
 
-    gyro_delay: float | None = 0.0
+    gyro_delay: float | None = None
     common_delay: float = 0.0
     common_delay_u: float = 0.0
 

@@ -120,8 +120,8 @@ class SensorPriorTable(table_of(Prior)):  # type: ignore[misc]
 class TimingTable(Strict):
     """Delays, positive where outputs come late."""
 
-    gyro_delay: _Delay | Literal["estimate"] | None = Field(
-        default=None, description="of the gyro against the accelerometers; or estimate; 0 if absent"
+    gyro_delay: _Delay | Literal["estimate"] = Field(
+        default="estimate", description="of the gyro against the accelerometers; or estimate"
     )
     common_delay: _CommonDelay | None = Field(
         default=None,
@@ -237,7 +237,7 @@ def _flexure(table: FlexureTable, usual: Resonance) -> Resonance:
 def _timing(table: TimingTable) -> Timing:
     """The delays; None for one to be estimated."""
     gyro = table.gyro_delay
-    delay = None if gyro == "estimate" else gyro.value if isinstance(gyro, Quantity) else 0.0
+    delay = gyro.value if isinstance(gyro, Quantity) else None
     common = table.common_delay
     return Timing(delay, 0.0 if common is None else common.value, 0.0 if common is None else common.u)
 

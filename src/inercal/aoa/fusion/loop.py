@@ -229,7 +229,7 @@ def significant(value: float, variance: float) -> float:
 
 @kernel
 def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleration: float) -> None:
-    """Remove from a row the derivatives by positions and by the gyro's scale where the motion is only noise.
+    """Remove from a row the derivatives by positions and by the gyro's scale and delay where the motion is only noise.
 
     They multiply rate and acceleration. At rest the filter would learn them from noise, and be sure of wrong values.
     """
@@ -241,6 +241,8 @@ def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleratio
                 values[a] *= moved
         if places.scale >= 0 and at[a] == places.scale:
             values[a] *= of_rate
+        if places.delay >= 0 and at[a] == places.delay:
+            values[a] *= of_acceleration
 
 
 @kernel
