@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter
-from fusion_twin import Twin, believed_of, run
+from fusion_twin import Twin, believed_of, beyond, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, G, scenario, study
@@ -209,6 +209,7 @@ def test_filterpy_finds_the_same(states):
         for i in range(4):
             told_of, h, R = twin.reading(ahead, i, row)
             h = h * believed
+            R += believed[twin.place["tau_g"]] * beyond(twin, theirs.P) if i == 3 else 0.0
             theirs.update(
                 row[i : i + 1],
                 HJacobian=lambda x, h=h: h[None, :],

@@ -169,6 +169,15 @@ class Limits:
     fading_interval: float = 10.0
     """Interval [s] at which constants fade."""
 
+    snap_time: float = 15.0
+    """Time [s] of a stretch by which the snap is chosen."""
+
+    snap_stretches: int = 4
+    """Stretches, the liveliest of a recording, by which it is chosen."""
+
+    snap_ratio: float = 1.4
+    """Mean squared innovation, over that of a still model with the same noise, up to which a snap is large enough."""
+
     settling_time: float = 2.0
     """Time [s] after the first row from which innovations and errors are judged."""
 

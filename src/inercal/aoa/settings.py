@@ -153,7 +153,7 @@ class Timing:
 class Estimator:
     """The fusion of all sensors.
 
-    ``snap`` [rad^2/s^7], None where it is not stated (`density`).
+    ``snap`` [rad^2/s^7], None where the recording decides (`inercal.aoa.diagnosis.snap`); until then `density`.
     """
 
     states: States = option("of three accelerometers: 19 all errors, 15, 11, 8 biases alone", 19)

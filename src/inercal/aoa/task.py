@@ -11,6 +11,7 @@ import numpy as np
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.diagnosis.examination import diagnose, implausible
+from inercal.aoa.diagnosis.snap import with_snap
 from inercal.aoa.fusion import filter_result, live, smoother
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem, problem
@@ -39,9 +40,10 @@ from inercal.records.record import Record
 class Measurement:
     """An ``estimate``, and the data behind it for files and pictures.
 
-    ``settings`` are those of the study, corrected by an earlier result; ``angles`` of the chosen method; ``filtered``
-    of the fusion, None for the paper's methods; ``points`` at rest; ``delay`` of the gyro by the spectra; ``errors`` by
-    method and ``verified`` sensors where there is a reference angle; ``compared`` angles of other methods, by name.
+    ``settings`` are those of the study, corrected by an earlier result, with the snap that the recording shows;
+    ``angles`` of the chosen method; ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest;
+    ``delay`` of the gyro by the spectra; ``errors`` by method and ``verified`` sensors where there is a reference
+    angle; ``compared`` angles of other methods, by name.
     """
 
     estimate: Estimate
@@ -118,6 +120,7 @@ def measure(
     recording = recording_of(record, settings)
     if not recording.spatial:
         settings.attitude.check_pitch_shows()
+    settings = with_snap(recording, settings)
     findings = implausible(recording, settings)
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior)

@@ -68,8 +68,10 @@ def _certain(value: object) -> Quantity:
 _SNAP = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*rad(?:\^2|²)\s*/\s*s(?:\^7|⁷)\s*")
 
 
-def _snap(value: object) -> float:
-    """A spectral density [rad^2/s^7], as a text with that unit."""
+def _snap(value: object) -> float | None:
+    """A spectral density [rad^2/s^7], as a text with that unit; None for auto."""
+    if value == "auto":
+        return None
     match = _SNAP.fullmatch(value) if isinstance(value, str) else None
     try:
         density = float(match[1]) if match else math.nan
@@ -77,16 +79,16 @@ def _snap(value: object) -> float:
         density = math.nan
     if not 0.0 < density < math.inf:
         raise refusal(
-            f'found {shown(value)}, expected a spectral density above zero, such as "1e7 rad^2/s^7"'
+            f'found {shown(value)}, expected "auto" or a spectral density above zero, such as "1e7 rad^2/s^7"'
         )
     return density
 
 
 _Snap = Annotated[
-    float,
+    float | None,
     PlainValidator(_snap),
-    PlainSerializer(lambda value: f"{value!r} rad^2/s^7"),
-    WithJsonSchema({"type": "string", "examples": ["1e7 rad^2/s^7"]}),
+    PlainSerializer(lambda value: "auto" if value is None else f"{value!r} rad^2/s^7"),
+    WithJsonSchema({"type": "string", "examples": ["auto", "1e9 rad^2/s^7"]}),
 ]
 
 
@@ -133,10 +135,10 @@ class TimingTable(Strict):
 class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
     """The fusion of all sensors."""
 
-    snap: _Snap | None = Field(
+    snap: _Snap = Field(
         default=None,
-        description="spectral density of the angle's fourth derivative; 1e7 rad^2/s^7 if absent, 1e8 from 15 "
-        "states on",
+        description="spectral density of the angle's fourth derivative; auto: 1e7 rad^2/s^7, 1e8 from 15 states on, "
+        "or in a livelier file the smallest of 1e9 to 1e12 that fits",
     )
 
 

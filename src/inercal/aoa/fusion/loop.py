@@ -246,6 +246,14 @@ def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleratio
 
 
 @kernel
+def beyond_first_order(P: Array, delay: int) -> float:
+    """Variance of the gyro's reading by the product of a delay and an acceleration that are both uncertain, and by that
+    of its square and half the jerk: where motion is lively, a derivative alone would teach a delay from noise."""
+    of_delay = P[delay, delay]
+    return of_delay * (P[2, 2] + 0.75 * of_delay * P[3, 3])
+
+
+@kernel
 def write(x: Array, P: Array, constants: Constants, out: Array, k: int) -> None:
     """Put theta, u, rate, u, acceleration at the stamp into row ``k``: later by a common delay than the sensors."""
     tau, u = constants.common_delay, constants.common_delay_u
@@ -313,6 +321,8 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
             if abs(z[k, i]) < _READING:
                 expected, noise, entries = reading(i, at, z[k, count + 2], model, row)
                 believed(row, entries, places, of_rate, of_acceleration)
+                if i == count and places.delay >= 0 and of_acceleration > 0.0:
+                    noise += beyond_first_order(P, places.delay)
                 v = z[k, i] - expected
                 for a in range(entries):
                     v -= entry[a] * (x[of[a]] - ahead[of[a]])
