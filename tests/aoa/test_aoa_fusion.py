@@ -209,7 +209,7 @@ def test_filterpy_finds_the_same(states):
         for i in range(4):
             told_of, h, R = twin.reading(ahead, i, row)
             h = h * believed
-            R += believed[twin.place["tau_g"]] * beyond(twin, theirs.P) if i == 3 else 0.0
+            R += beyond(twin, theirs.P, believed) if i == 3 else 0.0
             theirs.update(
                 row[i : i + 1],
                 HJacobian=lambda x, h=h: h[None, :],

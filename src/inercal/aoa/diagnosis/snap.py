@@ -105,7 +105,7 @@ def _nis(of: FilterProblem, t: Array, rows: Array) -> float:
 def _still(recording: Recording, settings: AoaSettings) -> float:
     """The same of a still model with the study's noise, sampled as the recording was by the sensors that it has."""
     step = float(np.median(np.diff(recording.t[later(recording.t)])))
-    t = step * np.arange(round(2.0 * LIMITS.settling_time / step))
+    t = step * np.arange(round(2.0 * LIMITS.settling_time / step), dtype=float)
     layout, rng = settings.layout, np.random.default_rng(0)
     up = settings.site.gravity * settings.attitude.level
     acc = np.tile(-up * np.sin(layout.angle), (len(t), 1))

@@ -249,8 +249,9 @@ def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleratio
 def beyond_first_order(P: Array, delay: int) -> float:
     """Variance of the gyro's reading by the product of a delay and an acceleration that are both uncertain, and by that
     of its square and half the jerk: where motion is lively, a derivative alone would teach a delay from noise."""
-    of_delay = P[delay, delay]
-    return of_delay * (P[2, 2] + 0.75 * of_delay * P[3, 3])
+    of_delay: float = P[delay, delay]
+    beyond: float = of_delay * (P[2, 2] + 0.75 * of_delay * P[3, 3])
+    return beyond
 
 
 @kernel
