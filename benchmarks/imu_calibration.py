@@ -22,6 +22,7 @@ from inercal.examples import EXAMPLES, FOLDER
 from inercal.geometry import kernels
 from inercal.imu.multiposition.calibration import _turns
 from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.imu.settings import Exclusion
 from inercal.imu.turns import carried, carried_with_derivatives
 from inercal.records.maps import read_map
 from inercal.records.read import read
@@ -33,7 +34,7 @@ XSENS = EXAMPLES["xsens"]
 def passes(calibration) -> dict:
     """One pass over all turns: in NumPy, with derivatives, and a compiled integration of as many intervals."""
     undriven = np.zeros((len(calibration.recording.gyro.t), 0))
-    turns, _ = _turns(calibration.recording, calibration.poses, undriven)
+    turns, _ = _turns(calibration.recording, calibration.poses, undriven, Exclusion(), ())
     gyro, up = calibration.gyro, calibration.poses.accelerometer.directions
     intervals = turns.intervals[turns.intervals > 0]
     omega = np.full((len(intervals), 3), 0.5)

@@ -22,7 +22,7 @@ from inercal.errors import InputError
 from inercal.geometry.site import Site
 from inercal.imu.multiposition.calibration import calibrate_multiposition
 from inercal.imu.settings import ImuSettings
-from inercal.records.made import record_of
+from inercal.records.record import record_of
 from inercal.units import parse_unit
 
 SEED = 20261122

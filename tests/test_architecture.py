@@ -149,7 +149,8 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "imu": (
-        "limits rest recording turns settings simulate multiposition ferraris aided temperature task figures"
+        "limits identified rest recording rows turns settings simulate multiposition means known_rates known_turns "
+        "ferraris aided temperature task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
@@ -218,7 +219,10 @@ def test_rooms_within_a_system_stand_on_each_other(system):
 
 
 def test_methods_of_an_imu_do_not_know_each_other():
-    methods = {f"inercal.imu.{method}" for method in ("multiposition", "ferraris", "aided", "temperature")}
+    methods = {
+        f"inercal.imu.{method}"
+        for method in ("multiposition", "ferraris", "aided", "known_rates", "known_turns", "temperature")
+    }
 
     def method_of(module):
         return methods & {".".join(module.split(".")[:3])}

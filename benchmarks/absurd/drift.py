@@ -17,6 +17,7 @@ _SIZES = {
     "output": {"rate": (1.0, "deg/h"), "acceleration": (100.0, "ug")},
     "output/(rad/s)": {"rate": (1.0, "")},
     "output/(m/s^2)": {"rate": (0.1, "deg/h/g"), "acceleration": (1.0, "")},
+    "output/(m/s^2)^2": {"rate": (0.1, "deg/h/g^2")},
     "rad": {"rate": (60.0, "arcsec"), "acceleration": (60.0, "arcsec")},
     "1": {"rate": (50.0, "ppm"), "acceleration": (50.0, "ppm")},
     "1/(rad/s)": {"rate": (5.0, "ppm/(deg/s)")},

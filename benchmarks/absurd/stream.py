@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 
-from inercal.records.write.text import number
+from inercal.records.write import number
 from inercal.stream.lines import Lines
 from inercal.stream.run import run
 

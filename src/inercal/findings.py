@@ -60,6 +60,8 @@ CODES: dict[str, Code] = {
     "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),
     "bias_drift": Code("a bias drifts over the recording", _BY_SIZE),
     "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
+    "several_instruments": Code("repeat runs look like runs of different instruments", _ALWAYS),
+    "rate_suspect": Code("a stated rate of a table does not fit the others", _BY_SIZE),
     "rate_without_u": Code("a sample rate was typed without an uncertainty", _BY_SIZE),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
@@ -82,13 +84,25 @@ CODES: dict[str, Code] = {
     ),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
-    "uncertain_site": Code("gravity or earth rate is known so badly that it rules the uncertainties", _NEVER),
+    "uncertain_site": Code(
+        "gravity or earth rate is known so badly that it rules the uncertainties", _BY_SIZE
+    ),
     "whole_turns": Code(
         "the angle of a turning axis is not known, and whole turns are taken for granted", _NEVER
     ),
     "weak_term": Code("a term is hardly known", _NEVER),
     "noise_misfit": Code("the noise is not of the kinds that are fitted", _NEVER),
     "large_errors": Code("errors of the table are so large that more than their squares matters", _ALWAYS),
+    "trend": Code("outputs or scale factors change over the test", _BY_SIZE, rank=18),
+    "warm_up": Code("outputs settle over the test", _BY_SIZE, rank=19),
+    "heading_suspect": Code("outputs respond to the east rate", _BY_SIZE, rank=17),
+    "level_suspect": Code("the base looks tilted", _BY_SIZE, rank=20),
+    "angle_harmonic": Code("an angle errs with its own harmonics", _BY_SIZE, rank=21),
+    "approach_hysteresis": Code(
+        "readings depend on the sense in which a position is reached", _BY_SIZE, rank=22
+    ),
+    "ground_field": Code("outputs respond to a field that is fixed to the ground", _BY_SIZE, rank=23),
+    "weak_test": Code("faults that would shift a value and that the residuals would not show", _NEVER),
     "not_stated": Code("a file does not state what a calibration should", _BY_SIZE),
     "not_held": Code("something of a calibration is not taken along", _NEVER),
     "other_frame": Code("the axes are not those of the calibration", _NEVER),

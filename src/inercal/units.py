@@ -47,6 +47,8 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
     "velocity": ("m/s", {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "ug*s": 1e-6 * _G, "mg*s": 1e-3 * _G}),
     "temperature": ("degC", {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0}),
     "voltage": ("V", {"V": 1.0, "mV": 1e-3, "uV": 1e-6}),
+    "current": ("A", {"A": 1.0, "mA": 1e-3, "uA": 1e-6, "nA": 1e-9}),
+    "torque": ("N*m", {"N*m": 1.0, "mN*m": 1e-3, "uN*m": 1e-6, "nN*m": 1e-9}),
     "angle random walk": (
         "rad/sqrt(s)",
         {"rad/sqrt(s)": 1.0, "deg/sqrt(s)": _DEG, "deg/sqrt(h)": _DEG / 60, "deg/s/sqrt(Hz)": _DEG,
@@ -77,6 +79,9 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
         {"m/s^3": 1.0, "ug/s": 1e-6 * _G, "ug/h": 1e-6 * _G / 3600, "mg/h": 1e-3 * _G / 3600},
     ),
 }  # fmt: skip
+
+RAW = ("count", "voltage", "current", "torque")
+"""Dimensions of outputs that tell nothing of the input without a scale factor."""
 
 #: zero of the temperature scales [degC]
 _ZERO = {"K": -273.15, "degF": -32.0 * 5.0 / 9.0}
@@ -113,7 +118,8 @@ _PINT_DIMENSIONS = {
     "second": "time", "1 / second": "frequency", "meter": "length", "radian": "angle",
     "radian / second": "rate", "meter / second ** 2": "acceleration", "meter / second": "velocity",
     "radian / second ** 2": "rate ramp", "meter / second ** 3": "acceleration ramp",
-    "kilogram * meter ** 2 / ampere / second ** 3": "voltage", "dimensionless": "number",
+    "kilogram * meter ** 2 / ampere / second ** 3": "voltage", "ampere": "current",
+    "kilogram * meter ** 2 / second ** 2": "torque", "dimensionless": "number",
 }  # fmt: skip
 
 _SUPERSCRIPT = re.compile("⁻?[¹²³⁴-⁹]")

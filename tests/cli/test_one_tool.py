@@ -12,7 +12,7 @@ import pytest
 from new_studies import FILL, filled
 
 from inercal.cli import run
-from inercal.cli.completion import script
+from inercal.cli.package import script
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES
 from inercal.instruments.terms import term

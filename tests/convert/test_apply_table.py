@@ -19,8 +19,8 @@ from inercal.errors import InputError
 from inercal.estimate.files import save
 from inercal.geometry.earth import EARTH_RATE
 from inercal.instruments.by_angle import CHANNELS, channel_model
-from inercal.records.made import record_of
 from inercal.records.read import read
+from inercal.records.record import record_of
 from inercal.records.write import write_record
 from inercal.rigs.plans import grid
 from inercal.turntable.settings import RateTest

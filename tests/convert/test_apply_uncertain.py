@@ -13,8 +13,7 @@ from inercal.convert.models import model_of, worth_knowing
 from inercal.errors import InputError
 from inercal.imu.temperature.calibrations import fit_calibrations
 from inercal.inputs import Source
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.units import parse_unit
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.linear import least_squares
+from inercal.estimate.least_squares import least_squares
 from inercal.estimate.result import coverage_factor
 from inercal.geometry.earth import gravity, gravity_gradient
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.estimate.identifiability import identify, in_words
-from inercal.estimate.linear import least_squares, whiten
+from inercal.estimate.least_squares import least_squares, whiten
 from inercal.geometry.rotations import elementary
 from rows import for_each
 

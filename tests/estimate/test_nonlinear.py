@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.estimate.linear import least_squares
-from inercal.estimate.nonlinear import solve
+from inercal.estimate.least_squares import least_squares, solve
 from rows import for_each
 
 T = np.linspace(0.0, 2.0, 12)

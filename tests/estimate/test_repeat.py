@@ -194,3 +194,25 @@ def test_the_part_from_elsewhere_survives_the_file():
     found = combine_runs([run_of([1.0], [1.0], [[0.25]]), run_of([2.0], [1.0], [[0.25]])])
     again = from_json(to_json(found))
     np.testing.assert_array_equal(again.common, found.common)
+
+
+def test_runs_of_different_instruments_are_said_to_be():
+    """Scale factors of 0.5 % and misalignments of 5 mrad from run to run; either alone may be one instrument."""
+    rng = np.random.default_rng(21)
+    names = ("K1_x", "K1_y", "K1_z", "M_xy", "M_xz", "M_yz")
+    units = ("count/(m/s^2)",) * 3 + ("rad",) * 3
+
+    def codes(scale, angle):
+        runs = []
+        for _ in range(5):
+            values = np.concatenate([400.0 * (1 + scale * rng.normal(size=3)), angle * rng.normal(size=3)])
+            own = np.array([0.02] * 3 + [1e-4] * 3) ** 2
+            runs.append(replace(run_of(values, own), names=names, units=units))
+        combined = combine_runs(runs)
+        return {finding.code for finding in combined.findings}, combined.status
+
+    found, status = codes(5e-3, 5e-3)
+    assert "several_instruments" in found
+    assert status is Status.SUSPECT
+    for one in (codes(5e-3, 0.0), codes(0.0, 5e-3), codes(1e-4, 1e-4)):
+        assert "several_instruments" not in one[0]

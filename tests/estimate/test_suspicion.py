@@ -51,8 +51,8 @@ def test_whoever_finds_something_that_harms_by_size_says_what_it_harms():
         code = node.args[0].value if isinstance(node.args[0], ast.Constant) else None
         if not stated and (code is None or CODES[code].harm is Harm.BY_SIZE):
             silent.append(f"{where}:{node.lineno} {code}")
-    # the reader's and the time axis's codes never do harm, whichever of them it is
-    allowed = {"time.py", "coefficients.py", "outcome.py"}
+    # codes of the reader never do harm, whichever of them it is
+    allowed = {"coefficients.py", "outcome.py"}
     assert [each for each in silent if not (each.endswith("None") and each.split(":")[0] in allowed)] == []
 
 

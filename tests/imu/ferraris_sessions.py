@@ -13,7 +13,7 @@ from inercal.imu.settings import ImuSettings
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.record import Record
-from inercal.studies.imu_ferraris import FerrarisTable, ferraris_settings
+from inercal.studies.imu import FerrarisTable, ferraris_settings
 from inercal.units import parse_unit
 
 SETTINGS = ImuSettings(Site(9.81))

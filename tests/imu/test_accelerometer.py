@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inercal.geometry.rotations import conjugate, rotate
+from inercal.imu.identified import pose_words
 from inercal.imu.multiposition.accelerometer import fit_accelerometer, model_from
-from inercal.imu.multiposition.verdict import curing_pose, pose_words
+from inercal.imu.multiposition.verdict import curing_pose
 from inercal.imu.simulate import hand_poses
 
 G = 9.81

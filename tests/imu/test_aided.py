@@ -26,7 +26,7 @@ from inercal.records.record import Record
 from inercal.report.html import render
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
-from inercal.studies.imu_aided import AidedTable, aided_settings
+from inercal.studies.imu import AidedTable, aided_settings
 from inercal.units import parse_quantity, parse_unit
 
 CHAIN = turntable("two_axis_turntable", None)

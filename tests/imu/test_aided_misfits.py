@@ -21,7 +21,7 @@ from inercal.imu.settings import AidedSettings, ImuSettings
 from inercal.records.record import Record
 from inercal.rigs.distribution import normal
 from inercal.rigs.tables import turntable
-from inercal.studies.imu_aided import AidedTable
+from inercal.studies.imu import AidedTable
 
 CHAIN = turntable("two_axis_turntable", None)
 ACC, GYRO = ("acc_x", "acc_y", "acc_z"), ("gyro_x", "gyro_y", "gyro_z")

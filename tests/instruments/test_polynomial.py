@@ -49,7 +49,7 @@ def test_a_gyrowheel_follows_its_equation():
 
 @pytest.mark.parametrize("axis", "xyz")
 def test_a_gyro_follows_its_equation(axis):
-    """y = D_F + S (w_i + T_ij w_j + T_ik w_k) + G f: misalignments times the scale factor, G not."""
+    """y = D_F + S (w_i + T_ij w_j + T_ik w_k) + G f + squares of f: misalignments times the scale factor, G not."""
     (f, w), model = draws(), channel_model("gyro", f"gyro_{axis}")
     values = values_of(model, np.random.default_rng(2))
     c = dict(zip(model.symbols, values, strict=True))
@@ -57,6 +57,8 @@ def test_a_gyro_follows_its_equation(axis):
     turned = w[:, i] + sum(c[f"T_{axis}{j}"] * w[:, "xyz".index(j)] for j in "xyz" if j != axis)
     expected = c[f"D_F_{axis}"] + c[f"S_{axis}"] * turned
     expected = expected + sum(c[f"G_{axis}{j}"] * f[:, "xyz".index(j)] for j in "xyz")
+    for j, k in ("xx", "yy", "zz", "xy", "xz", "yz"):
+        expected = expected + c[f"G_{axis}{j}{k}"] * f[:, "xyz".index(j)] * f[:, "xyz".index(k)]
     assert_allclose(model.regressors(f, w) @ model.linear(values), expected, rtol=1e-12)
 
 

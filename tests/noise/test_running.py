@@ -47,7 +47,7 @@ def test_the_window_equals_its_definition(n, window, channels, seed):
     for i in range(window - 1, n):
         part = x[i - window + 1 : i + 1]
         np.testing.assert_allclose(mean[i], part.mean(axis=0), rtol=1e-9, atol=1e-13)
-        np.testing.assert_allclose(variance[i], part.var(axis=0, ddof=1), rtol=1e-9)
+        np.testing.assert_allclose(variance[i], part.var(axis=0, ddof=1), rtol=1e-9, atol=1e-13)
 
 
 def test_the_window_equals_that_of_a_recording():

@@ -11,7 +11,7 @@ from inercal.rigs.distribution import uniform
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.tables import turntable
 from inercal.sensitivities import exact
-from inercal.sensitivities.estimators import draw, estimate, evaluate
+from inercal.sensitivities.sampled import draw, estimate, evaluate
 
 H = np.radians(2.0 / 60.0)
 TABLE = turntable("two_axis_turntable", uniform(H))

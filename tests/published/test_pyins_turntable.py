@@ -20,7 +20,7 @@ from inercal.geometry.site import Site
 from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.settings import ImuSettings
 from inercal.records.read import read
-from inercal.studies.imu_aided import AidedTable, aided_settings
+from inercal.studies.imu import AidedTable, aided_settings
 
 ACC = np.array(
     [

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from inercal.inputs import Source
 from inercal.records.checks import check
-from inercal.records.checks.time import time_axis, time_unit
-from inercal.records.checks.values import outliers, saturation
+from inercal.records.checks.values import outliers, saturation, time_axis, time_unit
 from inercal.records.column import Column
 from inercal.records.places import places
 from inercal.units import parse_unit

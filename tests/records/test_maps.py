@@ -83,8 +83,8 @@ def test_a_map_gives_channels_options_and_rate(tmp_path):
         ("[columns.acc_x]\nfrom = 1", "columns.acc_x.unit: missing, expected a unit such as"),
         (
             "[columns.acc_x]\nfrom = 1\nunit = 'm/s'",
-            r'columns.acc_x.unit: found "m/s" \(velocity\), expected a unit of acceleration or count or voltage '
-            r'or kind = "increment"',
+            r'columns.acc_x.unit: found "m/s" \(velocity\), expected a unit of acceleration or count or voltage or '
+            r'current or torque or kind = "increment"',
         ),
         (
             "[columns.acc_x]\nfrom = 1\nunit = 'flurb'",

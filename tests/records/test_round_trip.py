@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from inercal.errors import InputError
 from inercal.findings import Finding
 from inercal.inputs import Source
-from inercal.records.clocks import clocks
-from inercal.records.column import Column
+from inercal.records.column import Column, clocks
 from inercal.records.read import read
 from inercal.records.record import Record
 from inercal.records.write import SUFFIXES, write_record

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import InputError, RecordError
-from inercal.records.read import lines, read
+from inercal.records.read import layout, read
 from rows import for_each
 
 HEADER = "t [s],acc_x [m/s^2],gyro_x [deg/h]"
@@ -123,7 +123,7 @@ def test_compressed_files_are_read(tmp_path):
     block=st.sampled_from([200, 1000, 1 << 21]),
 )
 def test_what_is_written_reads_back_exactly(tmp_path, monkeypatch, rows, delimiter, block):
-    monkeypatch.setattr(lines, "_BLOCK", block)
+    monkeypatch.setattr(layout, "_BLOCK", block)
     record = read(written(tmp_path / "a.csv", table(rows, delimiter)))
     assert holds_rows(record, rows)
     assert not {"bad_row", "nan", "truncated"} & set(codes(record))
@@ -135,7 +135,7 @@ def test_findings_do_not_depend_on_the_blocks_read(tmp_path, monkeypatch, block)
         table(ROWS * 10).replace("0.03,9.82,-2.0\n", "0.03,,-2.0\n", 3).replace("0.02,9.8,1.0\n", "oops\n", 2)
     )
     whole = read(written(tmp_path / "a.csv", text))
-    monkeypatch.setattr(lines, "_BLOCK", block)
+    monkeypatch.setattr(layout, "_BLOCK", block)
     parts = read(tmp_path / "a.csv")
     assert parts.findings == whole.findings
     np.testing.assert_array_equal(parts["acc_x"].values, whole["acc_x"].values)
@@ -247,7 +247,8 @@ def test_of_many_strange_columns_whole_names_are_said(tmp_path):
     names = [f"Drehrate {i} [mdeg/s]" for i in range(12)]
     path = written(tmp_path / "a.csv", ";".join(names) + "\n" + ";".join("1" * 12) + "\n")
     said = (
-        r"Drehrate 7 \[mdeg/s\] and 4 more, expected known ones .* or a map \(`inercal new imu` writes one\)"
+        r"Drehrate 7 \[mdeg/s\] and 4 more, expected known ones .* or a map "
+        r"\(`inercal new` imu, turntable, selfcal or aoa writes one\)"
     )
     with pytest.raises(RecordError, match=said):
         read(path)
@@ -261,7 +262,7 @@ def test_positions_need_no_clock(tmp_path):
 
 
 def test_progress_counts_bytes_up_to_all(tmp_path, monkeypatch):
-    monkeypatch.setattr(lines, "_BLOCK", 200)
+    monkeypatch.setattr(layout, "_BLOCK", 200)
     first = written(tmp_path / "a.csv", table(ROWS * 20))
     second = written(tmp_path / "b.csv", "t [s],acc_y [g]\n" + "0.1,2.0\n" * 50)
     told = []

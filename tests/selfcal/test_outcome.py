@@ -189,7 +189,7 @@ def test_a_recording_that_contradicts_the_model_is_inconsistent_and_says_why():
 
 
 def test_an_inconsistent_verdict_names_what_explains_it_and_leaves_the_rest_unsaid():
-    """Of gimbals with a wrong sign a saturated sample explains nothing; goals of such numbers are of no interest."""
+    """A wrong sign explains more than a saturated sample; goals of such numbers are of no interest."""
     settings = study(path="best", goal={"kg0_x": 1e-12})
     made = recording(settings)
     known = (Finding("saturation", "acc_z: 3 samples"), Finding("outlier", "acc_x: 1 sample"))
@@ -201,7 +201,9 @@ def test_an_inconsistent_verdict_names_what_explains_it_and_leaves_the_rest_unsa
     assert result.message.endswith(made.findings[-1].message)
     assert [finding.code for finding in result.findings] == ["saturation", "outlier", "sign_suspect"]
     silent, _ = assembled(settings, replace(made, findings=known[:1]))
-    assert silent.message.endswith("check noise, commands, signs and units")
+    assert silent.message.endswith("acc_z: 3 samples")
+    unexplained, _ = assembled(settings, replace(made, findings=()))
+    assert unexplained.message.endswith("check noise, commands, signs and units")
     # what the diagnosis found comes before what was seen in single channels
     told, _ = assembled(settings, made, findings=[Finding("low_scatter", "a"), Finding("unmodelled", "b")])
     assert told.message.endswith("; b")

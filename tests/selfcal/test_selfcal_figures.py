@@ -41,8 +41,7 @@ from inercal.selfcal.platform.coefficients import (
 )
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.result.comparison import side_by_side
-from inercal.selfcal.result.tables import bounds_by_path, turns, weak_combinations
+from inercal.selfcal.result.tables import bounds_by_path, side_by_side, turns, weak_combinations
 from inercal.selfcal.task import Calibration
 from inercal.units import parse_unit
 
@@ -429,7 +428,7 @@ def test_the_page_of_a_design():
     )
     page = check(design_page(found, settings, told(found)))
     assert page.index("Comparison of paths") < page.index("Turns") < page.index("What the path cannot see")
-    for words in ("found", "ds_z", "(rest 5 s)", "up to 5 turns", "0.0005 °/√h", "10 µg", "The path found"):
+    for words in ("found", "ds_z", "(rest 5 s)", "up to 5 turns", "0.0005 deg/√h", "10 ug", "The path found"):
         assert words in page
 
 

@@ -10,7 +10,7 @@ from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import grid
 from inercal.rigs.tables import turntable
 from inercal.sensitivities import averages, exact, sampled
-from inercal.sensitivities.estimators import estimate, evaluate
+from inercal.sensitivities.sampled import estimate, evaluate
 
 LAW = uniform(np.radians(2.0 / 60.0))
 TABLE = turntable("two_axis_turntable", LAW)

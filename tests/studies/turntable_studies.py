@@ -113,3 +113,16 @@ def wheel_output(axis, c, a, w):
     for first, second in ("XX", "YY", "ZZ", "XY", "XZ", "YZ"):
         drift = drift + c.get(f"{D}_{first}{second}", 0.0) * a["XYZ".index(first)] * a["XYZ".index(second)]
     return drift + sum(c[f"{k}_{i}"] * w[j] for j, i in enumerate("xyz"))
+
+
+def codes_of(estimate):
+    """Codes of the findings but those of what no test would show, which most plans have."""
+    usual = ("weak_test", "stated_exact")
+    return [finding.code for finding in estimate.findings if finding.code not in usual]
+
+
+def u_without_doubts(estimate):
+    """u (p,) without faults that are not excluded: by noise, table and what is stated."""
+    doubtful = [item.share for item in estimate.budget if "not excluded" in item.source]
+    share = np.array([sum(each.get(name, 0.0) for each in doubtful) for name in estimate.names])
+    return estimate.u * np.sqrt(1.0 - share)

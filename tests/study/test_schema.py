@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 from inercal.errors import StudyError
 from inercal.studies.imu import imu_study
 from inercal.studies.schema import json_schema
-from inercal.studies.ways import DISTRIBUTIONS
+from inercal.studies.starting import DISTRIBUTIONS
 from inercal.units import _TABLE, parse_unit
 from rows import for_each
 

@@ -17,9 +17,9 @@ from inercal.studies.aoa import aoa_study
 from inercal.studies.imu import imu_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
+from inercal.studies.starting import PATHS, POSITIONS
 from inercal.studies.template import template
 from inercal.studies.turntable import turntable_study
-from inercal.studies.ways import PATHS, POSITIONS
 from inercal.units import parse_unit
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
@@ -132,6 +132,10 @@ def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
     for other in INSTEAD.get(table, ()) if key in INSTEAD.get(table, ()) else ():
         place.pop(other, None)
     place |= tomllib.loads(line.removeprefix("# "))
+    if (table, key) == ("imu", "rates"):
+        place["method"] = "known_rates"
+    if (table, key) in (("imu", "turns"), ("imu", "alignment")):
+        place |= {"method": "known_turns", "turns": dict.fromkeys("xyz", "360 deg")}
     if key == "channel":
         place["calibration"] = "calibration.json"
     if key == "clip":

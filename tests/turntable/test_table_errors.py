@@ -44,7 +44,8 @@ def calibrations(case, runs, plain=None):
 def test_intervals_hold(case, runs):
     """The coverage of one test scatters by at most sqrt(0.05 0.95), if all coefficients moved together."""
     z, ok = calibrations(case, runs)
-    assert ok == 1.0
+    # faults are named in 0.5 % of sound records: of 8 in more than one, of 100 in more than three by chance in 2e-3
+    assert runs * (1.0 - ok) < (1.5 if runs == RUNS else 3.5)
     covered = np.mean(np.abs(z) < 1.96)
     assert covered > 0.95 - 4.0 * np.sqrt(0.05 * 0.95 / runs)
     # means of z over the tests, each of unit variance; squares of z by their design effect at most the tests alone
@@ -56,6 +57,17 @@ def test_without_the_words_they_do_not():
     """The scope left out: u far too small, as errors of one angle come back with it."""
     z, _ = calibrations("angle", 4, plain={', scope = "angle"': ""})
     assert np.mean(z**2) > 2.0
+
+
+def test_harmonics_are_a_fault_beyond_those_that_are_stated_alone():
+    """Two minutes of the first harmonic of phi1, stated as that, and as 2 arcsec; nothing stated of the noise."""
+    without_noise = {'noise = "0.003 deg/h"\n': ""}
+    few = without_noise | {'amplitude = "120.0 arcsec"': 'amplitude = "2.0 arcsec"'}
+    for seed in range(4):
+        assert table_errors.one_test("harmonics", seed, without_noise)["status"] == "ok"
+        test = table_errors.one_test("harmonics", seed, few)
+        assert test["status"] == "suspect"
+        assert {"angle_harmonic", "approach_hysteresis"} & set(test["findings"])
 
 
 def test_values_of_an_angle_are_one_unknown_each():

@@ -242,6 +242,22 @@ def test_the_command_writes_tables_that_reach_the_goals(tmp_path, capsys):
         assert taken["predicted"][goal["name"]] == pytest.approx(goal["u"], rel=1e-4)
 
 
+def test_what_was_measured_and_harmonics_are_not_for_sale(tmp_path, capsys):
+    file = tmp_path / "table.toml"
+    measured = 'deps_x = { value = "3(1) arcsec", certificate = "K-1" }'
+    harmonic = 'dphi_z2 = { uniform = "1 arcmin", harmonics = [{ order = 1, amplitude = "2 arcsec" }] }'
+    kept = 'default = { uniform = "2 arcmin" }\n'
+    file.write_text(TOML.replace(kept, f"{kept}{measured}\n{harmonic}\n"))
+    assert run(["design", "tolerances", str(file), "--json"]) == 0
+    by_name = {each["error"]: each for each in json.loads(capsys.readouterr().out)["result"]["tolerances"]}
+    fixed = [each for name, each in by_name.items() if each["cost"] == 0.0]
+    assert len(fixed) == 3  # the measured one, and two quadratures
+    assert all(each["factor"] == 1.0 for each in fixed)
+    assert by_name["dphi_z2"]["cost"] > 0.0
+    assert run(["design", "tolerances", str(file), "--set", "cost.deps_x.cost=2"]) == 2
+    assert "cost.deps_x: the table has no such tolerance" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [

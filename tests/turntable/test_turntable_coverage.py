@@ -26,7 +26,8 @@ RUNS = 250
 @pytest.mark.parametrize("task", [one_turntable_calibration, one_turntable_calibration_of_unknown_noise])
 def test_intervals_cover_the_truth_as_often_as_they_say_with_the_table_s_errors_on(task, runs):
     sample = run(task, runs=runs, seed=SEED)
-    assert np.all(sample["sound"] == 1.0)
+    # tests for faults name one in 0.5 % of sound records: of 20 more than two, of 250 more than six by chance in 1e-3
+    assert np.sum(sample["sound"] != 1.0) <= (6 if runs == RUNS else 2)
     assert sample["error"].shape == (runs, len(usual_terms("gyrowheel")))
     found = coverage(sample["error"], sample["u"], sample["dof"])
     if runs == RUNS:

@@ -15,9 +15,8 @@ from inercal.geometry import earth, rotations
 from inercal.noise import deviation
 from inercal.selfcal.platform import rig
 from inercal.validate import aoa, foundation, imu, noise, selfcal, turntable
-from inercal.validate.case import Case, Numbers, find, judge
+from inercal.validate.case import SOURCES, Case, Numbers, find, judge
 from inercal.validate.run import SYSTEMS, cases_of, validate
-from inercal.validate.sources import SOURCES
 from rows import for_each
 
 CASES = [case for system in SYSTEMS for case in cases_of(system)]

@@ -13,8 +13,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Disturbances, Noise
 from inercal.arrays import Array
 from inercal.errors import StudyError
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
 
 _MARGIN = 1.0

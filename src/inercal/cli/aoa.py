@@ -115,8 +115,7 @@ def aoa(
 
     from inercal._jit import compiling
     from inercal.face import aoa as system
-    from inercal.face.runs import one_run
-    from inercal.face.study import read_study
+    from inercal.face.study import one_run, read_study
     from inercal.records.write import SUFFIXES
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))

@@ -1,14 +1,15 @@
-"""``inercal calibrate``."""
+"""``inercal calibrate`` and ``inercal temperature``."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from inercal.cli.options import (
-    Files,
     MapFile,
     Overrides,
     ReportOutput,
@@ -20,9 +21,10 @@ from inercal.cli.options import (
     working,
 )
 from inercal.cli.outcome import WHOLE, give
+from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.records.record import Record
+    from inercal.imu.temperature.model import TemperatureModel
 
 
 def calibrate_imu(
@@ -36,11 +38,13 @@ def calibrate_imu(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
-    return _calibrated("imu", files, study, map_file, span, overrides, output, read_repeats)
+    from inercal.imu.task import in_rows
+
+    return _calibrated("imu", files, study, map_file, span, overrides, output, in_rows)
 
 
 def calibrate_turntable(
-    files: Files,
+    files: RunFiles,
     /,
     *,
     study: StudyFile,
@@ -50,9 +54,7 @@ def calibrate_turntable(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
-    return _calibrated(
-        "turntable", files, study, map_file, span, overrides, output, lambda *one: [read_record(*one)]
-    )
+    return _calibrated("turntable", files, study, map_file, span, overrides, output)
 
 
 def _calibrated(
@@ -63,9 +65,9 @@ def _calibrated(
     span: Span,
     overrides: list[str] | None,
     output: ReportOutput,
-    read: Callable[[Sequence[Path], Path | None, ReportOutput, Span], list[Record]],
+    in_rows: Callable[[Any], bool] = lambda _: False,
 ) -> int:
-    """Read study and records, calibrate, and hand over."""
+    """Read study and records, calibrate, and hand over; ``in_rows`` of the settings: the rows need no times."""
     from importlib import import_module
 
     from inercal.face.study import read_study
@@ -74,9 +76,56 @@ def _calibrated(
     the_study = read_study(kind, study, overrides or ())
     output.spare(the_study.files)
     clock = time.perf_counter()
-    records = read(files, map_file, output, span)
+    records = read_repeats(files, map_file, output, span, in_rows(the_study.settings))
     read_s = time.perf_counter() - clock
     system = import_module(f"inercal.face.{kind}")
     with working(output) as progress:
         result = system.calibrate(records, the_study, progress=progress)
     return give(result, output, read_s)
+
+
+def temperature(
+    files: Annotated[
+        list[Path], Parameter(help="A static recording over a sweep, or calibrations (.json, .toml).")
+    ],
+    /,
+    *,
+    map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
+    at: Annotated[
+        str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
+    ] = "25 degC",
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Fit what a sensor's output or its calibration does with temperature."""
+    from dataclasses import replace
+
+    from inercal.face.imu import of_temperature
+    from inercal.units import parse_quantity
+
+    reference = parse_quantity(at, "temperature", "--at").value
+    output.check(WHOLE, (*files, map_file))
+    clock = time.perf_counter()
+    if all(file.suffix.lower() in WHOLE for file in files):
+        if map_file is not None:
+            raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
+        span.refuse("calibrations")
+        model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
+    else:
+        from inercal.imu.temperature.sweep import fit_recording
+
+        record = read_record(files, map_file, output, span)
+        read_s = time.perf_counter() - clock
+        model = fit_recording(record, reference)
+    solve_s = time.perf_counter() - clock - read_s
+    result = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
+    return give(result, output, read_s, "temperature model")
+
+
+def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
+    """The model of saved calibrations, in the order given."""
+    from inercal.estimate.files import load
+    from inercal.imu.temperature.calibrations import fit_calibrations
+    from inercal.records.read import source_of
+
+    return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)

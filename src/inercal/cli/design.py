@@ -1,16 +1,15 @@
-"""``inercal design``."""
+"""``inercal design`` and ``inercal sensitivity``: what is asked before a test."""
 
 from __future__ import annotations
 
 import json
 import math
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inercal.cli.options import Overrides, ReportOutput, Study, reading, working
-from inercal.cli.outcome import WHOLE, hand_over, read_in
+from inercal.cli.options import Overrides, ReportOutput, Study, reading, study_in, working
+from inercal.cli.outcome import WHOLE, give
 
 if TYPE_CHECKING:
     from inercal.selfcal.platform.plan import Plan
@@ -27,21 +26,16 @@ def design_positions(
     """Find the positions of a turntable that calibrate best."""
     from inercal._files import write_text
     from inercal.face import turntable as system
-    from inercal.face.study import read_study
 
     output.check((*WHOLE, ".csv"), (study,))
-    clock = time.perf_counter()
-    the_study = read_study("turntable", study, overrides or ())
-    output.spare(the_study.files)
-    read_s = time.perf_counter() - clock
+    the_study, read_s = study_in("turntable", study, overrides, output)
     with working(output) as progress:
         designed = system.design(the_study, progress)
 
     def rows(path: Path) -> None:
         write_text(path, _positions(designed.estimate.result["positions"], the_study.settings))
 
-    estimate = read_in(designed.estimate, read_s)
-    return hand_over(estimate, designed.view.tables(), designed.view.page, output, "positions", rows)
+    return give(designed, output, read_s, "positions", rows)
 
 
 def design_tolerances(
@@ -54,23 +48,17 @@ def design_tolerances(
     """Find the cheapest tolerances of a turntable that reach wanted uncertainties."""
     from inercal._files import write_text
     from inercal.face import turntable as system
-    from inercal.face.study import read_study
     from inercal.turntable.positions.tolerance_result import study_tables
 
     output.check((".json", ".toml"), (study,))
-    clock = time.perf_counter()
-    the_study = read_study("turntable", study, overrides or ())
-    output.spare(the_study.files)
-    read_s = time.perf_counter() - clock
+    the_study, read_s = study_in("turntable", study, overrides, output)
     with working(output) as progress:
         designed = system.design_tolerances(the_study, progress)
 
     def tables(path: Path) -> None:
         write_text(path, study_tables(designed.evidence))
 
-    estimate = read_in(designed.estimate, read_s)
-    page = designed.view.page
-    return hand_over(estimate, designed.view.tables(), page, output, "tolerances", tables, whole=(".json",))
+    return give(designed, output, read_s, "tolerances", tables, whole=(".json",))
 
 
 def design_selfcal(
@@ -84,12 +72,9 @@ def design_selfcal(
     from inercal._files import write_text
     from inercal._jit import compiling
     from inercal.face import selfcal as system
-    from inercal.face.study import read_study
 
     output.check((".json", ".toml"), (study,))
-    clock = time.perf_counter()
-    the_study = read_study("selfcal", study, overrides or ())
-    read_s = time.perf_counter() - clock
+    the_study, read_s = study_in("selfcal", study, overrides, output)
     with compiling("design selfcal", output.say_now):
         system.prepare_design(the_study)
     with reading(output, "searching") as progress:
@@ -98,9 +83,7 @@ def design_selfcal(
     def plan(path: Path) -> None:
         write_text(path, _plan(designed.evidence.plan, designed.message))
 
-    estimate = read_in(designed.estimate, read_s)
-    page = designed.view.page
-    return hand_over(estimate, designed.view.tables(), page, output, "plan", plan, whole=(".json",))
+    return give(designed, output, read_s, "plan", plan, whole=(".json",))
 
 
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:
@@ -120,3 +103,29 @@ def _plan(plan: Plan, message: str) -> str:
         f"# {message}\n[plan]\nturns = [\n{''.join(moves)}]\n"
         f'rate = "{math.degrees(plan.rate):.10g} deg/s"\nstep = "{plan.step:.10g} s"\nstart = {json.dumps(start)}\n'
     )
+
+
+def sensitivity(
+    study: Study,
+    /,
+    *,
+    overrides: Overrides = None,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Say which error of a turntable matters."""
+    from inercal.face import turntable as system
+
+    output.check((*WHOLE, ".nc", ".npz"), (study,))
+    the_study, read_s = study_in("turntable", study, overrides, output)
+    with reading(output, "sampling") as progress:
+        result = system.sensitivity(the_study, bool(output.targets), output.say_now, progress)
+    analysed = result.evidence
+    if analysed.note:
+        output.say(analysed.note)
+
+    def maps(path: Path) -> None:
+        from inercal.turntable.sensitivity.maps import write_maps
+
+        write_maps(analysed, path)
+
+    return give(result, output, read_s, "maps", maps)

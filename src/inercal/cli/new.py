@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from inercal.studies.template import Kind
     from inercal.units import Unit
 
+Rate = Annotated[
+    str | None,
+    Parameter(help='Sample rate of recordings without a time column, for the map: "100 Hz", "100.00(1) Hz".'),
+]
 Recordings = Annotated[list[Path] | None, Parameter(help="Recordings, to guess a column map from.")]
 
 
@@ -23,47 +27,53 @@ def new_imu(
     files: Recordings = None,
     /,
     *,
+    rate: Rate = None,
     overrides: Overrides = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study, and a map guessed from the recordings."""
-    _new("imu", files or [], overrides or [], output)
+    _new("imu", files or [], overrides or [], output, rate)
 
 
 def new_turntable(
     files: Recordings = None,
     /,
     *,
+    rate: Rate = None,
     overrides: Overrides = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study of a turntable, and a map guessed from recordings whose headers do not say what they hold."""
-    _new("turntable", files or [], overrides or [], output)
+    _new("turntable", files or [], overrides or [], output, rate)
 
 
 def new_selfcal(
     files: Recordings = None,
     /,
     *,
+    rate: Rate = None,
     overrides: Overrides = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study of a self-calibration, and a map guessed from recordings that do not say what they hold."""
-    _new("selfcal", files or [], overrides or [], output)
+    _new("selfcal", files or [], overrides or [], output, rate)
 
 
 def new_aoa(
     files: Recordings = None,
     /,
     *,
+    rate: Rate = None,
     overrides: Overrides = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a study of an angle of attack, and a map guessed from recordings that do not say what they hold."""
-    _new("aoa", files or [], overrides or [], output)
+    _new("aoa", files or [], overrides or [], output, rate)
 
 
-def _described(kind: Kind, files: list[Path]) -> tuple[Mapping[str, Unit | None], str | None]:
+def _described(
+    kind: Kind, files: list[Path], rate: str | None
+) -> tuple[Mapping[str, Unit | None], str | None]:
     """Channels of the recordings, with their units where known, and a map where the headers do not say these."""
     from inercal.records.channels import of_a_table
     from inercal.records.guess import guess_map
@@ -80,7 +90,7 @@ def _described(kind: Kind, files: list[Path]) -> tuple[Mapping[str, Unit | None]
     }
     if plain[kind]:
         return channels, None
-    column_map = guess_map(files, on_table=kind == "turntable", of_model=kind == "aoa")
+    column_map = guess_map(files, on_table=kind == "turntable", of_model=kind == "aoa", rate=rate)
     return (dict.fromkeys(_mapped(column_map)) if kind in ("imu", "turntable") else channels), column_map
 
 
@@ -93,16 +103,22 @@ def _mapped(column_map: str) -> list[str]:
     return [name for part in parts for name in part.get("columns", ())]
 
 
-def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput) -> None:
+def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
     from inercal._files import write_text
     from inercal.estimate.result import without_coefficients
     from inercal.records.read import source_of
     from inercal.studies.starting import UNKNOWN
     from inercal.studies.template import template
+    from inercal.units import parse_quantity
 
     output.check((".toml",), files)
-    channels, column_map = _described(kind, files)
+    if rate is not None:
+        if not parse_quantity(rate, "frequency", "--rate", "100 Hz").value > 0.0:
+            raise InputError("--rate", f"found {rate}, expected a rate above 0")
+        if not files:
+            raise InputError("--rate", "found without a recording, expected one for the map")
+    channels, column_map = _described(kind, files, rate)
     study = output.out or Path(f"{kind}.toml")
     map_file = None if column_map is None else study.with_name(f"{study.stem}-map{study.suffix}")
     written = [study] if map_file is None else [study, map_file]

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +21,7 @@ from inercal.errors import InputError
 if TYPE_CHECKING:
     from cyclopts import Token
 
+    from inercal.face.study import Study as StudyOfFile
     from inercal.findings import Finding
     from inercal.records.record import Record
 
@@ -160,7 +162,7 @@ class Span:
 
     def check(self) -> None:
         """Refuse a time that is none, before anything is read; raises `InputError`."""
-        from inercal.records.span import seconds
+        from inercal.records.record import seconds
 
         for option, text in self.given.items():
             seconds(text, option)
@@ -188,30 +190,55 @@ def read_record(
     files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
 ) -> Record:
     """Read recordings, with a progress bar where it takes long, and take the part that is asked for."""
-    from inercal.records.maps import read_map
     from inercal.records.read import read
 
-    span.check()
-    record_map = None if map_file is None else read_map(map_file)
-    with reading(output) as progress:
-        record = read(files, record_map, progress)
-    output.spare(source.path for source in record.sources)  # a map may have named others
-    return span.of(record)
+    return _read(lambda *given: [read(*given)], files, map_file, output, span)[0]
 
 
 def read_repeats(
-    files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
+    files: Sequence[Path],
+    map_file: Path | None,
+    output: FileOutput,
+    span: Span = Span(),
+    counted: bool = False,
 ) -> list[Record]:
-    """As `read_record`, but files with the same channels are the records of repeat runs."""
-    from inercal.records.maps import read_map
+    """As `read_record`, but files with the same channels are the records of repeat runs.
+
+    ``counted``: rows need no times, as means of poses.
+    """
     from inercal.records.read import read_runs
+
+    return _read(partial(read_runs, counted=counted), files, map_file, output, span)
+
+
+def _read(
+    read: Callable[..., list[Record]],
+    files: Sequence[Path],
+    map_file: Path | None,
+    output: FileOutput,
+    span: Span,
+) -> list[Record]:
+    """Records by one of the readers, and the part of each that is asked for."""
+    from inercal.records.maps import read_map
 
     span.check()
     record_map = None if map_file is None else read_map(map_file)
     with reading(output) as progress:
-        records = read_runs(files, record_map, progress)
+        records = read(files, record_map, progress)
     output.spare(source.path for record in records for source in record.sources)
     return [span.of(record) for record in records]
+
+
+def study_in(
+    kind: str, path: Path, overrides: Iterable[str] | None, output: FileOutput
+) -> tuple[StudyOfFile, float]:
+    """A study, whose files the output is to spare, and the time that reading took [s]."""
+    from inercal.face.study import read_study
+
+    clock = time.perf_counter()
+    study = read_study(kind, path, overrides or ())
+    output.spare(study.files)
+    return study, time.perf_counter() - clock
 
 
 def whole_number(kind: object, tokens: Sequence[Token]) -> int:

@@ -60,16 +60,19 @@ def hand_over(
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
 
 
-def give(result: Result, output: ReportOutput, read_s: float, what: str = "calibration") -> int:
-    """Hand over a result of the face; ``what`` it is, in a word."""
-    write = None if result.view.rows is None else result.save
-    estimate = read_in(result.estimate, read_s)
-    return hand_over(estimate, result.view.tables(), result.view.page, output, what, write)
-
-
-def read_in(estimate: Estimate, read_s: float) -> Estimate:
-    """The estimate with the time that reading took [s], beside that of its solution."""
-    return replace(estimate, timing={"read": read_s, "solve": estimate.timing["solve"]})
+def give(
+    result: Result,
+    output: ReportOutput,
+    read_s: float,
+    what: str = "calibration",
+    write: Callable[[Path], object] | None = None,
+    whole: tuple[str, ...] = WHOLE,
+) -> int:
+    """Hand over a result of the face, which took ``read_s`` [s] to read; the others as in `hand_over`."""
+    if write is None and result.view.rows is not None:
+        write = result.save
+    estimate = replace(result.estimate, timing={"read": read_s, "solve": result.estimate.timing["solve"]})
+    return hand_over(estimate, result.view.tables(), result.view.page, output, what, write, whole)
 
 
 def timed(estimate: Estimate) -> Estimate:

@@ -91,12 +91,7 @@ def recorded(
 ) -> list[Path]:
     """The recordings of a command that is not to read a stream.
 
-    Raises
-    ------
-    UsageError
-        There are none.
-    InputError
-        An option is there that only a stream has.
+    Raises `UsageError` where there are none, `InputError` for an option that only a stream has.
     """
     if not files:
         raise UsageError(f"{command}: FILES is missing, expected recordings, or --stream")

@@ -49,7 +49,7 @@ COMMANDS = {
         "inercal new aoa --out aoa.toml",
     ),
     ("inspect", ""): (
-        "inercal.cli.inspect:inspect",
+        "inercal.cli.recordings:inspect",
         "Look at a recording before it is used.\n\nChannels, units, rates, and everything suspicious about it; "
         "--report writes a page with pictures. Findings do not change the exit code.",
         "inercal inspect log.csv --report log.html",
@@ -58,8 +58,10 @@ COMMANDS = {
         "inercal.cli.calibrate:calibrate_imu",
         "Calibrate an IMU held by hand, set on its sides and turned, or turned by a table.\n\nGives bias, scale factor "
         "and misalignment of the accelerometers, and of the gyro if there is one, with uncertainties; of repeat runs "
-        "the combined values. --out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: "
-        "done, but the verdict is not ok.",
+        "the combined values; of the methods known_rates and known_turns FILEs are in order, one "
+        "for each rate or turn. "
+        "--out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: done, but the verdict is "
+        "not ok.",
         "inercal calibrate imu log.csv --study imu.toml --report cal.html",
     ),
     ("calibrate", "turntable"): (
@@ -93,7 +95,7 @@ COMMANDS = {
         "inercal aoa model.csv --study aoa.toml --report aoa.html",
     ),
     ("allan", ""): (
-        "inercal.cli.allan:allan",
+        "inercal.cli.recordings:allan",
         "Tell the noise of an instrument from a recording at rest.\n\nOverlapping Allan deviation of each channel with "
         "confidence limits, and angle or velocity random walk N, bias instability B, rate random walk K, ramp R and "
         "quantisation Q with uncertainties. --out saves them (.json or .toml) or the curves (.csv), --report writes a "
@@ -101,7 +103,7 @@ COMMANDS = {
         "inercal allan static.csv --report noise.html",
     ),
     ("sensitivity", ""): (
-        "inercal.cli.sensitivity:sensitivity",
+        "inercal.cli.design:sensitivity",
         "Say which error of a turntable matters for what the instrument should read.\n\nSobol indices of first and "
         "total order and Shapley effects, exactly or from samples, over the positions of the study. --out writes "
         "the maps (.nc or .npz), --report a page with pictures.",
@@ -161,14 +163,14 @@ COMMANDS = {
         "inercal simulate aoa aoa.toml --seed 1 --out model.csv",
     ),
     ("temperature", ""): (
-        "inercal.cli.temperature:temperature",
+        "inercal.cli.calibrate:temperature",
         "Fit what a sensor's output, or its calibration, does with temperature.\n\nFrom one recording at rest over a "
         "sweep of temperature, or from calibrations made at several temperatures (in the order of time): a cubic with "
         "uncertainties, and the hysteresis. --out saves it (.json or .toml), --report writes a page with pictures.",
         "inercal temperature sweep.csv --map sweep-map.toml --report t.html",
     ),
     ("apply", ""): (
-        "inercal.cli.apply:apply",
+        "inercal.cli.saved:apply",
         "Correct a recording with a calibration.\n\nWrites specific force [m/s^2] and rate [rad/s] to --out (.csv, "
         ".npz, .h5, .parquet or .nc). Of an instrument that was calibrated on a turntable the drift is compensated by "
         "the specific force (acc_x acc_y acc_z) or the angles of the table, and the rate left is rate_x, rate_y; a "
@@ -181,7 +183,7 @@ COMMANDS = {
         "inercal apply cal.json log.csv --out corrected.csv",
     ),
     ("compare", ""): (
-        "inercal.cli.compare:compare",
+        "inercal.cli.saved:compare",
         "Compare two calibrations of one instrument, run to run.\n\nThe difference of each coefficient over its "
         "uncertainty, the normalised error E_n, and whether all differences together are explained; sources common "
         "to both are taken off. --out saves the differences (.json or .toml), --report writes a page. Exit code 1: "
@@ -189,7 +191,7 @@ COMMANDS = {
         "inercal compare before.json after.json --report drift.html",
     ),
     ("convert", ""): (
-        "inercal.cli.convert:convert",
+        "inercal.cli.saved:convert",
         "Convert a calibration to another tool's convention, or from it.\n\n--to writes the file that imu_tk, "
         "imucal, Kalibr or PSINS reads (imu_tk: one for each sensor); without --out it is printed. --from reads "
         "such a file and writes a calibration (.json or .toml) for `inercal apply`; what the file does not state, "
@@ -197,7 +199,7 @@ COMMANDS = {
         "inercal convert cal.json --to imucal --out cal_imucal.json",
     ),
     ("monitor", ""): (
-        "inercal.cli.monitor:monitor",
+        "inercal.cli.recordings:monitor",
         "Watch an instrument live: is it at rest, for how long, and how noisy?\n\nCSV lines come in, from FILE or "
         "standard input, and lines go out: rest against a quiet start of five seconds, and since the last motion mean, "
         "standard deviation, random walk N and Allan deviation of each channel. With --checkpoint the same command "
@@ -213,12 +215,12 @@ COMMANDS = {
         "inercal validate --report validation.html",
     ),
     ("schema", ""): (
-        "inercal.cli.schema:schema",
+        "inercal.cli.package:schema",
         "Print one JSON Schema that covers every kind of study file, for editors and checkers.",
         "inercal schema --out inercal.schema.json",
     ),
     ("completion", ""): (
-        "inercal.cli.completion:completion",
+        "inercal.cli.package:completion",
         "Print the script by which a shell completes commands, options, choices and file names.\n\nBash reads it from "
         "~/.local/share/bash-completion/completions/inercal, zsh from the file _inercal in a folder of $fpath, fish "
         "from ~/.config/fish/completions/inercal.fish: write it there with --out. For one session of bash: "
@@ -226,7 +228,7 @@ COMMANDS = {
         "inercal completion bash --out inercal.bash",
     ),
     ("examples", ""): (
-        "inercal.cli.examples:examples",
+        "inercal.cli.package:examples",
         "List the recordings that ship with inercal, or copy one.\n\nA copy comes with its study and map, in the "
         "folder --out (named after the example if absent).",
         "inercal examples xsens --out xsens",

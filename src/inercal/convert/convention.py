@@ -17,14 +17,14 @@ from inercal.convert.correct import ImuModel
 from inercal.errors import InputError
 from inercal.findings import Finding
 from inercal.instruments.triad import TriadModel
-from inercal.units import parse_unit
+from inercal.units import RAW, parse_unit
 
 Terms = dict[str, Array]
 Units = dict[str, str]
 
 FORCE, RATE = "m/s^2", "rad/s"
 
-_MEASURED = {"acc": ("acceleration", "count", "voltage"), "gyro": ("rate", "count", "voltage")}
+_MEASURED = {"acc": ("acceleration", *RAW), "gyro": ("rate", *RAW)}
 
 
 @dataclass(frozen=True)

@@ -59,11 +59,8 @@ class ImuModel:
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of a record, whose columns may be without samples yet; with ``invert`` it holds true values.
 
-        Raises
-        ------
-        InputError
-            Units of another kind than those of the calibration, missing or uncalibrated channels, two clocks. A gyro
-            that the calibration does not cover is an error, not passed on as if it were corrected.
+        Raises `InputError`: units of another kind than those of the calibration, missing or uncalibrated channels, two
+        clocks. A gyro that the calibration does not cover is an error, not passed on as if it were corrected.
         """
         acc = record.triad("acc")
         gyro = record.triad("gyro") if "gyro_x" in record else None

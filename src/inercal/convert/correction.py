@@ -30,23 +30,11 @@ TEMPERATURE_MARGIN = 5.0
 class Correction:
     """Correction of columns of a record, or its inverse, sample by sample.
 
-    Attributes
-    ----------
-    work : callable
-        Takes samples (*batch,) of the columns in ``reads``, gives those of all that is written; the digits of a sample
-        do not depend on those beside it.
-    reads : mapping
-        Column -> factor and zero: ``work`` takes ``factor * value + zero``.
-    writes : mapping
-        Column -> name and unit of the one that takes its place.
-    appends : mapping
-        Name -> unit of columns that come behind the others.
-    settings : mapping
-        All that decides the results.
-    findings : tuple of Finding
-        What the record does not hold, so that it is not corrected for.
-    ranges : mapping
-        Column read or written -> lowest and highest value (as ``work`` has it) of the calibration, and their unit.
+    ``work`` takes samples (*batch,) of the columns in ``reads``, each as ``factor * value + zero``, and gives those of
+    all that is written; the digits of a sample do not depend on those beside it. ``writes`` has name and unit of the
+    column that takes the place of another, ``appends`` name and unit of those behind the others. ``settings`` is all
+    that decides the results, ``findings`` name what the record does not hold, so that it is not corrected for, and
+    ``ranges`` has the lowest and highest value of the calibration (as ``work`` has it) of a column, and their unit.
     """
 
     work: Callable[[Samples], Samples]
@@ -127,10 +115,7 @@ def uncertain(
 ) -> Uncertain:
     """The model that ``make`` makes of an estimate, with its uncertainty.
 
-    Raises
-    ------
-    InputError
-        The estimate has no covariance, as one that another tool wrote.
+    Raises `InputError`: the estimate has no covariance, as one that another tool wrote.
     """
     u = estimate.u
     if not np.isfinite(estimate.covariance).all() or not u.any():

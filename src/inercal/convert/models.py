@@ -31,21 +31,10 @@ class InUse:
 
 
 def model_of(estimate: Estimate, where: object = "calibration", uncertainty: bool = False) -> InUse:
-    """The instrument of a calibration.
+    """The instrument of a calibration: of an IMU, on a table, of a rate test, a platform, or over temperature.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        Of an IMU, an instrument on a table, a rate test, a platform, or a temperature model.
-    where : object
-        Named in errors.
-    uncertainty : bool
-        Its corrections also give the standard uncertainty of each corrected value.
-
-    Raises
-    ------
-    InputError
-        The estimate is no such calibration, or cannot be used.
+    With ``uncertainty`` its corrections also give the standard uncertainty of each corrected value. Raises
+    `InputError`, naming ``where``, for an estimate that is no such calibration, or cannot be used.
     """
 
     def make(each: Estimate) -> Model:

@@ -54,10 +54,7 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
     freedom the fewest of the coefficients that they are made of. Entries that are the same for every instrument
     (zeros below a diagonal) are no parameters.
 
-    Raises
-    ------
-    InputError
-        The estimate is not of an IMU, or the convention has no place for a term that matters.
+    Raises `InputError`: the estimate is not of an IMU, or the convention has no place for a term that matters.
     """
     convention = CONVENTIONS[name]
 
@@ -140,19 +137,10 @@ def _jacobian(estimate: Estimate, function: Callable[[Array], Array]) -> Array:
 def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None = None) -> Estimate:
     """The calibration in another tool's files, uncertainties not known (NaN).
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        One file; for imu_tk that of the accelerometers and perhaps that of the gyro.
-    name : str
-        A convention of `CONVENTIONS`.
-    units : mapping of str to str, optional
-        Units of the outputs, by ``acc`` and ``gyro``, where the files do not state them.
-
-    Raises
-    ------
-    InputError
-        The files are not of that convention, hold terms that a triad cannot, or units are neither stated nor given.
+    ``paths`` is one file, for imu_tk that of the accelerometers and perhaps that of the gyro; ``name`` one of
+    `CONVENTIONS`; ``units`` those of the outputs of ``acc`` and ``gyro`` where the files do not state them. Raises
+    `InputError` where the files are not of that convention, hold terms that a triad cannot, or units are neither stated
+    nor given.
     """
     convention = CONVENTIONS[name]
     terms, in_files = convention.parse([(path, _text(path, name)) for path in paths])

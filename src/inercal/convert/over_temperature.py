@@ -64,10 +64,7 @@ class OutputOverTemperature:
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of a record that has its ``temperature``: outputs as they would be at the reference.
 
-        Raises
-        ------
-        InputError
-            None of the channels, another kind of unit, or no temperature.
+        Raises `InputError`: none of the channels, another kind of unit, or no temperature.
         """
         present = [name for name in self.polynomials if name in record]
         where = ", ".join(source.path for source in record.sources) or "record"
@@ -95,20 +92,10 @@ def over_temperature(
     instrument_of: Callable[[Estimate], Callable[[Mapping[str, Any]], Model]],
     where: object = "calibration",
 ) -> OverTemperature | OutputOverTemperature:
-    """The instrument of an estimate of `inercal temperature`.
+    """The instrument of an estimate of `inercal temperature`, of a sweep or of calibrations at several temperatures.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        Of a sweep, or of calibrations at several temperatures.
-    instrument_of : callable
-        Takes the calibration at T0, gives what makes a model of other values of its terms.
-    where : object
-
-    Raises
-    ------
-    InputError
-        The estimate has no values, or does not say of which calibrations it is.
+    ``instrument_of`` takes the calibration at T0 and gives what makes a model of other values of its terms. Raises
+    `InputError`, naming ``where``, without values, or where the estimate does not say of which calibrations it is.
     """
     result, values = estimate.result, {name: p.value for name, p in estimate.parameters.items()}
     if not values or not np.isfinite(estimate.values).all():

@@ -51,10 +51,7 @@ class PlatformModel:
         Of wanted rates ``wc`` it makes commands, of measured rates ``gyro`` those of the platform, of outputs ``acc``
         specific force; with ``invert`` the other way round.
 
-        Raises
-        ------
-        InputError
-            None of these channels, an axis is missing, or they are not in physical units.
+        Raises `InputError`: none of these channels, an axis is missing, or they are not in physical units.
         """
         triads = [record.triad(sensor) for sensor in _SENSORS if f"{sensor}_x" in record]
         if not triads:
@@ -97,10 +94,7 @@ class PlatformModel:
 def platform_model(estimate: Estimate, where: object = "calibration") -> PlatformModel:
     """The platform of an estimate of `inercal selfcal`.
 
-    Raises
-    ------
-    InputError
-        Another estimate, or values that are not finite or cannot be inverted; named by ``where``.
+    Raises `InputError`: another estimate, or values that are not finite or cannot be inverted; named by ``where``.
     """
     values = {name: p.value for name, p in estimate.parameters.items()}
     if not values.keys() >= set(NAMES) or not np.all(np.isfinite(estimate.values)):

@@ -90,10 +90,7 @@ class RateGyros:
 def rate_gyros(estimate: Estimate, where: object = "calibration") -> RateGyros:
     """The gyros of an estimate of a rate test.
 
-    Raises
-    ------
-    InputError
-        The estimate has no values or no unit, or a scale factor is 0.
+    Raises `InputError`: the estimate has no values or no unit, or a scale factor is 0.
     """
     values = {name: each.value for name, each in estimate.parameters.items()}
     axes = "".join(axis for axis in "xyz" if f"S_{axis}" in values)
@@ -111,10 +108,15 @@ def rate_gyros(estimate: Estimate, where: object = "calibration") -> RateGyros:
 
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
     """``not_held``: what a rate test says of a gyro beside its input and output."""
-    other = [name for name in estimate.names if name.rpartition("_")[0] not in _APPLIED]
+    along = {name[-1] for name in estimate.names if name.startswith("S_")}
+    across = [name for name in estimate.names if name.startswith("T_") or name[-1] not in along]
+    limits = [name for name in estimate.names if name.rpartition("_")[0] in ("S_nl", "S_hyst")]
     findings = []
-    if other:
-        text = f"{', '.join(other)}: limits of the error, not applied"
+    if limits:
+        text = f"{', '.join(limits)}: limits of the error, not applied"
+        findings.append(Finding("not_held", text, str(where)))
+    if across:
+        text = f"{', '.join(across)}: not applied, they belong to gyros across the turning axis"
         findings.append(Finding("not_held", text, str(where)))
     text = "D_F holds what gravity does at the attitude of the rate test: at another one the bias differs"
     return (*findings, Finding("not_held", text, str(where)))

@@ -39,20 +39,10 @@ Vector = list[Any]
 class TableInstrument:
     """An instrument as a calibration on a table describes it.
 
-    Attributes
-    ----------
-    kind : str
-        As in `inercal.instruments.by_angle.CHANNELS`.
-    channels : tuple of str
-        Those that were calibrated.
-    values : mapping
-        Terms (*batch,) by symbol, those that were stated among them; absent ones are 0.
-    output : Unit
-        Of its outputs.
-    gravity : float
-        Of the site of the calibration [m/s^2].
-    attitude : sequence of mapping
-        Elements of the table from its base to the instrument: a ``joint`` with its ``axis``, or a ``rotation`` (3, 3).
+    ``kind`` and the ``channels`` that were calibrated are as in `inercal.instruments.by_angle.CHANNELS`; ``values`` are
+    terms (*batch,) by symbol, stated ones among them, absent ones 0. ``output`` is the unit of its outputs, ``gravity``
+    [m/s^2] that of the site of the calibration. ``attitude`` holds the elements of the table from its base to the
+    instrument: a ``joint`` with its ``axis``, or a ``rotation`` (3, 3).
     """
 
     kind: str
@@ -65,11 +55,8 @@ class TableInstrument:
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of a record: outputs to ``rate_*`` [rad/s] or ``acc_*`` [m/s^2], or the other way round.
 
-        Raises
-        ------
-        InputError
-            No such channel, a unit of another kind, different clocks, or neither attitude nor specific force where
-            the drift depends on it.
+        Raises `InputError`: no such channel, a unit of another kind, different clocks, or neither attitude nor specific
+        force where the drift depends on it.
         """
         true = {
             channel: channel if self.kind == "accelerometer" else f"rate_{channel[-1]}"

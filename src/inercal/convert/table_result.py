@@ -21,10 +21,8 @@ _SMALLEST = 1e-9
 def table_instrument(estimate: Estimate, where: object = "calibration") -> TableInstrument:
     """The instrument of an estimate of `inercal calibrate turntable` from positions.
 
-    Raises
-    ------
-    InputError
-        The estimate has no values, does not say what was stated, or its scale factors cannot be inverted.
+    Raises `InputError`: the estimate has no values, does not say what was stated, or its scale factors cannot be
+    inverted.
     """
     result = estimate.result
     needed = ("instrument", "unit", "stated", "attitude", "gravity_m_s2")

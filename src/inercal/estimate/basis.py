@@ -71,19 +71,10 @@ def studied(
 def conditions_of(
     settings: Settings, recorded: Quantity | None, ranges: Mapping[str, Any], **own: Any
 ) -> dict[str, Any]:
-    """The conditions of a result.
+    """The conditions of a result, ``own`` ones of this kind of estimate (such as its frame) first.
 
-    Parameters
-    ----------
-    settings : Settings
-        The study.
-    recorded : Quantity or None
-        The temperature that was recorded (`inercal.records.temperature.recorded_temperature`); that of the study goes
-        before.
-    ranges : mapping
-        Smallest and largest input by name, its SI unit at the end of the name.
-    **own
-        Conditions of this kind of estimate alone, such as its frame; come first.
+    The temperature is that of the study, else the ``recorded`` one (`inercal.records.record.recorded_temperature`);
+    ``ranges`` has smallest and largest input by name, its SI unit at the end of the name.
     """
     site, of_study = settings.site, settings.temperature
     temperature = recorded if of_study is None else of_study

@@ -29,40 +29,20 @@ _NUMBERS = "fiub"
 
 
 def save(path: str | Path, kind: str, fingerprint: str, state: object) -> None:
-    """Write a state in the place of an older one.
+    """Write a state, a NamedTuple, dataclass or mapping, in the place of an older one.
 
-    Parameters
-    ----------
-    path : str or Path
-    kind : str
-        Estimator of the state, such as ``monitor``.
-    fingerprint : str
-        Of all on which the meaning of the state depends, by `fingerprint`.
-    state : NamedTuple, dataclass or mapping
-
-    Raises
-    ------
-    InputError
-        The file cannot be written; an older one is then as it was.
+    ``kind`` is the estimator of the state, such as ``monitor``; ``fingerprint`` that of all on which its meaning
+    depends. Raises `InputError` where the file cannot be written; an older one is then as it was.
     """
     write_bytes(path, _encoded({"kind": kind, "fingerprint": fingerprint, "state": state}))
 
 
 def load(path: str | Path, kind: str, fingerprint: str, like: S) -> S:
-    """Read a state that `save` wrote.
+    """Read a state that `save` wrote with that ``kind`` and ``fingerprint``.
 
-    Parameters
-    ----------
-    path, kind, fingerprint
-        As given to `save`.
-    like : NamedTuple, dataclass or mapping
-        A state of the same form, such as the initial one: its types are those of the result. Arrays may have
-        other lengths.
-
-    Raises
-    ------
-    InputError
-        No file, no checkpoint, a damaged one, or one of another kind, of other settings or of another form.
+    ``like`` is a state of the same form, such as the initial one: its types are those of the result, its arrays may
+    have other lengths. Raises `InputError` without a file, for no checkpoint, a damaged one, or one of another kind, of
+    other settings or of another form.
     """
     try:
         data = read_bytes(path)
@@ -103,10 +83,7 @@ def alone(path: str | Path) -> Iterator[None]:
     A file ``PATH.lock`` is locked meanwhile, where the system and the file system have such locks (not on Windows).
     They end with the process, however it ends; the file is then left, and harms nobody.
 
-    Raises
-    ------
-    InputError
-        Another run has it, or the file cannot be written.
+    Raises `InputError` where another run has it, or the file cannot be written.
     """
     try:
         import fcntl

@@ -62,16 +62,9 @@ class Saved:
 def compare(first: Saved, second: Saved) -> Estimate:
     """Compare two calibrations of one instrument.
 
-    Returns
-    -------
-    Estimate
-        Its values are the differences second - first of the coefficients that both have, in the units of the
-        first; ``result["coefficients"]`` has one row for each.
-
-    Raises
-    ------
-    InputError
-        A file that is no calibration, no coefficient in common, or a coefficient whose units do not agree.
+    The values are the differences second - first of the coefficients that both have, in the units of the first;
+    ``result["coefficients"]`` has one row for each. Raises `InputError` for a file that is no calibration, no
+    coefficient in common, or a coefficient whose units do not agree.
     """
     for saved in (first, second):
         _check(saved)

@@ -23,24 +23,10 @@ Limits = tuple[float, float]
 class Coverage:
     """Share of intervals that held the truth, and the share that should have.
 
-    Attributes
-    ----------
-    level : float
-        Probability that the intervals claim, e.g. 0.95.
-    runs : int
-        Number of runs.
-    fraction : (m,)
-        Share of the runs in which the interval of each coefficient held the truth.
-    limits : (float, float)
-        Limits of every `fraction`.
-    pooled : float
-        Share over all runs and coefficients.
-    pooled_limits : (float, float)
-        Limits of `pooled`.
-    design_effect : float
-        Ratio of the variance of `pooled` to that of independent coefficients, 1 to m.
-    rms : (m,)
-        Root mean square of error / standard uncertainty: near 1, more for few degrees of freedom.
+    ``level`` is the probability that the intervals claim, ``fraction`` (m,) the share of the ``runs`` in which the
+    interval of each coefficient held the truth, within ``limits``; ``pooled`` the share over all, within
+    ``pooled_limits``. ``design_effect`` is the ratio of the variance of ``pooled`` to that of independent coefficients,
+    1 to m; ``rms`` (m,) the root mean square of error / standard uncertainty: near 1, more for few degrees of freedom.
     """
 
     level: float
@@ -81,18 +67,9 @@ class Coverage:
 class Nees:
     """Normalised estimation error squared: do stated covariances match the errors?
 
-    Attributes
-    ----------
-    mean : float
-        Mean over the runs of ``e' P^-1 e``. Too large: the covariances are too small.
-    expected : int
-        Its expectation m, the number of coefficients.
-    standard_error : float
-        ``sqrt(2 m / runs)``, the standard deviation of the mean.
-    limits : (float, float)
-        Chi-square band in which the mean has to lie.
-    runs : int
-        Number of runs.
+    ``mean`` over the ``runs`` of ``e' P^-1 e``, too large where the covariances are too small; its ``expected`` value
+    m, the number of coefficients; ``standard_error``, ``sqrt(2 m / runs)``; ``limits``, the chi-square band for the
+    mean.
     """
 
     mean: float
@@ -138,15 +115,8 @@ def coverage(
         Stated standard uncertainties, in the same unit.
     dof : float, (runs,) or (runs, m), optional
         Degrees of freedom of `u`; infinite where `u` is known.
-    level : float, optional
-        Probability that the intervals claim.
-    risk : float, optional
-        Accepted probability of a false alarm.
-
-    Returns
-    -------
-    Coverage
-        Shares, limits and verdict.
+    level, risk : float, optional
+        Probability that the intervals claim, and that of a false alarm.
 
     Raises
     ------
@@ -210,11 +180,6 @@ def nees(errors: ArrayLike, covariances: ArrayLike, *, risk: float = 0.01) -> Ne
         Stated covariances, positive definite; coefficients may differ in scale by any factor.
     risk : float, optional
         Accepted probability of a false alarm.
-
-    Returns
-    -------
-    Nees
-        Mean, chi-square band and verdict.
 
     Raises
     ------

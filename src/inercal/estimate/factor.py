@@ -90,22 +90,14 @@ def _singular(R: Array) -> tuple[Array, Array]:
 
 @kernel
 def root(P: Array, kind: int, out: Array, work: Array) -> tuple[bool, float]:
-    """Write a root of a covariance to ``out``: its columns add up to it, ``P = out out^T``.
+    """Write a root of a covariance ``P`` (n, n) to ``out`` (n, n): its columns add up to it, ``P = out out^T``.
 
-    Parameters
-    ----------
-    P : (n, n) symmetric; variances of zero are fine with eigen and svd
-    kind : CHOLESKY (eigen where that fails), EIGEN or SVD
-    out : (n, n) receives the root; NaN where ``P`` is not finite
-    work : (n, n) overwritten
+    ``kind`` is CHOLESKY (eigen where that fails), EIGEN or SVD, which take variances of zero too; ``work`` (n, n) is
+    overwritten. ``out`` is NaN where ``P`` is not finite.
 
-    Returns
-    -------
-    bool
-        True where Cholesky's factor failed and the eigen factor was taken.
-    float
-        Lowest eigenvalue of the correlation matrix, NaN where none was computed. Negative ones, and eigenvectors
-        with them, are left out of the root; below `NEGATIVE` the caller has to say so.
+    Returned is true where Cholesky's factor failed and the eigen factor was taken, and the lowest eigenvalue of the
+    correlation matrix, NaN where none was computed. Negative ones, and eigenvectors with them, are left out of the
+    root; below `NEGATIVE` the caller has to say so.
     """
     if kind == CHOLESKY and cholesky(P, out):
         return False, math.nan

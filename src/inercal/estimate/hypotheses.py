@@ -47,32 +47,14 @@ SHOWN = 3
 class Hypothesis(Generic[Case]):
     """One explanation of the misfit of a case.
 
-    Attributes
-    ----------
-    name : str
-        Of the hypothesis; each is looked for once.
-    code : str
-        Of its finding.
-    says : str or callable
-        The finding's sentence, or that of what was fitted; the part up to a colon says what, the rest what to do.
-    without : callable
-        The case as it would be without an error of some ``parameters`` (m,), each near 0.
-    parameters : tuple of str
-        Names of the parameters; a hypothesis may have none.
-    step : float [SI]
-        Change of a parameter for the derivative.
-    bounds : (float, float) [SI]
-        Values of the parameters that are believed.
-    prior : float [SI]
-        Standard deviation of each parameter about 0; infinite without a prior.
-    alternatives : float
-        Number of hypotheses of which it was picked.
-    times : int
-        Number of its occurrences, each picked of so many.
-    left_out : int
-        Scalars that the case without it leaves out, each of which counts 1.
-    where, harm
-        Of the finding.
+    Each ``name`` is looked for once; ``code``, ``where`` and ``harm`` are those of the finding. ``says`` is its
+    sentence, or makes that of what was fitted; the part up to a colon says what, the rest what to do. ``without`` gives
+    the case as it would be without an error of some ``parameters`` (m,), each near 0; there may be none.
+
+    Of a parameter [SI], ``step`` is the change for the derivative, ``bounds`` are the values that are believed,
+    ``prior`` is the standard deviation about 0, infinite without one. The hypothesis was picked of so many
+    ``alternatives``, so many ``times``; ``left_out`` counts the scalars that the case without it leaves out, each of
+    which counts 1.
     """
 
     name: str
@@ -171,15 +153,10 @@ def search(
 
     Parameters
     ----------
-    case
-        A recording with its study.
     table : callable
         Hypotheses about a case.
-    judge : Judge
     risk : float
-        Probability at each step that any hypothesis is found in a sound case.
-    most : int
-        Steps at most.
+        Probability at each step, of ``most`` at most, that any hypothesis is found in a sound case.
     systematic : Hypothesis, optional
         Systematic inputs, with their prior: fitted along with all, never a finding.
     choose : callable

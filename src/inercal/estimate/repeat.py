@@ -33,6 +33,12 @@ from inercal.records.places import counted
 SIGNIFICANCE = 1e-3
 """Probability, over all coefficients, below which chance is ruled out as the cause of differences between runs."""
 
+OF_ANOTHER_SCALE = 2e-3
+"""Relative standard deviation of scale factors between runs beyond that of one instrument."""
+
+OF_ANOTHER_ANGLE = 1e-3
+"""Standard deviation of misalignments [rad] between runs beyond that of one instrument."""
+
 REFERENCE = (
     "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
     "Chemistry 42 (1970) 1194"
@@ -87,24 +93,12 @@ def _welch(weights: Array, squares: float, dof: Array) -> float:
 
 
 def combine_runs(runs: Sequence[Estimate]) -> Estimate:
-    """Combine estimates of the same coefficients from independent runs.
+    """Combine estimates of the same coefficients from independent runs, two at least.
 
-    Parameters
-    ----------
-    runs : sequence of Estimate, at least two
-        Runs whose status is neither ok nor suspect are left out and give the status of the whole.
-
-    Returns
-    -------
-    Estimate
-        Its ``result`` holds ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones)
-        and ``between`` (standard deviation from run to run and its probability by chance), and what is the same in
-        the results of all.
-
-    Raises
-    ------
-    InputError
-        The runs have other coefficients or units than the first.
+    Runs whose status is neither ok nor suspect are left out and give the status of the whole. The ``result`` holds
+    ``runs`` (files and status of each), by name ``by_run`` (values and u of the sound ones) and ``between`` (standard
+    deviation from run to run and its probability by chance), and what is the same in the results of all. Raises
+    `InputError` where runs have other coefficients or units than the first.
     """
     sound = [run for run in runs if run.status.done]
     bad = next((run for run in runs if not run.status.done), None)
@@ -139,7 +133,7 @@ def combine_runs(runs: Sequence[Estimate]) -> Estimate:
     covariance = shared + within + np.diag(between)
     dof = _dof(alone, weights, spread, np.diag(within) + between, np.diag(covariance))
     names = first.names
-    findings = [*_findings(runs), *_changes(first, parts)]
+    findings = [*_findings(runs), *_changes(first, parts), *_of_several(names, x, parts)]
     status, message = Status.OK, f"{counted(len(names), 'coefficient')} from {counted(len(sound), 'run')}"
     if bad is not None:
         status = bad.status
@@ -207,6 +201,29 @@ def _changes(first: Estimate, parts: Sequence[Combined]) -> list[Finding]:
             text = f"{name} changes from run to run, standard deviation {rounded(size, size)[0]} {first[name].unit}"
             findings.append(Finding("between_runs", text))
     return findings
+
+
+def _of_several(names: Sequence[str], x: Array, parts: Sequence[Combined]) -> list[Finding]:
+    """``several_instruments``: runs (k, p) that change in scale and misalignment at once, as no instrument does.
+
+    At least half of the scale factors change beyond chance by more than `OF_ANOTHER_SCALE`, and half of the
+    misalignments by more than `OF_ANOTHER_ANGLE`.
+    """
+    ruled_out = np.array([part.probability < SIGNIFICANCE / len(parts) for part in parts])
+    size = np.sqrt([part.between for part in parts])
+    scale = np.array([name.startswith(("K1_", "S_")) for name in names])
+    angle = np.array([name.startswith(("M_", "T_")) for name in names])
+    other_scale = ruled_out & scale & (size > OF_ANOTHER_SCALE * np.abs(np.mean(x, axis=0)))
+    other_angle = ruled_out & angle & (size > OF_ANOTHER_ANGLE)
+    if not scale.any() or 2 * other_scale.sum() < scale.sum() or 2 * other_angle.sum() < angle.sum():
+        return []
+    text = (
+        f"the {len(x)} runs look like {len(x)} different instruments, not like repeat runs of "
+        "one: scale factors change by "
+        f"up to {100.0 * float(np.max(size[scale] / np.abs(np.mean(x, axis=0)[scale]))):.2g} %, misalignments by up to "
+        f"{1e3 * float(np.max(size[angle], initial=0.0)):.2g} mrad (standard deviations): calibrate each by itself"
+    )
+    return [Finding("several_instruments", text)]
 
 
 def _budget(runs: Sequence[Estimate], within: Array, between: Array, total: Array) -> tuple[BudgetItem, ...]:

@@ -155,20 +155,9 @@ def _live_with(parent: Connection) -> None:
 
 
 def generator(seed: int, run: int) -> np.random.Generator:
-    """Return the random stream of one run of a campaign.
+    """The random stream of one ``run`` (from 0) of a campaign of that ``seed`` (not negative).
 
-    Parameters
-    ----------
-    seed : int
-        The campaign's seed, not negative.
-    run : int
-        Number of the run, from 0.
-
-    Returns
-    -------
-    numpy.random.Generator
-        PCG64 on ``SeedSequence(seed, spawn_key=(run,))``: what ``SeedSequence(seed).spawn`` gives its
-        child number ``run``.
+    PCG64 on ``SeedSequence(seed, spawn_key=(run,))``: what ``SeedSequence(seed).spawn`` gives its child number ``run``.
     """
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(run,))))
 
@@ -183,14 +172,12 @@ def run(
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Sample:
-    """Repeat a task, each time with a random stream of its own, and stack what it returns.
+    """Repeat a task, each time with a random stream of its own, and stack what it returns: (runs, ...) float64 by name.
 
     Parameters
     ----------
     task : callable
         ``task(rng)`` returns a mapping of names to numbers or arrays of fixed shape.
-    runs : int
-        Number of runs.
     seed : int
         Seed of the campaign, not negative. With `runs` it settles every digit of the answer.
     executor : Executor, optional
@@ -203,11 +190,6 @@ def run(
         see that the code behind the name has changed.
     progress : callable, optional
         Called in this thread as ``progress(done, runs)``: at the start, then after every chunk.
-
-    Returns
-    -------
-    dict of str to (runs, ...) float64
-        Values that the task returned, run ``i`` at index ``i``.
 
     Raises
     ------

@@ -148,7 +148,9 @@ def update(r: Array, Pxz: Array, Pzz: Array, L: Array, P: Array, dx: Array) -> t
     """Kalman's update by m measurements, of which those with innovation NaN are left out.
 
     With ``Pzz = L L^T`` and ``W = Pxz L^-T``: ``K Pzz K^T = W W^T``, which is taken from the covariance and leaves it
-    exactly symmetric.
+    exactly symmetric. Returned are the normalised innovation squared, NaN without any measurement, and the number of
+    measurements that took part. ``Pzz`` that is not positive definite leaves NaN in ``dx`` and ``P``: a filter that
+    failed.
 
     Parameters
     ----------
@@ -158,15 +160,6 @@ def update(r: Array, Pxz: Array, Pzz: Array, L: Array, P: Array, dx: Array) -> t
     L : (m, m) work array
     P : (n, n) covariance of the state; updated
     dx : (n,) receives the correction ``K r`` of the state, which is the caller's to apply
-
-    Returns
-    -------
-    float
-        Normalised innovation squared, NaN without any measurement.
-    int
-        Number of measurements that took part.
-
-    ``Pzz`` that is not positive definite leaves NaN in ``dx`` and ``P``: a filter that failed.
     """
     n, m = Pxz.shape
     dims = m

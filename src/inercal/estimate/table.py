@@ -33,3 +33,9 @@ class Table:
             ).rstrip()
             for line in lines
         )
+
+
+def heads(*texts: str) -> tuple[tuple[str, str], ...]:
+    """Columns of a table from texts such as ``time [s]``: names with their units."""
+    parts = (text.partition(" [") for text in texts)
+    return tuple((name, unit.removesuffix("]")) for name, _, unit in parts)

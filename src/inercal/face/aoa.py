@@ -11,8 +11,7 @@ import numpy as np
 from inercal.aoa import task
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, one_run
-from inercal.face.study import Study
+from inercal.face.study import Progress, Study, calibrations, one_run
 from inercal.records.record import Record
 
 if TYPE_CHECKING:

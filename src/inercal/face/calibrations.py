@@ -7,9 +7,35 @@ from pathlib import Path
 
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
-from inercal.face.result import Result
+from inercal.face.result import Result, View
 from inercal.findings import Finding
 from inercal.records.record import Record
+
+
+def of_comparison(estimate: Estimate, first: Estimate) -> Result:
+    """The comparison of a calibration with the ``first`` as a result, in the units in which that is shown."""
+    from inercal.report.comparison import page, picture, table
+
+    shown = _shown(estimate, first)
+    view = View(
+        shown,
+        estimate.message,
+        lambda: [table(shown)],
+        lambda: page(shown),
+        lambda: picture(shown),
+    )
+    return Result(estimate, view)
+
+
+def _shown(estimate: Estimate, first: Estimate) -> Estimate:
+    """The comparison with its rows in the units in which the first calibration is shown."""
+    lengths = ("first", "u_first", "second", "u_second", "difference", "u", "U")
+    units, rows = first.shown_units(), []
+    for row in estimate.result["coefficients"]:
+        unit, size = units[row["name"]]
+        rows.append({**row, **{key: row[key] / size for key in lengths}, "unit": unit})
+    of_field = estimate.in_units([units[name] for name in estimate.names])
+    return replace(of_field, result={**estimate.result, "coefficients": rows})
 
 
 def compare(first: Result | Estimate | str | Path, second: Result | Estimate | str | Path) -> Result:
@@ -41,7 +67,6 @@ def compare(first: Result | Estimate | str | Path, second: Result | Estimate | s
     """
     from inercal.estimate.compare import Saved
     from inercal.estimate.compare import compare as compared
-    from inercal.face.comparison import of_comparison
 
     files = [Saved(*estimate_of(each, where)) for each, where in ((first, "first"), (second, "second"))]
     return of_comparison(compared(*files), files[0].estimate)
@@ -124,7 +149,6 @@ def load(path: str | Path) -> Result:
     'ok'
     """
     from inercal.estimate.files import load as read_estimate
-    from inercal.face.comparison import of_comparison
 
     estimate = read_estimate(path)
     match estimate.command:

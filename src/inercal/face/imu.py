@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.estimate.result import Estimate
-from inercal.face.result import Result, View, coefficients
+from inercal.face.result import Result, of_coefficients
 from inercal.face.study import Study
 from inercal.imu.task import calibrate as calibrate_run
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
     from inercal.imu.temperature.model import TemperatureModel
-    from inercal.report.html import Picture
 
 
 def calibrate(
@@ -29,9 +28,13 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
     from inercal.estimate.repeat import combine_runs
-    from inercal.face.runs import calibrations, with_span
+    from inercal.face.study import calibrations, of_files, with_span
+    from inercal.imu.task import calibrate_files, in_order
 
-    calibrated = calibrations(records, study, progress, calibrate_run)
+    if in_order(study.settings):
+        calibrated = [of_files(records, study, progress, calibrate_files)]
+    else:
+        calibrated = calibrations(records, study, progress, calibrate_run)
     runs = [each.estimate for each in calibrated]
     estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
     shown = estimate.shown()
@@ -69,25 +72,6 @@ def of_temperature(model: TemperatureModel) -> Result:
 
     shown = model.estimate.shown()
     return Result(model.estimate, of_coefficients(shown, page), model)
-
-
-def of_coefficients(
-    shown: Estimate, page: Callable[[], str], more: Callable[[], Sequence[str]] = tuple
-) -> View:
-    """The view of a result that is its coefficients, with ``more`` tables behind that of them."""
-
-    def values() -> Picture:
-        from inercal.report.coefficients import values
-
-        return values(shown)
-
-    return View(
-        shown,
-        coefficients(shown),
-        lambda: [shown.table() if shown.names else "", *more()],
-        page,
-        values,
-    )
 
 
 def loaded(estimate: Estimate) -> Result:

@@ -16,8 +16,8 @@ from inercal.inputs import Source
 from inercal.records.channels import is_channel, misfit, nearest, needs_unit
 from inercal.records.checks import check
 from inercal.records.column import Column
-from inercal.records.read.canonical import titled
 from inercal.records.record import Record
+from inercal.records.titles import name_and_unit
 from inercal.units import Unit, parse_quantity, parse_unit
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def read(
     *,
     begin: str | float | None = None,
     end: str | float | None = None,
+    counted: bool = False,
 ) -> Record:
     """Read one or several files into a record, with findings about whatever is suspicious.
 
@@ -50,6 +51,8 @@ def read(
         ``t [s],acc_x [m/s^2]``.
     begin, end : str, float or None
         Part of the recording, from the first stamp of each clock: ``"12.5 s"``, or seconds.
+    counted : bool
+        Rows need no times and are then counted 0, 1, 2, ...: means of poses.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def read(
     """
     from inercal.records.read import read as read_files
 
-    return read_files(paths, map).between(begin, end)
+    return read_files(paths, map, counted=counted).between(begin, end)
 
 
 def record(
@@ -159,7 +162,7 @@ def _of_table(table: Any) -> Iterator[tuple[str, ArrayLike, str | None]]:
         raise RecordError("record", f"found {kind}, expected a DataFrame, a Dataset, or arrays by keyword")
     numeric = 0
     for title in table.keys():  # noqa: SIM118  (of a DataFrame too)
-        name, unit = titled(str(title))
+        name, unit = name_and_unit(str(title))
         if is_channel(name) or _is_triad(name):
             numeric += 1
             yield name, np.asarray(table[title]), unit

@@ -271,3 +271,22 @@ def coefficients(shown: Estimate) -> str:
 def _cut(text: str) -> str:
     """A text that fits on a line or two."""
     return text if len(text) <= 200 else f"{text[:196]} ..."
+
+
+def of_coefficients(
+    shown: Estimate, page: Callable[[], str], more: Callable[[], Sequence[str]] = tuple
+) -> View:
+    """The view of a result that is its coefficients, with ``more`` tables behind that of them."""
+
+    def values() -> Picture:
+        from inercal.report.coefficients import values
+
+        return values(shown)
+
+    return View(
+        shown,
+        coefficients(shown),
+        lambda: [shown.table() if shown.names else "", *more()],
+        page,
+        values,
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -10,16 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import InputError
-from inercal.face.imu import of_coefficients
-from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, of_design, with_span
-from inercal.face.study import Study
+from inercal.face.result import Result, View, of_coefficients
+from inercal.face.study import Progress, Study, calibrations, designed_by, with_span
 from inercal.records.record import Record
 from inercal.selfcal import task
 
 if TYPE_CHECKING:
     from inercal.report.html import Picture
-    from inercal.selfcal.settings import SelfcalSettings
 
 
 def prepare(study: Study, compare: bool = False) -> None:
@@ -38,10 +34,9 @@ def calibrate(
     if len(records) > 1 and compare:
         raise InputError("compare", f"found {len(records)} runs, expected one")
 
-    def run(record: Record, settings: SelfcalSettings, say: Progress) -> task.Calibration:
-        return task.calibrate(record, settings, compare, say)
-
-    calibrated = calibrations(records, study, progress, run)
+    calibrated = calibrations(
+        records, study, progress, lambda record, settings, say: task.calibrate(record, settings, compare, say)
+    )
     return _one(calibrated[0]) if len(calibrated) == 1 else _repeated(calibrated, records)
 
 
@@ -107,10 +102,8 @@ def design(study: Study, progress: Callable[[int, int], None] | None = None) -> 
     from inercal.selfcal.before.path_design import REFERENCES
     from inercal.selfcal.before.path_design import design as search
 
-    clock = time.perf_counter()
-    with study.at_fault():
-        designed = search(study.settings, *(() if progress is None else (progress,)))
-    result = of_design("design selfcal", designed, study, clock, REFERENCES)
+    by = () if progress is None else (progress,)
+    designed, result = designed_by("design selfcal", study, lambda: search(study.settings, *by), REFERENCES)
 
     def page() -> str:
         from inercal.selfcal.figures.design import page as of_page

@@ -1,18 +1,21 @@
-"""Studies: of a TOML file, or of the same keys as keywords."""
+"""Studies, of a TOML file or of the same keys as keywords, and tasks run by them on records."""
 
 from __future__ import annotations
 
 import json
+import time
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from inercal.errors import InputError, StudyError
+from inercal.estimate.result import Estimate, without_coefficients
 from inercal.records.places import counted_names
+from inercal.records.record import Record
 from inercal.units import shown
 
 KINDS = ("imu", "turntable", "selfcal", "aoa")
@@ -211,3 +214,82 @@ def _toml(value: Any) -> str:
             return _toml(value.tolist())
         case _:
             raise StudyError("study", f"found {shown(value)}, expected a text, a number, a list or a table")
+
+
+Progress = Callable[[str], None]
+"""Callback (text) that takes the progress in words."""
+
+T = TypeVar("T")
+
+
+def calibrations(
+    records: Sequence[Record],
+    study: Study,
+    progress: Progress,
+    calibrate: Callable[[Record, Any, Progress], T],
+) -> list[T]:
+    """The calibration of each record, its inputs with the files of the study."""
+    calibrated = []
+    with study.at_fault():
+        for number, record in enumerate(records, start=1):
+            of_run = f"run {number} of {len(records)}: " if len(records) > 1 else ""
+
+            def say(text: str, of_run: str = of_run) -> None:
+                progress(of_run + text)
+
+            calibrated.append(_traced(calibrate(record, study.settings, say), record, study))
+    return calibrated
+
+
+def of_files(
+    records: Sequence[Record],
+    study: Study,
+    progress: Progress,
+    calibrate: Callable[[Sequence[Record], Any, Progress], T],
+) -> T:
+    """The one calibration of records in order, its inputs with the files of the study."""
+    with study.at_fault():
+        calibrated: T = _traced(calibrate(records, study.settings, progress), records[0], study)
+    return calibrated
+
+
+def one_run(records: Sequence[Record], instead: str) -> Record:
+    """The record, where there is one; else a refusal that says what to do ``instead``. Raises `InputError`."""
+    if len(records) > 1:
+        second, first = records[1].sources, records[0].sources
+        raise InputError(
+            second[0].path if second else "records",
+            f"has the channels of {first[0].path if first else 'the first'}, expected one run: {instead}",
+        )
+    return records[0]
+
+
+def designed_by(
+    command: str, study: Study, search: Callable[[], T], references: tuple[str, ...]
+) -> tuple[T, Estimate]:
+    """Outcome of a search, with ``message``, ``result`` and ``findings``, and the result of the command."""
+    from inercal.records.read import source_of
+
+    clock = time.perf_counter()
+    with study.at_fault():
+        designed: Any = search()
+    timing, files = {"solve": time.perf_counter() - clock}, map(source_of, study.files)
+    what = designed.message, designed.result, files, designed.findings, timing, study.keys
+    return designed, without_coefficients(command, *what, references=references)
+
+
+def _traced(calibration: Any, record: Record, study: Study) -> Any:
+    """The calibration, its estimate with the span of the record and with the study among its inputs."""
+    from inercal.records.read import source_of
+
+    estimate = with_span(calibration.estimate, record)
+    return replace(
+        calibration, estimate=replace(estimate, inputs=(*estimate.inputs, *map(source_of, study.files)))
+    )
+
+
+def with_span(estimate: Estimate, record: Record) -> Estimate:
+    """The estimate, saying what part of the recording it is of."""
+    if not record.span:
+        return estimate
+    return replace(estimate, provenance={**estimate.provenance, "span": dict(record.span)})

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.estimate.result import without_coefficients
-from inercal.face.imu import of_coefficients
-from inercal.face.result import Result, View
-from inercal.face.runs import Progress, calibrations, of_design, one_run
-from inercal.face.study import Study
+from inercal.face.result import Result, View, of_coefficients
+from inercal.face.study import Progress, Study, calibrations, designed_by
 from inercal.records.record import Record
 from inercal.turntable import task
 
@@ -23,12 +21,15 @@ if TYPE_CHECKING:
 def calibrate(
     records: Sequence[Record], study: Study, compare: bool = False, progress: Progress = lambda _: None
 ) -> Result:
-    """Calibrate an instrument that was taken through positions, or gyros by a rate test.
+    """Calibrate an instrument that was taken through positions, or gyros by a rate test, from one run or several.
 
-    Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
+    Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``. Of repeat runs
+    ``evidence`` has a calibration for each.
     """
-    record = one_run(records, "calibrate each by itself")
-    calibration: Any = calibrations([record], study, progress, task.calibrate)[0]
+    calibrated: list[Any] = calibrations(records, study, progress, task.calibrate)
+    if len(calibrated) > 1:
+        return _combined(calibrated, records[0])
+    (calibration,) = calibrated
 
     def page() -> str:
         from inercal.turntable import figures
@@ -43,6 +44,24 @@ def calibrate(
     return Result(calibration.estimate, of_coefficients(calibration.shown, page, more), calibration)
 
 
+def _combined(calibrated: Sequence[Any], first: Record) -> Result:
+    """The result of repeat runs."""
+    from inercal.estimate.repeat import combine_runs
+    from inercal.face.study import with_span
+    from inercal.turntable.display import displayed
+
+    estimate = with_span(combine_runs([each.estimate for each in calibrated]), first)
+    shown = displayed(estimate, calibrated[0].readings.unit)
+
+    def page() -> str:
+        from inercal.report.coefficients import repeats
+        from inercal.report.html import render
+
+        return render(shown, repeats(estimate), "Repeat runs on a turntable")
+
+    return Result(estimate, of_coefficients(shown, page), tuple(calibrated))
+
+
 def simulate(study: Study, rng: np.random.Generator) -> Record:
     """A simulated record of the positions or the rate test of the study."""
     with study.at_fault():
@@ -54,10 +73,9 @@ def design(study: Study, progress: Progress = lambda _: None) -> Result:
     from inercal.turntable.positions.planning import REFERENCES
     from inercal.turntable.positions.planning import design as planned
 
-    clock = time.perf_counter()
-    with study.at_fault():
-        designed = planned(study.settings, progress)
-    result = of_design("design positions", designed, study, clock, REFERENCES)
+    designed, result = designed_by(
+        "design positions", study, lambda: planned(study.settings, progress), REFERENCES
+    )
 
     def page() -> str:
         from inercal.turntable.figures.design import page as of_page

@@ -33,13 +33,14 @@ def calibrate(
     Parameters
     ----------
     records : Record or sequence of Record
-        One run; several are repeat runs of an IMU or a platform, which are combined.
+        One run; several are repeat runs of an IMU, a table or a platform, which are combined, or of the methods
+        ``known_rates`` and ``known_turns`` of an IMU one for each rate or turn, in order.
     study : Study or path, optional
         Needed for a turntable, a platform and an angle of attack; of an IMU, ``latitude`` (and ``height``) or
         ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.
     method : str, optional
-        Of an IMU without a study: ``"multiposition"``, ``"ferraris"`` or ``"aided"``; absent, ``"ferraris"`` of a
-        record with labelled sections, else ``"multiposition"``.
+        Of an IMU without a study: ``"multiposition"``, ``"ferraris"``, ``"aided"`` or ``"means"``; absent,
+        ``"ferraris"`` of a record with labelled sections, else ``"multiposition"``.
     compare : bool
         Also run the other estimators of a platform, or the other methods of an angle of attack.
     progress : callable

@@ -8,13 +8,26 @@ from inercal.imu.aided.calibration import AidedCalibration
 from inercal.imu.aided.figures import pictures as of_aided
 from inercal.imu.ferraris.calibration import FerrarisCalibration
 from inercal.imu.ferraris.figures import pictures as of_ferraris
+from inercal.imu.known_rates.calibration import KnownRatesCalibration
+from inercal.imu.known_rates.figures import pictures as of_known_rates
+from inercal.imu.known_turns.calibration import KnownTurnsCalibration
+from inercal.imu.known_turns.figures import pictures as of_known_turns
+from inercal.imu.means.calibration import MeansCalibration
+from inercal.imu.means.figures import pictures as of_means
 from inercal.imu.multiposition.figures import pictures as of_multiposition
 from inercal.report.html import Picture, render
 
 if TYPE_CHECKING:
     from inercal.imu.multiposition.calibration import MultipositionCalibration
 
-    AnyCalibration: TypeAlias = MultipositionCalibration | FerrarisCalibration | AidedCalibration
+    AnyCalibration: TypeAlias = (
+        MultipositionCalibration
+        | FerrarisCalibration
+        | AidedCalibration
+        | MeansCalibration
+        | KnownRatesCalibration
+        | KnownTurnsCalibration
+    )
 
 
 def main(calibration: AnyCalibration) -> Picture:
@@ -29,6 +42,12 @@ def pictures(calibration: AnyCalibration) -> list[Picture]:
             return of_ferraris(calibration)
         case AidedCalibration():
             return of_aided(calibration)
+        case MeansCalibration():
+            return of_means(calibration)
+        case KnownRatesCalibration():
+            return of_known_rates(calibration)
+        case KnownTurnsCalibration():
+            return of_known_turns(calibration)
         case _:
             return of_multiposition(calibration)
 

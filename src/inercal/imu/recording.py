@@ -18,6 +18,7 @@ from inercal.records.checks.values import saturated
 from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
 from inercal.records.record import Record
+from inercal.units import RAW
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
 
 def unit_words(triad: Triad, model: TriadModel) -> str:
     """A wrong unit of physical outputs, in words, by scale factors far from nominal; empty if they are near."""
-    if triad.unit.dimension in ("count", "voltage"):
+    if triad.unit.dimension in RAW:
         return ""
     nominal = 1.0 / triad.unit.factor
     ratio = float(np.median(model.scale) / nominal)

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,10 +24,14 @@ COMMAND = "calibrate imu"
 
 NOT_NEGATIVE = within(0.0, math.inf, "a size of 0 or more")
 
-_TURN = Bounds(
+TURN = Bounds(
     lambda angle: math.radians(10.0) <= abs(angle) <= math.radians(36000.0),
     "an angle of 10 deg to 36000 deg, negative for turns against the right-hand rule",
 )
+"""Angles of a turn."""
+
+TILT = within(0.0, math.radians(20.0), "a standard uncertainty up to 20 deg")
+"""Standard uncertainties of a direction."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,13 @@ class FerrarisSettings:
 
     turn: float = quantity(
         "angle of the turns, positive about the positive axis by the right-hand rule, perhaps with its standard "
-        "uncertainty", "angle", "360 deg", example="360(0.5) deg", bounds=_TURN, u="turn_u",
+        "uncertainty", "angle", "360 deg", example="360(0.5) deg", bounds=TURN, u="turn_u",
     )  # fmt: skip
     turn_u: float = 0.0
     alignment: float | None = quantity(
         "standard uncertainty of the direction of each position and of the axis of each turn; from the scatter of the "
         "positions if absent", "angle", example="0.5 deg",
-        bounds=within(0.0, math.radians(20.0), "a standard uncertainty up to 20 deg"),
+        bounds=TILT,
     )  # fmt: skip
     sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)
 
@@ -77,7 +81,40 @@ class AidedSettings:
     azimuth_u: float | None = None
 
 
-@short_repr
+@dataclass(frozen=True)
+class MeansSettings:
+    """Options of a calibration by pose means, a row for each pose: there are none."""
+
+
+@dataclass(frozen=True)
+class KnownRatesSettings:
+    """Options of a gyro's calibration at known rates: ``rates`` (k,) [rad/s], one a record, and their ``rates_u``."""
+
+    rates: tuple[float, ...]
+    rates_u: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class KnownTurnsSettings:
+    """Options of a gyro's calibration by turns by known angles, about x, y and z.
+
+    Attributes
+    ----------
+    angles, angles_u : three floats
+        Angle of each turn [rad], positive about the positive axis by the right-hand rule, and its standard uncertainty.
+    alignment : float or None
+        As its key says [rad].
+    """
+
+    angles: tuple[float, float, float]
+    angles_u: tuple[float, float, float]
+    alignment: float | None = None
+
+
+Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRatesSettings | KnownTurnsSettings
+"""Options of a method other than multi-position."""
+
+
 @dataclass(frozen=True)
 class Simulation:
     """A simulated recording: the instrument lies still, then is turned from pose to pose by hand.
@@ -137,6 +174,7 @@ class Exclusion:
         return any(begin < last and first < end for first, last in self.times)
 
 
+@short_repr
 @dataclass(frozen=True)
 class ImuSettings:
     """Settings of a calibration, in SI.
@@ -151,7 +189,7 @@ class ImuSettings:
         Poses and turns to be left out.
     traceability : mapping
         ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
-    method : FerrarisSettings, AidedSettings or None
+    method : Method or None
         Options of the method; None: multi-position, un-aided.
     simulation, disturbances
         What is simulated, and what is added to it.
@@ -178,7 +216,7 @@ class ImuSettings:
     )  # fmt: skip
     exclude: Exclusion = Exclusion()
     traceability: Mapping[str, str] = field(default_factory=dict)
-    method: FerrarisSettings | AidedSettings | None = None
+    method: Method | None = None
     simulation: Simulation = Simulation()
     disturbances: Disturbances = Disturbances()
     temperature: Quantity | None = None

@@ -14,8 +14,7 @@ from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
 from inercal.imu.settings import Disturbances
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel, triad_from_terms
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.units import parse_unit
 
 

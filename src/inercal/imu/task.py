@@ -2,25 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inercal.errors import StudyError
-from inercal.estimate.suspicion import judged
+from inercal.estimate.result import judged
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
-from inercal.imu.settings import AidedSettings, FerrarisSettings, ImuSettings
+from inercal.imu.settings import (
+    AidedSettings,
+    FerrarisSettings,
+    ImuSettings,
+    KnownRatesSettings,
+    KnownTurnsSettings,
+    MeansSettings,
+)
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
     from inercal.imu.aided.calibration import AidedCalibration
     from inercal.imu.ferraris.calibration import FerrarisCalibration
+    from inercal.imu.known_rates.calibration import KnownRatesCalibration
+    from inercal.imu.known_turns.calibration import KnownTurnsCalibration
+    from inercal.imu.means.calibration import MeansCalibration
     from inercal.imu.multiposition.calibration import MultipositionCalibration
 
-    Calibrated = MultipositionCalibration | FerrarisCalibration | AidedCalibration
+    Calibrated = (
+        MultipositionCalibration
+        | FerrarisCalibration
+        | AidedCalibration
+        | MeansCalibration
+        | KnownRatesCalibration
+        | KnownTurnsCalibration
+    )
+
+
+def in_order(settings: ImuSettings) -> bool:
+    """True where a calibration is of several records in order, one for each rate or turn: they are no repeat runs."""
+    return isinstance(settings.method, KnownRatesSettings | KnownTurnsSettings)
+
+
+def in_rows(settings: ImuSettings) -> bool:
+    """True where rows of a file are means, which need no times."""
+    return isinstance(settings.method, MeansSettings | KnownRatesSettings)
 
 
 def calibrate(
@@ -48,17 +75,45 @@ def calibrate(
     InputError
         The record does not hold what the method needs.
     """
-    if record.rate_u and not settings.time_base_u:
-        settings = replace(settings, time_base_u=record.rate_u)
-    calibration = _by_method(record, settings, progress)
-    if record.rate_u == 0.0 and not settings.time_base_u:
+    return calibrate_files([record], settings, progress)
+
+
+def calibrate_files(
+    records: Sequence[Record], settings: ImuSettings, progress: Callable[[str], None] = lambda _: None
+) -> Calibrated:
+    """Calibrate an IMU from records in order, one for each rate or turn of a method that is `in_order`, else from one.
+
+    Parameters and errors are those of `calibrate`.
+    """
+    rate_u = max((record.rate_u for record in records if record.rate_u is not None), default=None)
+    if rate_u and not settings.time_base_u:
+        settings = replace(settings, time_base_u=rate_u)
+    calibration = _by_method(records, settings, progress)
+    if rate_u == 0.0 and not settings.time_base_u and not in_rows(settings):
         calibration = _with_exact_rate(calibration)
-    return calibration if settings.site.inputs else _with_exact_gravity(calibration, settings.site.gravity)
+    if settings.site.inputs or in_order(settings):
+        return calibration
+    return _with_exact_gravity(calibration, settings.site.gravity)
 
 
-def _by_method(record: Record, settings: ImuSettings, progress: Callable[[str], None]) -> Calibrated:
+def _by_method(
+    records: Sequence[Record], settings: ImuSettings, progress: Callable[[str], None]
+) -> Calibrated:
     """The calibration by the method of the settings; only its module is loaded."""
+    record = records[0]
     match settings.method:
+        case KnownRatesSettings():
+            from inercal.imu.known_rates.calibration import calibrate_known_rates
+
+            return calibrate_known_rates(records, settings, settings.method, progress)
+        case KnownTurnsSettings():
+            from inercal.imu.known_turns.calibration import calibrate_known_turns
+
+            return calibrate_known_turns(records, settings, settings.method, progress)
+        case MeansSettings():
+            from inercal.imu.means.calibration import calibrate_means
+
+            return calibrate_means(record, settings, progress)
         case FerrarisSettings():
             from inercal.imu.ferraris.calibration import calibrate_ferraris
 

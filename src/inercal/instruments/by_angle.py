@@ -6,7 +6,10 @@ gyrowheel, rotor gyro (813-style), axis X (Y alike), a the gravity reference in 
     y = k_x w_x + k_y w_y + k_z w_z + DX_F + DX_X a_x + DX_Y a_y + DX_Z a_z
         + DX_XX a_x^2 + DX_YY a_y^2 (+ DX_ZZ a_z^2) + DX_XY a_x a_y + DX_XZ a_x a_z + DX_YZ a_y a_z
 
-gyro (952-style), axis i, f the specific force [m/s^2]::  y = S (w_i + T_ij w_j + T_ik w_k) + D_F + G f
+gyro (952-style), axis i, f the specific force [m/s^2]::
+
+    y = S (w_i + T_ij w_j + T_ik w_k) + D_F + G f (+ G_ixx f_x^2 + G_iyy f_y^2 + G_izz f_z^2
+        + G_ixy f_x f_y + G_ixz f_x f_z + G_iyz f_y f_z)
 
 accelerometer (1293-style), axis i, p and o the next ones in cyclic order::
 
@@ -28,7 +31,11 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
 }
 
 #: terms that are there only where they are asked for: a plan on one table seldom tells them from others
-EXTRA = ("DX_ZZ", "DY_ZZ", *(f"{k}_{i}" for k in ("Koq", "Kpp", "Koo") for i in "xyz"))
+EXTRA = (
+    *("DX_ZZ", "DY_ZZ"),
+    *(f"{k}_{i}" for k in ("Koq", "Kpp", "Koo") for i in "xyz"),
+    *(f"G_{i}{jk}" for i in "xyz" for jk in ("xx", "yy", "zz", "xy", "xz", "yz")),
+)
 
 
 def channel_model(kind: str, channel: str) -> ChannelModel:
@@ -60,7 +67,7 @@ def _gyro(axis: str) -> ChannelModel:
     others = [j for j in "xyz" if j != axis]
     terms = {f"D_F_{axis}": monomial(""), f"S_{axis}": monomial(axis.upper())}
     terms |= {f"T_{axis}{j}": monomial(j.upper()) for j in others}
-    terms |= {f"G_{axis}{j}": monomial(j) for j in "xyz"}
+    terms |= {f"G_{axis}{j}": monomial(j) for j in ("x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz")}
     return _made(f"gyro_{axis}", terms, f"S_{axis}", frozenset(f"T_{axis}{j}" for j in others))
 
 

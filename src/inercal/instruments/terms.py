@@ -78,6 +78,13 @@ _RATE_TEST = tuple(
     )
 )
 
+_GYRO_BY_ANGLE = tuple(
+    Term(f"G_{i}{j}{k}", f"drift of gyro {i} per {of} of force along {j}{along}", "output/(m/s^2)^2")
+    for i in _AXES
+    for j, k in ("xx", "yy", "zz", "xy", "xz", "yz")
+    for of, along in [("square", "") if j == k else ("product", f" and {k}")]
+)
+
 _ACCELEROMETER_BY_ANGLE = (
     *(
         Term(f"M_{i}{j}", f"misalignment: response of accelerometer {i} to specific force along {j}", "rad")
@@ -147,6 +154,7 @@ TERMS: dict[str, Term] = {
     for term in (
         *_ACCELEROMETER,
         *_GYRO,
+        *_GYRO_BY_ANGLE,
         *_RATE_TEST,
         *_ACCELEROMETER_BY_ANGLE,
         *_DRIFT,
@@ -370,7 +378,7 @@ def resting_on(channel: str, names: Sequence[str]) -> tuple[str, ...]:
 #: sensor -> symbols of what is found from its output
 _SYMBOLS_OF = {
     "acc": {term.symbol for term in (*_ACCELEROMETER, *_ACCELEROMETER_BY_ANGLE)},
-    "gyro": {term.symbol for term in (*_GYRO, *_RATE_TEST)},
+    "gyro": {term.symbol for term in (*_GYRO, *_GYRO_BY_ANGLE, *_RATE_TEST)},
     "y_x": {term.symbol for term in _DRIFT if term.symbol.startswith(("DX_", "k_"))},
     "y_y": {term.symbol for term in _DRIFT if term.symbol.startswith(("DY_", "kY_"))},
 }

@@ -155,29 +155,14 @@ def allan_deviation(
 
 
 def regular(t: ArrayLike, x: ArrayLike, where: object = "t") -> tuple[float, Array]:
-    """Put samples with time stamps on an even grid, without interpolation; missing rows become NaN.
+    """Samples ``x`` (n, ...) with time stamps ``t`` (n,) [s] on an even grid, without interpolation.
 
-    Parameters
-    ----------
-    t : (n,)
-        Time stamps [s], increasing, with jitter and gaps.
-    x : (n, ...)
-        Samples.
-    where : object, optional
-        Named in the error.
+    Stamps increase, with jitter and gaps: steps of more than one and a half times the median. Returned are the sample
+    interval [s], the mean of the other steps, so that stamps rounded to a clock's tick do no harm, and the samples
+    (rows, ...) in their order, with a row of NaN for each one that a gap has room for.
 
-    Returns
-    -------
-    interval : float
-        Sample interval [s]: the mean of the steps that are not gaps, so that stamps rounded to a clock's tick do no
-        harm. Steps of more than one and a half times the median are gaps.
-    x : (rows, ...)
-        Samples in their order, with a row of NaN for each one that a gap has room for.
-
-    Raises
-    ------
-    RecordError
-        Fewer than three stamps, stamps that do not increase, or more rows missing than ten times those there.
+    Raises `RecordError`, naming ``where``, for fewer than three stamps, stamps that do not increase, or more rows
+    missing than ten times those there.
     """
     stamps, values = np.asarray(t, dtype=float), np.asarray(x, dtype=float)
     if stamps.ndim != 1 or len(stamps) < 3 or len(values) != len(stamps):

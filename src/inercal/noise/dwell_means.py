@@ -21,22 +21,10 @@ def running_sums(x: Array) -> Array:
 
 
 def overlapping_variance(sums: Array, m: int) -> Array:
-    """Overlapping Allan variance of rate-like samples for means over ``m`` samples.
+    """Overlapping Allan variance (*channels) of rate-like samples for means over ``m`` samples, 1 <= m <= n/2.
 
-    Parameters
-    ----------
-    sums : (n + 1, *channels)
-        The `running_sums` of the samples.
-    m : int
-        Samples in a mean, 1 <= m <= n/2.
-
-    Returns
-    -------
-    (*channels) in the unit of the samples squared.
-
-    References
-    ----------
-    Riley and Howe, NIST SP 1065 (2008), section 5.2.4.
+    ``sums`` (n + 1, *channels) are the `running_sums` of the samples. Riley and Howe, NIST SP 1065 (2008), section
+    5.2.4.
     """
     second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
     return np.asarray(np.mean(second**2, axis=0) / (2.0 * m**2))
@@ -81,19 +69,10 @@ def fit(x: Array, interval: float) -> AllanFit:
 def fit_pooled(stretches: Sequence[Array], interval: float) -> AllanFit:
     """Fit noise coefficients to static stretches of a recording, whose own means say nothing.
 
-    Parameters
-    ----------
-    stretches : sequence of (n, channels)
-        Equally spaced samples of an instrument at rest, the longest with n >= 16.
-    interval : float
-        Sample interval [s].
-
-    Notes
-    -----
-    Octaves of averaging time from n/512 samples of the longest stretch (the noise of shorter means is shaped by the
-    instrument's filters) to n/4, of several stretches to n/2; weighted by the degrees of freedom and the fitted size of
-    each value. (Weights from the values themselves would favour those that happen to be small, and understate drift by
-    a fifth.)
+    The ``stretches`` (n, channels) are sampled every ``interval`` [s], the longest with n >= 16. Octaves of averaging
+    time go from n/512 samples of the longest (the noise of shorter means is shaped by the instrument's filters) to n/4,
+    of several stretches to n/2; each value is weighted by its degrees of freedom and fitted size. (Weights from the
+    values themselves would favour those that happen to be small, and understate drift by a fifth.)
     """
     from scipy.optimize import nnls
 

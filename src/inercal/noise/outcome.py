@@ -21,10 +21,10 @@ from inercal.instruments.terms import noise_term
 from inercal.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.noise.deviation import AllanDeviation, allan_deviation, regular
 from inercal.noise.rest import Unrest, unrest
-from inercal.records.clocks import usable_interval
-from inercal.records.column import Column
+from inercal.records.column import Column, usable_interval
 from inercal.records.places import counted
 from inercal.records.record import Record
+from inercal.units import RAW
 
 COMMAND = "allan"
 
@@ -55,7 +55,7 @@ _IN_ORDER = 0.9
 """Share of the rows whose time stamps go forward, from which the others are left out."""
 
 _CHANNELS = re.compile(r"acc_[xyz]|a[1-9]\d*|gyro(_[xyz]|_roll|_yaw)?|y_[xy]")
-_DIMENSIONS = ("acceleration", "rate", "count", "voltage", "number")
+_DIMENSIONS = ("acceleration", "rate", "number", *RAW)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +99,7 @@ class Noise:
 def noise_of(record: Record) -> Noise:
     """Allan deviations and noise coefficients of every channel of a record at rest that measures motion.
 
-    Raises
-    ------
-    RecordError
-        No such channel, hardly any samples, or time stamps that do not increase.
+    Raises `RecordError`: no such channel, hardly any samples, or time stamps that do not increase.
     """
     groups = _groups(record)
     noise_coefficients(allan_deviation(np.sin(np.arange(64.0) ** 2), 1.0))  # loads or compiles kernels

@@ -7,20 +7,22 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from inercal.units import Unit
+from inercal.units import RAW, Unit
 
 #: names (a regular expression) -> dimensions of the unit, and of increments where the channel may be one
 _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     (r"t", ("time",), None),
-    (r"acc_[xyz]|a[1-9]\d*", ("acceleration", "count", "voltage"), "velocity"),
-    (r"gyro_[xyz]|gyro|gyro_roll|gyro_yaw", ("rate", "count", "voltage"), "angle"),
+    (r"acc_[xyz]", ("acceleration", *RAW), "velocity"),
+    (r"a[1-9]\d*", ("acceleration", "count", "voltage"), "velocity"),
+    (r"gyro_[xyz]", ("rate", *RAW), "angle"),
+    (r"gyro|gyro_roll|gyro_yaw", ("rate", "count", "voltage"), "angle"),
     (r"wc_[xyz]", ("rate", "count"), "angle"),
-    (r"y_[xy]", ("rate", "number", "count", "voltage"), None),
+    (r"y_[xy]", ("rate", "number", *RAW), None),
     (r"phi[123]|th_[xyz]|theta_ref", ("angle", "count", "voltage"), None),
     (r"rate|(?:u_)?rate_[xyz]", ("rate",), None),
-    (r"u_acc_[xyz]", ("acceleration", "count", "voltage"), None),
-    (r"u_(?:gyro|wc)_[xyz]", ("rate", "count", "voltage"), None),
-    (r"u_y_[xy]", ("rate", "number", "count", "voltage"), None),
+    (r"u_acc_[xyz]", ("acceleration", *RAW), None),
+    (r"u_(?:gyro|wc)_[xyz]", ("rate", *RAW), None),
+    (r"u_y_[xy]", ("rate", "number", *RAW), None),
     (r"temperature", ("temperature", "count", "voltage"), None),
     (r"trigger", ("number", "count", "voltage"), None),
     (r"position|point|label", ("number", "count"), None),

@@ -43,19 +43,10 @@ def window_samples(rate: float) -> int:
 
 
 def windowed_variance(x: Array, window: int) -> Array:
-    """Size of the variance of three axes in a centred window.
+    """Size of the variance of three axes ``x`` (n, 3) in a centred ``window`` of an odd number of samples.
 
-    Parameters
-    ----------
-    x : (n, 3)
-        Samples; windows that touch a value that is not finite have infinite variance.
-    window : int
-        Odd number of samples.
-
-    Returns
-    -------
-    (n,) root of the sum of squares of the three axes' variances [unit of x squared]; infinite within half a
-    window of either end.
+    Returned is (n,) the root of the sum of squares of the three axes' variances [unit of x squared]; infinite in
+    windows that touch a value that is not finite, and within half a window of either end.
     """
     n, half = len(x), window // 2
     size = np.full(n, np.inf)

@@ -15,9 +15,8 @@ from inercal.errors import RecordError
 from inercal.records.channels import Origin, of_a_table
 from inercal.records.places import counted_names
 from inercal.records.read import format_of
-from inercal.records.read.canonical import bare
 from inercal.records.read.table import Sample
-from inercal.records.titles import fits, numbered, titled
+from inercal.records.titles import bare, fits, numbered, titled
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
@@ -49,34 +48,23 @@ class _File:
 
 @np.errstate(over="ignore", invalid="ignore")
 def guess_map(
-    paths: str | Path | Sequence[str | Path], on_table: bool = False, of_model: bool = False
+    paths: str | Path | Sequence[str | Path],
+    on_table: bool = False,
+    of_model: bool = False,
+    rate: str | None = None,
 ) -> str:
-    """Guess a column map from the files themselves.
+    """Guess a column map from the files of one record themselves; of repeat runs the first is looked at.
 
     Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``) and units, arrays without a
     header by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
-    a unit by the size of gravity.
+    a unit by the size of gravity. Of a test ``on_table`` columns without names are not guessed, for angles and outputs
+    look alike; nor those ``of_model`` that pitches, whose accelerometers go by their numbers, ``a1`` to ``an``.
 
-    Parameters
-    ----------
-    paths : path or sequence of paths
-        The files of one record; of repeat runs the first is looked at.
-    on_table : bool
-        A test on a table: columns without names are not guessed, for angles and outputs look alike.
-    of_model : bool
-        A model that pitches: accelerometers go by their numbers, ``a1`` to ``an``, and columns without names are not
-        guessed.
 
-    Returns
-    -------
-    str
-        A map in TOML that reads these files, with a comment on each guess and on columns not used. Where no
-        sensor was recognised, there are only comments, to write the map by.
-
-    Raises
-    ------
-    RecordError
-        A file cannot be read, or nothing in it looks like a channel.
+    ``rate`` is the sample rate, as text with its unit, where there is no time column. The map is TOML that reads these
+    files, with a comment on each guess and on columns not used. Where no sensor was recognised, there are only
+    comments, to write the map by. Raises `RecordError` where a file cannot be read, or nothing in it looks like a
+    channel.
     """
     files: list[_File] = []
     for path in [paths] if isinstance(paths, str | Path) else paths:
@@ -99,8 +87,10 @@ def guess_map(
             lines += _columns(file, f"{table}.columns")
     for file in files:
         lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
+    if rate is not None and all("t" in file.guesses for file in files):
+        raise RecordError(files[0].path, "found a column of times, expected none beside a sample rate")
     if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
-        lines += _rate([line for file in files for line in file.leading])
+        lines += _rate([line for file in files for line in file.leading], rate)
     return "\n".join(lines) + "\n"
 
 
@@ -345,8 +335,10 @@ def _options(file: _File, table: str) -> list[str]:
     return ["", f"[{table}]", *lines] if table else lines
 
 
-def _rate(leading: Iterable[str]) -> list[str]:
-    """The sample rate as TOML, where there is no time column."""
+def _rate(leading: Iterable[str], rate: str | None) -> list[str]:
+    """The sample rate as TOML, where there is no time column: as stated, or as a line of the file says."""
+    if rate is not None:
+        return ["", "# there is no time column", "[time]", f"rate = {_quoted(rate)}"]
     sentence = next((line for line in leading if _RATE.search(line)), None)
     match = _RATE.search(sentence) if sentence is not None else None
     if sentence is not None and match:

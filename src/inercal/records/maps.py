@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from inercal._toml import Strict, check, read_toml
-from inercal.errors import MapError
+from inercal.errors import InputError, MapError
 from inercal.records.channels import Channel, Origin, is_channel, misfit, nearest, needs_unit
 from inercal.records.read.table import FileOptions, Part
 from inercal.units import parse_quantity, parse_unit, shown
@@ -57,6 +59,11 @@ class ColumnEntry(Strict):
         return value
 
 
+def _refusal(message: str) -> PydanticCustomError:
+    """An error that `inercal._toml.check` reports in just these words, after the dotted key."""
+    return PydanticCustomError("refused", "refused", {"error": InputError("key", message)})
+
+
 class FileEntry(Strict):
     """``[file]``: how the files are laid out; what is left out is found out."""
 
@@ -65,10 +72,54 @@ class FileEntry(Strict):
     comment: str | None = Field(
         default=None, description="what begins a line that is passed over; # and % if absent"
     )
-    skip: int = Field(default=0, ge=0, description="lines before the header or the numbers")
+    skip: int = Field(
+        default=0, ge=0, description="lines before the header or the numbers; bytes of a binary file"
+    )
     variable: str | None = Field(
         default=None, description="variable, group or topic that holds the columns, where a file has several"
     )
+    transpose: bool = Field(
+        default=False, description="the file lies on its side: its rows are channels, as of a 3 x n array"
+    )
+    binary: str | list[str] | None = Field(
+        default=None,
+        description="type of the numbers of a raw binary file, or of each field: byte order < (little) or >, kind f, i "
+        "or u, and bytes",
+        examples=["<f4", [">u4", "<i2"]],
+    )
+    fields: list[str] = Field(
+        default=[], description="names of the numbers of each row of a raw binary file, for `from`",
+        examples=[["t", "gyro_x", "gyro_y", "gyro_z"]],
+    )  # fmt: skip
+
+    @field_validator("binary")
+    @classmethod
+    def _is_binary(cls, value: str | list[str] | None) -> str | list[str] | None:
+        """Types of numbers, the byte order stated."""
+        for each in [value] if isinstance(value, str) else value or ():
+            if not re.fullmatch(r"[<>](f[48]|[iu][248])|[iu]1", each):
+                raise ValueError(f'found {each!r}, expected a type such as "<f4", ">i2" or "u1"')
+        return value
+
+    @model_validator(mode="after")
+    def _described(self) -> FileEntry:
+        """A binary file has a type for each field, and nothing of a text."""
+        if self.binary is None and self.fields:
+            raise _refusal("found fields without binary, expected both for a raw binary file")
+        if self.binary is None:
+            return self
+        types = self.binary if isinstance(self.binary, list) else [self.binary] * len(self.fields)
+        if not self.fields or len(types) != len(self.fields) or len(set(self.fields)) < len(self.fields):
+            raise _refusal(
+                f"found {len(types)} types of binary for {len(self.fields)} fields, expected one "
+                "for each, or one for all, "
+                "and a different name for each"
+            )
+        if self.delimiter or self.decimal or self.comment or self.variable:
+            raise _refusal(
+                "found delimiter, decimal, comment or variable, expected none for a raw binary file"
+            )
+        return self
 
     @field_validator("delimiter")
     @classmethod
@@ -130,17 +181,9 @@ class RecordMap:
 
 
 def read_map(path: str | Path) -> RecordMap:
-    """Read a column map.
+    """Read a column map, a TOML file as in the reference of records.
 
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file as in the reference of records.
-
-    Raises
-    ------
-    MapError
-        Naming the key, what was found and what was expected.
+    Raises `MapError`, naming the key, what was found and what was expected.
     """
     data = read_toml(path, MapError)
     if data.keys() & {"site", "rig", "imu"} and not data.keys() & {"columns", "file"}:
@@ -172,7 +215,17 @@ def _part(name: str, table: Mapping[str, Any], path: object) -> Part:
 
 def _options(entry: FileEntry) -> FileOptions:
     """The layout as the readers take it."""
-    return FileOptions(entry.delimiter, entry.decimal, entry.comment, entry.skip, entry.variable)
+    types = entry.binary if isinstance(entry.binary, list) else [entry.binary or ""] * len(entry.fields)
+    return FileOptions(
+        entry.delimiter,
+        entry.decimal,
+        entry.comment,
+        entry.skip,
+        entry.variable,
+        entry.transpose,
+        tuple(types),
+        tuple(entry.fields),
+    )
 
 
 def _rate(entry: TimeEntry, path: object) -> tuple[float | None, float]:

@@ -97,27 +97,17 @@ def render(
     tables: Sequence[Table] = (),
     answer: Sequence[Table] = (),
 ) -> str:
-    """The report of an estimate.
+    """The report of an estimate of any command and any status: HTML without script, network or font.
 
     Parameters
     ----------
-    estimate : Estimate
-        Of any command and any status, with or without parameters.
     pictures : sequence of Picture
         In the order they are to be shown; the first one answers the question of the page.
-    title : str
-        Heading of the page.
     tables : sequence of Table
-        Further tables, ahead of the other pictures.
+        Further tables, ahead of the other pictures. A table of the result with the title of one of these is not shown
+        again among the details.
     answer : sequence of Table
         The result where it is not the coefficients: ahead of these.
-
-    A table of the result with the title of one of these is not shown again among the details.
-
-    Returns
-    -------
-    str
-        HTML that needs nothing but itself: no script, no network, no font.
     """
     result = plain_objects(estimate.result)
     shown = {table.title.lower() for table in (*answer, *tables)}
@@ -153,26 +143,15 @@ def page(
     pictures: Sequence[Picture] = (),
     **content: Any,
 ) -> str:
-    """A page of this package: its one frame, and in it what a template makes of ``content``.
+    """A page of this package: its one frame, and in it what a file of ``templates`` makes of ``content``.
 
     The frame is the title, who did what, the verdict, the picture that answers the question, the findings, and at the
     end how it was done. Whatever is put in is escaped. Bytes in file names that no encoding knew are read as UTF-8,
     and what that does not know is replaced.
 
-    Parameters
-    ----------
-    template : str
-        Name of a file in ``templates``.
-    estimate : Estimate
-        The result of the command.
-    title : str
-        Heading of the page.
-    facts : sequence of (name, unit, text), optional
-        Subject of the page, where there is no instrument to trace; `Estimate.traceability` if absent.
-    meaning : str
-        Verdict in words, ahead of the message of the estimate.
-    pictures : sequence of Picture
-        The first one answers the question of the page; a template shows the others below its tables.
+    ``facts`` (name, unit, text) are the subject of the page where there is no instrument to trace
+    (`Estimate.traceability` if absent); ``meaning`` is the verdict in words, ahead of the message of the estimate. The
+    first of ``pictures`` answers the question; a template shows the others below its tables.
     """
     import jinja2
     from markupsafe import Markup

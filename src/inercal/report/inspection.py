@@ -13,8 +13,7 @@ from inercal.arrays import Array
 from inercal.estimate.result import Estimate
 from inercal.estimate.table import Table
 from inercal.findings import Finding
-from inercal.records.clocks import counted_rows
-from inercal.records.column import Column
+from inercal.records.column import Column, counted_rows
 from inercal.records.record import Record
 from inercal.report.html import Picture, page
 from inercal.report.marks import Axis, Line, Mark, Note, Panel, Strips

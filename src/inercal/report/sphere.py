@@ -23,23 +23,11 @@ _NEAR = 0.15
 def hemispheres(
     directions: Array, values: Array | None = None, label: str = "", stars: Array | None = None
 ) -> list[Panel]:
-    """Directions on two hemispheres seen along -z, in equal-area projection, numbered in their order.
+    """Unit vectors (n, 3) on two hemispheres seen along -z, +z first, in equal-area projection, numbered in their
+    order.
 
-    Parameters
-    ----------
-    directions : (n, 3)
-        Unit vectors.
-    values : (n,), optional
-        Numbers with a sign, as colour; all of one colour if absent.
-    label : str
-        Quantity of the values, with its unit.
-    stars : (m, 3), optional
-        Directions to be marked.
-
-    Returns
-    -------
-    two panels
-        The half towards +z and the one towards -z.
+    ``values`` (n,) with a sign are shown as colour, and ``label`` is their quantity with its unit; ``stars`` (m, 3) are
+    directions to be marked.
     """
     few, colours = len(directions) <= NUMBERED, None
     if values is not None:

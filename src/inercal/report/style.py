@@ -111,18 +111,10 @@ def svg(figure: Figure) -> str:
 
 
 def envelope(t: Array, values: Array, pieces: int = 800) -> tuple[Array, Array]:
-    """A long signal as the line through the least and the greatest value of each piece of it.
+    """A long signal as the line (m,), m <= 2 ``pieces``, through the least and the greatest value of each piece of it.
 
-    Parameters
-    ----------
-    t, values : (n,)
-        Times and values; values that are not finite, or beyond 1e100, leave a gap.
-    pieces : int
-        Number of pieces; a signal of at most twice as many samples is returned as it is.
-
-    Returns
-    -------
-    t, values : (m,), m <= 2 pieces
+    Values (n,) that are not finite, or beyond 1e100, leave a gap; a signal of at most 2 ``pieces`` samples stays as it
+    is.
     """
     t, shown = (np.where(np.abs(x) < 1e100, x, np.nan) for x in (t, values))
     if len(shown) <= 2 * pieces:

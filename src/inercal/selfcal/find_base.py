@@ -59,8 +59,10 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
     Raises StudyError for an unknown heading of which the recording tells less than `LIMITS.heading_u`: at the poles
     earth rate has no north.
     """
-    prior, base, vertical = settings.prior.copy(), settings.base, _vertical(settings.base)
+    prior, base = settings.prior.copy(), settings.base
     guesses = [base]
+    # 1 for the axis of b about which the heading turns, vertical where the base is level
+    vertical = np.abs(Base(base.frame).from_geographic()[:, 2])
     if settings.heading_unknown:
         prior[BETA] = np.hypot(prior[BETA], LIMITS.heading_sigma * vertical)
         guesses = [replace(base, heading=0.5 * math.pi * k) for k in range(4)]
@@ -109,11 +111,6 @@ def _bound(recording: Recording, settings: SelfcalSettings, batch: FilterResult)
     along = batch.history.attitude, coefficients
     bounds = recorded_bounds(recording, problem(settings), *along, restarts=batch.restarts)
     return bounds.covariance[BETA, BETA]
-
-
-def _vertical(base: Base) -> Array:
-    """(3,) 1 for the axis of b about which the heading turns, vertical where the base is level; 0 else."""
-    return np.abs(Base(base.frame).from_geographic()[:, 2])
 
 
 def _refuse_weak(u: float, settings: SelfcalSettings) -> None:

@@ -42,22 +42,11 @@ REFERENCES = (
 class Campaign:
     """Errors of one estimator over many simulated runs; coefficients in the product form, SI.
 
-    Attributes
-    ----------
-    kind : str
-    names : tuple of str, length p
-    error, u : (runs, p)
-        Estimate less truth, and stated standard uncertainty.
-    joint_error, joint_covariance : (runs, m), (runs, m, m)
-        With the attitude (3) [rad, about the axes of p] before the coefficients, m = 3 + p; of estimators that state
-        none, coefficients alone.
-    bound : (p,)
-        Cramer-Rao bound of the standard uncertainties.
-    nis : (runs,)
-        Mean normalised innovation squared of each run over rows away from gimbal lock; ``rows`` how many, and
-        ``nis_expected`` its expectation (`expected_nis`).
-    attempted : int
-        Number of runs; the arrays hold those whose estimator said that its numbers can be used.
+    ``error`` and stated ``u`` (runs, p); ``joint_error`` (runs, m) and ``joint_covariance`` (runs, m, m) with the
+    attitude [rad, about the axes of p] before the coefficients, m = 3 + p, of estimators that state one. ``bound`` (p,)
+    Cramer-Rao bound of the standard uncertainties. ``nis`` (runs,) mean normalised innovation squared over the ``rows``
+    away from gimbal lock, ``nis_expected`` its expectation. Of ``attempted`` runs the arrays hold those whose estimator
+    said that its numbers can be used.
     """
 
     kind: FilterKind
@@ -89,11 +78,6 @@ class Campaign:
         return bool(self.runs == self.attempted and held and fitting)
 
     @property
-    def verdict(self) -> str:
-        """`passed` in words."""
-        return f"the stated uncertainties {'hold' if self.passed else 'are too small'}"
-
-    @property
     def harmless(self) -> str:
         """Names and statistics outside their limits as uncertainties are rather too large, in words, if any."""
         coverage, nees = self.coverage, self.nees
@@ -106,7 +90,8 @@ class Campaign:
     @property
     def message(self) -> str:
         """Verdict and number of runs, in words."""
-        text = f"{self.verdict}: {self.attempted} runs, {self.runs} of them converged"
+        verdict = "hold" if self.passed else "are too small"
+        text = f"the stated uncertainties {verdict}: {self.attempted} runs, {self.runs} of them converged"
         return "; ".join(filter(None, [text, self.harmless]))
 
     @property
@@ -155,20 +140,17 @@ class Campaign:
 
     def table(self) -> str:
         """The figures as lines of text."""
-        ratio = "\n".join(
-            f"{name:8s} {value:6.3f}" for name, value in zip(self.names, self.rms_over_bound, strict=True)
-        )
         low, high = self.nis_limits
-        return "\n".join(
-            [
-                f"{self.kind}: {self.attempted} runs, {self.runs} of them converged",
-                self.coverage.table(self.names),
-                self.nees.table(),
-                f"NIS {self.nis.mean():.4f}, expected {low:.4f} to {high:.4f}",
-                "rms error over the bound:",
-                ratio,
-            ]
-        )
+        each = zip(self.names, self.rms_over_bound, strict=True)
+        lines = [
+            f"{self.kind}: {self.attempted} runs, {self.runs} of them converged",
+            self.coverage.table(self.names),
+            self.nees.table(),
+            f"NIS {self.nis.mean():.4f}, expected {low:.4f} to {high:.4f}",
+            "rms error over the bound:",
+            *(f"{name:8s} {ratio:6.3f}" for name, ratio in each),
+        ]
+        return "\n".join(lines)
 
 
 def campaign(
@@ -180,38 +162,18 @@ def campaign(
     folder: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Campaign:
-    """Simulate and estimate many times.
+    """Simulate and estimate a study with plan and truth many times, with its estimator or another ``kind``.
 
-    Parameters
-    ----------
-    settings : SelfcalSettings
-        With plan and truth.
-    runs, seed, folder, progress
-        As in `inercal.estimate.runs.run`.
-    kind : str, optional
-        Estimator; that of the study if absent.
-    workers : int
-        Threads; the kernels run side by side.
-
-    Raises
-    ------
-    StudyError
-        The study has no plan or no truth, or a base that would have to be found first.
-    InputError
-        Fewer than two runs converged.
+    ``runs``, ``seed``, ``folder``, ``progress`` as in `inercal.estimate.runs.run`; ``workers`` are threads. Raises
+    StudyError where the study has no plan or truth, or a base that would have to be found first, and InputError where
+    fewer than two runs converged.
     """
     stated_well(settings, "a campaign")
     of_study, made = problem(settings), experiment(settings)
     kind = of_study.filter.kind if kind is None else kind
     load_kernels(kind, of_study)
-    sample = run(
-        partial(one_run, made, of_study, kind),
-        runs=runs,
-        seed=seed,
-        executor=Threads(workers),
-        folder=folder,
-        progress=progress,
-    )
+    one = partial(one_run, made, of_study, kind)
+    sample = run(one, runs=runs, seed=seed, executor=Threads(workers), folder=folder, progress=progress)
     truth, size = settings.truth, settings.size
     assert truth is not None
     sound = sample["converged"] > 0.0

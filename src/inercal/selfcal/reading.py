@@ -17,8 +17,7 @@ from inercal.errors import RecordError
 from inercal.findings import Finding
 from inercal.records.column import Column
 from inercal.records.places import counted, places
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 from inercal.selfcal.diagnosis.gross import clipped, implausible, off_the_path
 from inercal.selfcal.filters.gaps import with_held
 from inercal.selfcal.limits import LIMITS

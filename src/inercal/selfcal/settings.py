@@ -71,11 +71,8 @@ class Filter:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Errors that a simulation adds to the model; none if absent.
-
-    ``harmonics`` are errors of encoders: joint 0, 1, 2, order k, amplitude [rad], phase [rad]: a sin(k th + phase).
-    ``substeps`` of the truth lie between two rows.
-    """
+    """Errors that a simulation adds to the model: ``harmonics`` of encoders, a sin(k th + phase), as joint 0, 1, 2,
+    order k, amplitude [rad], phase [rad]; ``substeps`` of the truth lie between two rows."""
 
     dropouts: float = quantity(
         "part of the rows without accelerometers and angles", "number", "0", example="1 %", bounds=PART
@@ -108,28 +105,12 @@ class Search:
 class SelfcalSettings:
     """A study of self-calibration, in SI.
 
-    Attributes
-    ----------
-    site : Site
-        Latitude and gravity with their uncertainties.
-    gimbals, base
-        The rig.
-    heading_unknown : bool
-        The heading of the base is to be found from the record; beta corrects it.
-    limits : mapping
-        Allowed range (low, high) [rad] of a gimbal angle by its name ``th_x``.
-    plan : Plan or None
-        The path; None where the study has none (a record is enough to calibrate).
-    noise : Noise
-    prior : (24,)
-        Standard deviations of all coefficients about 0, in the order of `inercal.selfcal.platform.coefficients`.
-    truth : (24,) or None
-        Product form, for simulations; its last six are the true gyro scale errors and base tilt.
-    goal : mapping
-        Wanted standard uncertainty [SI] by name of coefficient.
-    filter, disturbances, search
-    traceability, temperature, given
-        As in `inercal.imu.settings.ImuSettings`.
+    ``site`` with its uncertainties; ``gimbals`` and ``base`` the rig, its heading to be found from the record where
+    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name; ``plan`` None where a record is
+    enough. ``prior`` (24,) standard deviations of all coefficients about 0, in the order of
+    `inercal.selfcal.platform.coefficients`; ``truth`` (24,) or None, product form, for simulations; ``goal`` wanted
+    standard uncertainty [SI] by name. ``traceability``, ``temperature``, ``given`` as in
+    `inercal.imu.settings.ImuSettings`.
     """
 
     site: Site

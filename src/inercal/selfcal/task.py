@@ -27,9 +27,9 @@ from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA, names
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.result.comparison import side_by_side
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
+from inercal.selfcal.result.tables import side_by_side
 from inercal.selfcal.settings import SelfcalSettings
 
 

@@ -25,9 +25,8 @@ from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
 from inercal.rigs.patterns import Known
 from inercal.sensitivities.exact import drop_rounding, positions
-from inercal.sensitivities.indices import Indices, VarianceParts
+from inercal.sensitivities.indices import Indices, VarianceParts, shapley_effects
 from inercal.sensitivities.moments import moments
-from inercal.sensitivities.shapley import shapley_effects
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,21 +113,10 @@ def homogeneous(chain: Chain, angles: ArrayLike) -> Dense:
 
 
 def analyse(dense: Dense, outputs: Sequence[Output], shapley: bool = False, second: bool = False) -> Indices:
-    """Exact parts of variance of outputs at the positions of a chain.
+    """Exact parts of variance of outputs at the positions of a chain of matrices (m, m).
 
-    Parameters
-    ----------
-    dense : Dense
-        Of matrices (m, m).
-    outputs : sequence of Output
-        With reference and axis (m,).
-    shapley, second : bool
-        Shapley effects and second-order parts too.
-
-    Raises
-    ------
-    ValueError
-        An output of another size than the matrices.
+    Reference and axis of each output are (m,), else ValueError is raised. ``shapley`` effects and ``second``-order
+    parts are given if asked for.
     """
     variance, bias, first, interaction = _parts(dense, outputs)
 

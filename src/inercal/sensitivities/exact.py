@@ -28,9 +28,8 @@ from inercal.arrays import Array
 from inercal.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.rigs.outputs import Output
 from inercal.rigs.patterns import Known
-from inercal.sensitivities.indices import Indices, VarianceParts, by_position
+from inercal.sensitivities.indices import Indices, VarianceParts, by_position, shapley_effects
 from inercal.sensitivities.moments import moments
-from inercal.sensitivities.shapley import shapley_effects
 
 if TYPE_CHECKING:
     from inercal.sensitivities import kernels
@@ -52,23 +51,11 @@ def analyse(
     second: bool = False,
     threads: int | None = None,
 ) -> Indices:
-    """Exact parts of variance of outputs of a chain at given positions.
+    """Exact parts of variance of outputs of a chain at ``angles`` (n, joints) [rad].
 
-    Parameters
-    ----------
-    chain : Chain
-        The rig; its offsets move the instrument without turning it, so they have no part.
-    outputs : sequence of Output
-    angles : (n, joints) rad
-    shapley, second : bool
-        Shapley effects and second-order parts too.
-    threads : int, optional
-        As many as there are processors if absent; the digits do not depend on it.
-
-    Raises
-    ------
-    ValueError
-        Angles that do not fit the joints of the chain, or no threads.
+    The chain's offsets move the instrument without turning it, so they have no part. ``shapley`` effects and
+    ``second``-order parts are given if asked for; ``threads`` are as many as processors if absent, and the digits do
+    not depend on them. Raises ValueError for angles that do not fit the joints, or no threads.
     """
     return by_position(
         lambda standing, at: _analyse(standing, outputs, at, shapley, second, threads),
@@ -104,12 +91,8 @@ def closed_variance(
 ) -> Array:
     """Variance (o, n) that a set of errors causes, alone and among themselves: Var E[Y | these errors].
 
-    Raises
-    ------
-    KeyError
-        A factor that the chain does not have.
-    ValueError
-        As `analyse`; a chain in which errors are known or follow an angle (see `Chain.standing`).
+    Raises `KeyError`: a factor that the chain does not have; `ValueError`: as `analyse`; a chain in which errors are
+    known or follow an angle (see `Chain.standing`).
     """
     for name in factors:
         if name not in chain.factors:

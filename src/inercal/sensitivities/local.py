@@ -16,16 +16,11 @@ _ROUNDING = 8.0 * np.finfo(float).eps
 
 
 def analyse(chain: Chain, outputs: Sequence[Output], angles: ArrayLike) -> Indices:
-    """Parts of variance (dY/derror_k)^2 var_k, without interactions; the bias is that of mean errors alone.
+    """Parts of variance (dY/derror_k)^2 var_k at ``angles`` (n, joints) [rad], without interactions; bias of mean
+    errors alone.
 
     Good where the errors act linearly. Where the derivatives vanish (an axis along gravity), the quadratic
     terms rule and these indices mislead or, if all derivatives are zero, do not exist.
-
-    Parameters
-    ----------
-    chain : Chain
-    outputs : sequence of Output
-    angles : (n, joints) positions [rad]
     """
     positions = np.atleast_2d(np.asarray(angles, dtype=float))
     by_error = chain.slopes(positions)  # (n, k, 3, 3)

@@ -9,7 +9,7 @@ import numpy as np
 
 from inercal.convert.correction import Model
 from inercal.findings import Finding
-from inercal.records.write.text import quoted
+from inercal.records.write import quoted
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output
 

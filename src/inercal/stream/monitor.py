@@ -18,8 +18,7 @@ from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.imu.limits import LIMITS
 from inercal.noise.running import Octaves, Window, cascade, empty_octaves, empty_window, slide
-from inercal.records.clocks import usable_interval
-from inercal.records.column import Column
+from inercal.records.column import Column, usable_interval
 from inercal.records.dwells import window_samples
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Output, Slots

@@ -37,7 +37,7 @@ from inercal.errors import RecordError
 from inercal.estimate.checkpoint import alone, fingerprint, load, save
 from inercal.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.records.places import counted
-from inercal.records.write.text import number
+from inercal.records.write import number
 from inercal.stream.lines import Line, Lines, Sample
 
 S = TypeVar("S")

@@ -36,9 +36,8 @@ from inercal.studies.common import (
     Version,
     site_of,
 )
-from inercal.studies.fields import QuantityText, refusal
+from inercal.studies.fields import ExactText, QuantityText, refusal
 from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
-from inercal.studies.ratios import ExactText
 from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, shown

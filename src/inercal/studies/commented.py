@@ -20,16 +20,10 @@ COLUMN = 36
 def commented(
     schema: Schema, definitions: Mapping[str, Schema], study: Mapping[str, Any], hidden: str = "(?!)"
 ) -> str:
-    """A study with all its keys.
+    """A study with all its keys, by the schema of its kind and the definitions of `inercal.studies.schema.json_schema`.
 
-    Parameters
-    ----------
-    schema, definitions
-        Those of the kind of study, of `inercal.studies.schema.json_schema`.
-    study : mapping
-        The keys that are in force. A table that is in force has its heading, too, where it is empty.
-    hidden : str
-        A regular expression of dotted keys and tables that are left out unless they are in force.
+    The keys of ``study`` are in force; a table there has its heading, too, where it is empty. ``hidden`` is a regular
+    expression of dotted keys and tables that are left out unless they are in force.
     """
     return "\n".join(_table("", schema, definitions, study, hidden)) + "\n"
 

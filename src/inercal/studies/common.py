@@ -91,10 +91,7 @@ Conditions = Annotated[
 def site_of(table: SiteTable, where: object) -> Site:
     """Gravity of a site: as typed, or else normal gravity at its latitude and height.
 
-    Raises
-    ------
-    StudyError
-        Neither gravity nor latitude is given.
+    Raises `StudyError` where neither gravity nor latitude is given.
     """
     latitude = None if table.latitude is None else table.latitude.value
     latitude_u = 0.0 if table.latitude is None else table.latitude.u
@@ -120,12 +117,9 @@ def site_of(table: SiteTable, where: object) -> Site:
 
 
 def site_on_earth(table: SiteTable, where: object, what: str) -> Site:
-    """The site of ``what`` turns with the earth, in words, and so must have a latitude.
+    """The site of ``what``, in words, which turns with the earth, and so must have a latitude.
 
-    Raises
-    ------
-    StudyError
-        No latitude is given.
+    Raises `StudyError` where no latitude is given.
     """
     if table.latitude is None:
         raise StudyError(

@@ -68,18 +68,8 @@ class _Form:
 def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Instrument:
     """The instrument in SI: a term in units of the output is in the SI unit of its dimension.
 
-    Parameters
-    ----------
-    table : InstrumentTable
-    gravity : float
-        Of the site [m/s^2]: the unit of a in the terms of a gyrowheel.
-    where : object
-        Named in the error: the study file.
-
-    Raises
-    ------
-    StudyError
-        A unit the kind cannot have, an unknown term, a value in a unit its term cannot have.
+    ``gravity`` [m/s^2] of the site is the unit of a in the terms of a gyrowheel. Raises `StudyError`, naming the file
+    ``where``, for a unit the kind cannot have, an unknown term, or a value in a unit its term cannot have.
     """
     unit = _unit(table, where)
     symbols = tuple(s for channel in CHANNELS[table.kind] for s in channel_model(table.kind, channel).symbols)
@@ -176,6 +166,8 @@ def _forms(symbol: str, kind: str, unit: Unit) -> tuple[list[_Form], str]:
         case "output/(m/s^2)":
             pure = [_Form("number")] if own == "acceleration" else []
             return [*pure, _Form(own, "acceleration", 1)], '"1.00(2)"' if pure else f'"1.5 {out}/g"'
+        case "output/(m/s^2)^2":
+            return [_Form(own, "acceleration", 2)], f'"1.5 {out}/g^2"'
         case "rad":
             return [_Form("angle")], '"20 arcsec"'
         case "1":

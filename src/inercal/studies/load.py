@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from inercal._toml import read_toml
 from inercal.errors import StudyError
-from inercal.studies.starting import UNKNOWN
-from inercal.studies.ways import DISTRIBUTIONS, PATHS, POSITIONS
+from inercal.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN
 from inercal.units import shown
 
 # each kind of study brings models that take a tenth of a second to build: those of the others are not wanted
@@ -66,22 +65,14 @@ def reader(kind: str) -> Callable[[Mapping[str, Any], str | Path], Any]:
 
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
-    """Read the study of ``inercal calibrate imu``.
+    """Read the study of ``inercal calibrate imu``, a TOML file.
 
-    Parameters
-    ----------
-    path : str or Path
-        The TOML file.
-    overrides : iterable of str
-        Keys to set over those of the file, ``"imu.static_start=50 s"``. A value that is TOML
-        (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text. Where a table holds one of several
-        keys (``positions.grid``, ``plan``, ...), one that is set takes the place of the others. A file that is set
-        is one of the working folder, not of the study's.
+    ``overrides`` are keys to set over those of the file, ``"imu.static_start=50 s"``. A value that is TOML
+    (``true``, ``"9.81 m/s^2"``) is read as such, any other as a text. Where a table holds one of several
+    keys (``positions.grid``, ``plan``, ...), one that is set takes the place of the others. A file that is set
+    is one of the working folder, not of the study's.
 
-    Raises
-    ------
-    StudyError
-        One sentence: file and key, what was found, what was expected.
+    Raises `StudyError`: file and key, what was found, what was expected.
     """
     from inercal.studies.imu import imu_study
 
@@ -185,10 +176,7 @@ def unfilled(data: Mapping[str, Any], value: str) -> dict[str, Any]:
 def put(data: dict[str, Any], override: str, folder: Path) -> None:
     """Set one key of the freshly parsed ``data``, of a study in ``folder``, by its dotted name.
 
-    Raises
-    ------
-    StudyError
-        No key and value, or a key inside a value that is no table.
+    Raises `StudyError` for no key and value, or a key inside a value that is no table.
     """
     where = f"--set {shown(override)}"
     name, equals, text = override.partition("=")

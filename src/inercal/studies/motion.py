@@ -66,10 +66,7 @@ class MotionTable(table_of(MotionPlan)):  # type: ignore[misc]
 def motion_of(table: MotionTable, where: str | Path) -> MotionPlan:
     """The motion in SI.
 
-    Raises
-    ------
-    StudyError
-        Frequencies out of order, steps that do not lead from first to last, too many samples.
+    Raises `StudyError` for frequencies out of order, steps that do not lead from first to last, too many samples.
     """
     plan = settings_of(MotionPlan, table)
     if plan.path is not None:
@@ -131,10 +128,8 @@ def disturbances_of(
 ) -> Disturbances:
     """Disturbances of a simulation, in SI.
 
-    Raises
-    ------
-    StudyError
-        Frequencies out of order, heights for another number of accelerometers, clipping without a range.
+    Raises `StudyError` for frequencies out of order, heights for another number of accelerometers, clipping without a
+    range.
     """
     shaking = {key: getattr(table, key) for key in ("pitch", "heave", "axial", "roll", "yaw")}
     disturbances = settings_of(Disturbances, table, **shaking)

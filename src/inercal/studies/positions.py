@@ -21,7 +21,7 @@ from inercal.rigs.chain import Chain
 from inercal.rigs.plans import NAMED, Plan, grid, listed, named
 from inercal.studies.fields import refusal
 from inercal.studies.rig import Angle, Limits
-from inercal.studies.ways import POSITIONS
+from inercal.studies.starting import POSITIONS
 from inercal.units import shown
 
 MOST = 200_000
@@ -98,11 +98,8 @@ _USUAL: Mapping[int, tuple[int, ...]] = {1: (36,), 2: (36, 36), 3: (12, 12, 12)}
 def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) -> Plan:
     """The positions of a study [rad]; those of a grid that the axes reach.
 
-    Raises
-    ------
-    StudyError
-        A plan that is not for this table, a list or a file that does not fit its joints, a file that cannot be
-        read, or a position beyond a limit.
+    Raises `StudyError` for a plan that is not for this table, a list or a file that does not fit its joints, a file
+    that cannot be read, or a position beyond a limit.
     """
     if table.plan is not None:
         key, plan = f"positions.plan {table.plan}", _named(table.plan, chain, "positions.plan", where)
@@ -133,10 +130,7 @@ def grid_of(
 ) -> Plan:
     """The positions of a grid that the axes reach; where none is given, of the usual one, ``half`` a step off or not.
 
-    Raises
-    ------
-    StudyError
-        A grid that does not fit the joints, is too large, or has no position within the limits.
+    Raises `StudyError` for a grid that does not fit the joints, is too large, or has no position within the limits.
     """
     counts = _USUAL[len(chain.joints)]
     if table is not None:
@@ -157,10 +151,7 @@ def grid_of(
 def compared(names: Sequence[str] | None, chain: Chain, limits: Limits, where: object) -> tuple[str, ...]:
     """Named plans to set beside a design: those asked for, or all that the table can take.
 
-    Raises
-    ------
-    StudyError
-        A plan that the table cannot take.
+    Raises `StudyError` for a plan that the table cannot take.
     """
     if names is None:
         names = [

@@ -183,10 +183,7 @@ class Place:
 def elements_of(table: NamedErrorTable, place: Place) -> list[Element]:
     """Elements of an error beside its distribution: what is known of it, and how well.
 
-    Raises
-    ------
-    StudyError
-        A table or harmonic before any joint, or a table that cannot be read.
+    Raises `StudyError` for a table or harmonic before any joint, or a table that cannot be read.
     """
     if (table.table is not None or table.harmonics) and not place.after_joint:
         raise StudyError(

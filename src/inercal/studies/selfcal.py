@@ -35,10 +35,9 @@ from inercal.studies.common import (
     site_on_earth,
 )
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive
-from inercal.studies.gimbals import GimbalsTable, base_of, gimbals_of, limits_of
+from inercal.studies.platform import GimbalsTable, PlanTable, base_of, gimbals_of, limits_of, plan_of
 from inercal.studies.rig import Angle
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
-from inercal.studies.turns import PlanTable, plan_of
 from inercal.units import Quantity, parse_quantity
 
 #: group -> dimension and example of its values

@@ -14,8 +14,17 @@ from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.settings import GYROS, Calibration, Per
 from inercal.errors import InputError, QuantityError, StudyError
 from inercal.findings import Status
-from inercal.studies.fields import QuantityText, Temperature, positive, refusal
-from inercal.studies.ratios import ELECTRIC, ExactText, Ratio, ScaleText, SlopeText
+from inercal.studies.fields import (
+    ELECTRIC,
+    ExactText,
+    QuantityText,
+    Ratio,
+    ScaleText,
+    SlopeText,
+    Temperature,
+    positive,
+    refusal,
+)
 from inercal.units import Quantity, parse_quantity, parse_unit, shown
 
 MOST = 24
@@ -193,10 +202,8 @@ def layout_of(table: SensorsTable) -> Layout:
 def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, Calibration]:
     """The calibration of each sensor that the study names.
 
-    Raises
-    ------
-    StudyError
-        A bias that is none of this sensor, a calibration that cannot be read or does not hold the sensor.
+    Raises `StudyError` for a bias that is none of this sensor, a calibration that cannot be read or does not hold the
+    sensor.
     """
     return {
         name: _calibration(name, one, where)

@@ -1,6 +1,13 @@
-"""New studies of each kind: the keys in force; `inercal new` adds all others as comments."""
+"""New studies of each kind, with the keys in force, and keys of which a table of a study holds one."""
+
+from __future__ import annotations
 
 from typing import Final
+
+#: keys of which a table of a study holds one: ways to state positions, a path, a distribution
+POSITIONS: Final = ("grid", "plan", "list", "file")
+PATHS: Final = ("turns", "path")
+DISTRIBUTIONS: Final = ("uniform", "normal", "triangular", "two_point")
 
 UNKNOWN: Final = "?"
 """The value of a key that the user must fill in."""

@@ -14,8 +14,7 @@ from pydantic_core import core_schema
 
 from inercal._toml import Strict
 from inercal.keys import Key, keys_of
-from inercal.studies.fields import QuantityText
-from inercal.studies.ratios import ExactText
+from inercal.studies.fields import ExactText, QuantityText
 from inercal.units import Quantity
 
 T = TypeVar("T")

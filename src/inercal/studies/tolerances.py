@@ -119,11 +119,14 @@ def tolerances_of(
             raise StudyError(where, f"{key}: found {shown(text)}, expected a u above zero")
         goal[symbol] = value
     given = {name for name in _NAMES if getattr(costs, name) is not None}
-    for name in sorted(given - set(chain.factors)):
-        raise StudyError(where, f"cost.{name}: the table has no such error, expected one of rig.errors")
-    prices = {
+    # what was measured, or follows an angle, is what it is
+    bought = {error.name for error in chain.errors if error.pattern is None and not error.certificate}
+    for name in sorted(given - bought):
+        raise StudyError(where, f"cost.{name}: the table has no such tolerance, expected one of rig.errors")
+    prices = {error.name: Price(levels=((1.0, 0.0),)) for error in chain.errors} | {
         error.name: _price(getattr(costs, error.name) if error.name in given else costs.default, error, where)
         for error in chain.errors
+        if error.name in bought
     }
     return settings_of(Tolerances, costs, goal=goal, prices=prices)
 

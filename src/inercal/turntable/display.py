@@ -72,7 +72,7 @@ def _conditions(conditions: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
 
 
 def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
-    """The result with noise in the unit of the record and errors of the table in arcsec."""
+    """The result with noise and drift in the unit of the record and errors of the table in arcsec."""
     changed = dict(result)
     if "noise" in changed:
         changed["noise"] = [
@@ -83,6 +83,12 @@ def _result(result: Mapping[str, Any], unit: Unit) -> dict[str, Any]:
             }
             | {"unit": unit.symbol}
             for row in changed["noise"]  # of a file None where it was not known
+        ]
+    if "nuisances" in changed:
+        changed["nuisances"] = [
+            row | {"value": row["value"] / size, "u": row["u"] / size, "unit": text}
+            for row in changed["nuisances"]
+            for text, size in [shown_unit(row["unit"], unit)]
         ]
     if "table_errors" in changed:
         changed["table_errors"] = [

@@ -30,6 +30,40 @@ class Limits:
     """Part of u by which squares and products of the table's errors may shift or blur a coefficient before they are in
     the fit: below it they change u by half a percent."""
 
+    residual_risk: float = 3e-3
+    """Probability that any test of the residuals for a fault (trend, heading, level) names one in a sound record."""
+
+    dwell_risk: float = 1e-3
+    """Probability that drift within the dwells is named in a sound record."""
+
+    screen: float = 0.05
+    """Probability by chance of the score of a fault below which it is fitted."""
+
+    doubtful: float = 0.03
+    """Probability by chance of a fault below which its shift counts in u, though it is not significant."""
+
+    harmful_shift: float = 0.5
+    """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
+
+    blind_shift: float = 1.0
+    """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
+    the test would not show it."""
+
+    drift_sigmas: float = 4.0
+    """Standard uncertainties by which drift within the dwells may differ from that between them to be used with it."""
+
+    straight_part: float = 0.1
+    """Second-order change of a value by an uncertain latitude, over its u, below which first order does."""
+
+    bent_part: float = 0.33
+    """Second-order change of a value by an uncertain latitude, over its u, beyond which no u holds."""
+
+    latitude_off: float = math.radians(0.1)
+    """Error [rad] of a latitude that is stated without uncertainty up to which a finding says what it would do."""
+
+    gravity_off: float = 1e-3
+    """Error [m/s^2] of gravity, likewise."""
+
     site_ratio: float = 2.0
     """Ratio of u to its value at an exact site beyond which a finding names the site."""
 
@@ -41,6 +75,10 @@ class Limits:
 
     turning_cosine: float = 0.1
     """Cosine of turning axis and gyro axis below which a gyro takes no part in a rate test."""
+
+    across_cosine: float = 1e-3
+    """Cosine of turning axis and a gyro axis below which the gyro lies across: of a misalignment of 10 mrad towards a
+    third axis 2 arcsec pass for one towards the turning axis."""
 
     scatter_dof: int = 3
     """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""

@@ -29,10 +29,12 @@ LONGEST = 3.0
 
 @dataclass(frozen=True)
 class ReadingNoise:
-    """Noise of a reading: standard deviations ``std`` (c,), and their degrees of freedom ``dof``, inf where stated."""
+    """Noise of a reading: standard deviations ``std`` (c,), their degrees of freedom ``dof``, inf where stated, and the
+    logarithm of the restricted ``likelihood``."""
 
     std: Array
     dof: Array
+    likelihood: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,7 @@ def scatter(
     start = 2.0 * np.log(np.maximum(np.where(free, _spread(rows, y), std), floor))
     dof = np.full(len(free), np.inf)
     if not free.any():
-        return ReadingNoise(np.exp(0.5 * start), dof)
+        return ReadingNoise(np.exp(0.5 * start), dof, _likelihood(rows, y, table, np.exp(start)).value)
     log, now = start, _likelihood(rows, y, table, np.exp(start))
     for _ in range(STEPS):
         s2 = np.exp(log)
@@ -88,7 +90,7 @@ def scatter(
     s2 = np.exp(log)[free]
     of_log = now.information[np.ix_(free, free)] * s2 * s2[:, None]
     dof[free] = 2.0 / np.diag(np.linalg.pinv(of_log))
-    return ReadingNoise(np.exp(0.5 * log), dof)
+    return ReadingNoise(np.exp(0.5 * log), dof, now.value)
 
 
 def _spread(rows: Array, y: Array) -> Array:

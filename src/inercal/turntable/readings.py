@@ -27,10 +27,12 @@ class Readings:
     channels : (c,) names
     unit : Unit
         Of the record.
-    y : (n, c) readings, means over the dwells; in the SI unit of ``unit`` (count, V and 1 stay what they are)
+    y : (n, c) readings, means over the dwells; in the SI unit of ``unit`` (count, V, A, N*m and 1 stay what they are)
     samples : (n,) rows behind each reading
     u_mean : (c,) standard deviation of a reading that the scatter within the dwells explains if it is white,
         in the unit of y; NaN where a reading is a single row
+    times : (n,) middle of each dwell [s], or the number of the reading where stamps are missing or run backward
+    slopes : (n, c) change of the output per second within each dwell; NaN where there is none
     findings : about the record
     """
 
@@ -40,6 +42,8 @@ class Readings:
     y: Array
     samples: NDArray[np.int64]
     u_mean: Array
+    times: Array
+    slopes: Array
     findings: tuple[Finding, ...] = ()
 
 
@@ -90,7 +94,7 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     groups, short = (_by_number(record, angles, where), []) if "position" in record else _by_angle(angles)
     if not groups:
         raise RecordError(where, "found no rows with angles, expected one or more for each position")
-    means = _averaged(angles, values, groups, channels, columns[0].unit, where)
+    means = _averaged(angles, values, columns[0].t, groups, channels, columns[0].unit, where)
     if short:
         text = (
             f"{counted(len(short), 'stay')} of less than half the usual length: the readings there are left out; a "
@@ -119,7 +123,7 @@ def _by_number(record: Record, angles: Array, where: str) -> list[NDArray[np.int
     numbered = np.flatnonzero(np.isfinite(number) & np.isfinite(angles).all(axis=1))
     parts = _stretches(numbered, np.diff(number[numbered]) != 0.0)
     for part in parts:
-        if np.abs(_apart(angles[part], angles[part[0]])).max() > LIMITS.position_angle:
+        if np.abs(apart(angles[part], angles[part[0]])).max() > LIMITS.position_angle:
             raise RecordError(
                 where,
                 f"the angles change within position {number[part[0]]:g}, expected one attitude for each number",
@@ -153,7 +157,7 @@ def _at_rest(angles: Array) -> bool:
 
     Rows of a turn fill the whole angle of a position, so that their median lies a quarter of it from the middle one.
     """
-    away = np.abs(_apart(angles, angles[len(angles) // 2]))
+    away = np.abs(apart(angles, angles[len(angles) // 2]))
     return len(angles) > 2 and bool(np.median(away, axis=0).max() < 0.15 * LIMITS.position_angle)
 
 
@@ -161,7 +165,7 @@ def _departure(angles: Array, start: int) -> int:
     """First row after ``start`` that is not in its position."""
     stop, size = start, 64
     while stop < len(angles):
-        away = np.abs(_apart(angles[stop : stop + size], angles[start])).max(axis=1) > LIMITS.position_angle
+        away = np.abs(apart(angles[stop : stop + size], angles[start])).max(axis=1) > LIMITS.position_angle
         if away.any():
             return stop + int(np.argmax(away))
         stop, size = stop + size, 4 * size
@@ -173,7 +177,7 @@ def _stretches(rows: NDArray[np.int64], breaks: NDArray[np.bool_]) -> list[NDArr
     return np.split(rows, np.flatnonzero(breaks) + 1) if len(rows) else []
 
 
-def _apart(a: Array, b: Array) -> Array:
+def apart(a: Array, b: Array) -> Array:
     """Difference of angles, within ±pi."""
     return np.asarray(np.remainder(a - b + np.pi, 2.0 * np.pi) - np.pi)
 
@@ -181,6 +185,7 @@ def _apart(a: Array, b: Array) -> Array:
 def _averaged(
     angles: Array,
     values: Array,
+    t: Array,
     groups: list[NDArray[np.int64]],
     channels: tuple[str, ...],
     unit: Unit,
@@ -189,6 +194,7 @@ def _averaged(
     """Means over the groups of rows; numbers that are missing do not count."""
     y = np.empty((len(groups), values.shape[1]))
     scatter, freedom = np.zeros(values.shape[1]), np.zeros(values.shape[1])
+    times, slopes = np.empty(len(groups)), np.full(y.shape, np.nan)
     missing = 0
     for k, rows in enumerate(groups):
         finite = np.isfinite(values[rows])
@@ -200,6 +206,11 @@ def _averaged(
             )
         missing += int((~finite).sum())
         y[k] = np.where(finite, values[rows], 0.0).sum(axis=0) / count
+        times[k] = t[rows].mean()
+        away = t[rows] - times[k]
+        spread = away @ away  # 0.0 also of times so near each other that their squares vanish
+        if len(rows) > 2 and finite.all() and spread > 0.0:
+            slopes[k] = away @ values[rows] / spread
         scatter += np.square(np.where(finite, values[rows] - y[k], 0.0)).sum(axis=0)
         freedom += count - 1
     samples = np.array([len(rows) for rows in groups])
@@ -209,5 +220,7 @@ def _averaged(
     if missing:
         text = f"{counted(missing, 'value')} within the dwells are no numbers: the means are over the others"
         findings.append(Finding("nan", text))
-    still = [angles[rows[0]] + _apart(angles[rows], angles[rows[0]]).mean(axis=0) for rows in groups]
-    return Readings(np.array(still), channels, unit, y, samples, u_mean, tuple(findings))
+    still = [angles[rows[0]] + apart(angles[rows], angles[rows[0]]).mean(axis=0) for rows in groups]
+    if not np.all(np.diff(times) > 0.0):
+        times, slopes = np.arange(len(groups), dtype=float), np.full(y.shape, np.nan)
+    return Readings(np.array(still), channels, unit, y, samples, u_mean, times, slopes, tuple(findings))

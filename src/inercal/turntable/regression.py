@@ -8,8 +8,9 @@ errors that stay constant over the test are unknowns with the prior variance of 
     [   0    ] = [   0           1     ]  [ chi/s ]
 
 which is the same as weighting with V + J s^2 J^T, and also says what the test tells about chi. J depends on c,
-so that the fit is repeated until c rests. Where squares and products of the errors matter against u, they are in the
-readings and in V (`inercal.turntable.second_order`).
+so that the fit is repeated until c rests. Effects beside the instrument's terms (a drift, a fault that is tried) are
+more columns of A, free, or more of J, random. Where squares and products of the errors matter against u, they are in
+the readings and in V (`inercal.turntable.second_order`).
 """
 
 from __future__ import annotations
@@ -27,7 +28,15 @@ from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import TableModel
 from inercal.turntable.noise import scatter
 from inercal.turntable.second_order import SecondOrder, second_order
-from inercal.turntable.weights import Samples, Weights, beside_inputs, least_noise, weights, whitened
+from inercal.turntable.weights import (
+    Samples,
+    Weights,
+    beside_inputs,
+    least_noise,
+    weights,
+    weights_of,
+    whitened,
+)
 
 ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
@@ -40,6 +49,24 @@ FLOOR = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
+class Effects:
+    """Effects beside the terms of the instrument: ``free`` (n, c, m) columns, and ``random`` (n, c, q) ones, each times
+    a variable of variance 1."""
+
+    free: Array
+    random: Array
+
+    @classmethod
+    def none(cls, n: int, channels: int) -> Effects:
+        """No effects on so many readings."""
+        return cls(np.zeros((n, channels, 0)), np.zeros((n, channels, 0)))
+
+    def beside(self, free: Array) -> Effects:
+        """These, and more ``free`` ones (n, c, m)."""
+        return Effects(np.concatenate([self.free, free], axis=-1), self.random)
+
+
+@dataclass(frozen=True, eq=False)
 class Regression:
     """A fit of linear coefficients.
 
@@ -47,6 +74,7 @@ class Regression:
     ----------
     model : TableModel
     angles : (n, joints) rad
+    y : (n, c) readings
     c : (p,) linear coefficients [output per monomial]
     covariance : (p, p) of them
     gain : (p, n, c) how each reading enters each coefficient: ``c = gain y``, y less the stated terms
@@ -60,12 +88,20 @@ class Regression:
     table : (q,) estimated constant errors [rad or m], in the order of ``constant``
     table_u : (q,) their standard uncertainties
     constant : (q,) indices of the constant errors among the chain's
+    effects : the effects beside the terms that were fitted
+    effect : (m,) values of the free ones
+    effect_covariance : (m, m) of them
+    effect_gain : (m, n, c) how each reading enters each
+    random_effect : (q,) values of the random ones, in their standard deviations
+    random_covariance : (q, q) of them
+    likelihood : restricted log-likelihood, but for a constant
     second : SecondOrder
         Second order of the readings, by which they are corrected and weighted; None where it does not matter
     """
 
     model: TableModel
     angles: Array
+    y: Array
     c: Array
     covariance: Array
     gain: Array
@@ -80,7 +116,35 @@ class Regression:
     table: Array
     table_u: Array
     constant: NDArray[np.int64]
+    effects: Effects
+    effect: Array
+    effect_covariance: Array
+    effect_gain: Array
+    random_effect: Array
+    random_covariance: Array
+    likelihood: float
     second: SecondOrder | None = None
+
+    @property
+    def rows(self) -> Array:
+        """Regressors (n, c, p + m) of the terms and of the free effects."""
+        return np.concatenate([self.model.rows(self.angles), self.effects.free], axis=-1)
+
+    def weights(self, noise: Array) -> Weights:
+        """Covariance of the readings with ``noise`` (c,), second order and random effects included."""
+        chain = self.model.chain
+        table = weights_of(chain, self.slopes, self.angles, self.beside, noise, self.samples)
+        table = table if self.second is None else self.second.added(table)
+        return table.with_common(self.effects.random)
+
+    def shift(self, columns: Array) -> Array:
+        """Change (p, m) of the linear coefficients by effects ``columns`` (n, c, m) that are not fitted."""
+        return np.asarray(np.einsum("pnc,ncm->pm", self.gain, columns))
+
+    def with_effects(self, effects: Effects, noise: Sequence[float | None]) -> Regression:
+        """The readings fitted again with other ``effects``, to the same order of the errors; raises as `fit`."""
+        to_second = self.second is not None
+        return fit_to_order(self.model, self.angles, self.y, noise, self.c, self.samples, effects, to_second)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +232,7 @@ def fit(
     noise: Sequence[float | None],
     start: Array | None = None,
     samples: Samples | None = None,
+    effects: Effects | None = None,
 ) -> Regression:
     """Fit all channels together.
 
@@ -180,44 +245,49 @@ def fit(
     noise : (c,) standard deviation of a reading; None where it is to be estimated from the scatter
     start : (p,) coefficients for the first derivatives; from an unweighted fit if absent
     samples : (n,) rows behind each reading, over which errors of scope ``sample`` average; one if absent
+    effects : Effects, optional
+        Beside the terms, which the positions identify with them.
 
     Raises
     ------
     LinAlgError
         Terms so large that errors of the table, which they multiply, drown the readings: their weights do not settle.
     """
-    straight = _fit(model, angles, y, noise, start, samples, False)
-    bent = second_order(model, angles, straight.c, straight.samples)
-    if not _matters(straight, bent):
+    straight = fit_to_order(model, angles, y, noise, start, samples, effects, False)
+    if not second_order_matters(straight):
         return straight
-    return _fit(model, angles, y, noise, straight.c, samples, True)
+    return fit_to_order(model, angles, y, noise, straight.c, samples, effects, True)
 
 
-def _matters(straight: Regression, bent: SecondOrder) -> bool:
+def second_order_matters(straight: Regression) -> bool:
     """True if the second order changes a coefficient, or its u, noticeably against its u."""
+    bent = second_order(straight.model, straight.angles, straight.c, straight.samples)
     mean, columns = bent.shifts(straight.gain)
     rms = np.sqrt(np.square(mean) + np.square(columns).sum(axis=1))
     return bool(np.any(rms > LIMITS.second_order * np.sqrt(np.diag(straight.covariance))))
 
 
-def _fit(
+def fit_to_order(
     model: TableModel,
     angles: Array,
     y: Array,
     noise: Sequence[float | None],
     start: Array | None,
     samples: Samples | None,
+    effects: Effects | None,
     to_second_order: bool,
 ) -> Regression:
-    """The fit with or without the second order of the table's errors; raises as `fit`."""
-    rows = model.rows(angles)
-    n, channels, p = rows.shape
+    """As `fit`, with or without the second order of the table's errors."""
+    n, channels, p = model.rows(angles).shape
+    effects = Effects.none(n, channels) if effects is None else effects
+    rows = np.concatenate([model.rows(angles), effects.free], axis=-1)
+    m = rows.shape[-1] - p
     samples = np.ones(n, dtype=np.int64) if samples is None else samples
     size = np.sqrt(np.mean(np.square(y), axis=0))
     least = FLOOR * np.where(size > 0.0, size, 1.0)
-    y = y - model.outputs(angles, np.zeros(p))  # what is stated
+    read, y = y, y - model.outputs(angles, np.zeros(p))  # what is stated
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
-    c = solve(rows, y, plain).c if start is None else start
+    c = solve(rows, y, plain).c[:p] if start is None else start
     u, settled, bent, readings = np.zeros(p), True, None, y
     for _ in range(ROUNDS):
         if not np.isfinite(c).all():
@@ -226,10 +296,11 @@ def _fit(
         if to_second_order:
             bent = second_order(model, angles, c, samples)
             table, y = bent.added(table), readings - bent.mean
+        table = table.with_common(effects.random)
         noise_fit = scatter(rows, y, table, noise, np.maximum(least, least_noise(table.within)))
         sigma = noise_fit.std
         solution = solve(rows, y, Weights(table.within + np.diag(sigma**2), table.common))
-        change, c = np.abs(solution.c - c), solution.c
+        change, c = np.abs(solution.c[:p] - c), solution.c[:p]
         before, u = u, np.sqrt(np.diag(solution.joint)[:p])
         if np.all(change <= 1e-3 * u):
             break
@@ -240,23 +311,33 @@ def _fit(
     ):
         raise np.linalg.LinAlgError("the weights of the readings do not settle")
     constant = np.flatnonzero([error.scope.constant for error in model.chain.errors])
-    std = model.chain.std[constant]
+    std, free = model.chain.std[constant], slice(p, p + m)
+    last = slice(len(solution.chi) - effects.random.shape[-1], None)
+    of_table = np.diag(solution.joint)[p + m : p + m + len(std)]
     return Regression(
         model,
         angles,
+        read,
         c,
         solution.joint[:p, :p],
-        solution.gain,
-        y - np.einsum("ncp,p->nc", rows, c),
+        solution.gain[:p],
+        y - np.einsum("ncp,p->nc", rows, solution.c),
         solution.chi2,
-        n * channels - p,
+        n * channels - p - m,
         sigma,
         noise_fit.dof,
         model.by_errors(angles, c),
         beside_inputs(model, angles, c),
         samples,
         solution.chi[: len(std)] * std,
-        np.sqrt(np.diag(solution.joint)[p : p + len(std)]) * std,
+        np.sqrt(of_table) * std,
         constant,
+        effects,
+        solution.c[free],
+        solution.joint[free, free],
+        solution.gain[free],
+        solution.chi[last],
+        solution.joint[p + m :, p + m :][last, last],
+        noise_fit.likelihood,
         bent,
     )

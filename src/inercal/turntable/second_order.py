@@ -1,10 +1,10 @@
 """Second order of a table's errors: what their squares and products do to the readings (GUM 5.1.2 note, F.2.4.4).
 
-To second order an error chi_k and an input of the site move a reading by ``J_k chi_k + H_kl chi_k chi_l / 2``. The
-squares have the mean ``H_kk s_k^2 / 2``, by which readings are corrected; about it, squares and products are
-uncorrelated with each other and, for symmetric distributions, with the errors themselves. Each is therefore one more
-error of the readings, with the standard deviation ``s_k s_l``, or ``s_k^2 sqrt(kurtosis - 1)`` for a square, and takes
-a new value where either of its two does.
+To second order the errors chi move a reading by ``J_k chi_k + H_kl chi_k chi_l / 2``. The squares have the mean
+``H_kk s_k^2 / 2``, by which readings are corrected; about it, squares and products are uncorrelated with each other
+and, for symmetric distributions, with the errors themselves. Each is therefore one more error of the readings, with the
+standard deviation ``s_k s_l``, or ``s_k^2 sqrt(kurtosis - 1)`` for a square, and takes a new value where either of its
+two does. (A latitude multiplies what is fitted, and needs a fit on either side: `positions.latitude`.)
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class SecondOrder:
     Attributes
     ----------
     squares : (n, c, k) mean shift of the readings by the square of each error of the table
-    mean : (n, c) mean shift by all, the site included
+    mean : (n, c) mean shift by all
     redrawn : (n, c, q) standard deviations of the products that are new at a position
     shared : (n, c, r) changes by one standard deviation of those that several positions share
     """
@@ -53,10 +53,7 @@ class SecondOrder:
 def second_order(model: TableModel, angles: Array, c: Array, samples: Samples) -> SecondOrder:
     """Second order of the readings for linear coefficients ``c`` (p,); ``samples`` (n,) rows behind each reading."""
     chain = model.chain
-    std = np.array([*chain.std, *(each.u for each in model.references)])
-    errors: list[Error | None] = [*chain.errors, *(None for _ in model.references)]
-    # the site has one value throughout
-    groups = [*chain.groups(angles), *(np.zeros(len(angles), dtype=np.int64) for _ in model.references)]
+    std, errors, groups = chain.std, chain.errors, chain.groups(angles)
     H = _second_derivatives(model, angles, c)
     squares = 0.5 * np.einsum("nckk,k->nck", H, np.square(std))
     mean = squares.sum(axis=-1)
@@ -65,7 +62,7 @@ def second_order(model: TableModel, angles: Array, c: Array, samples: Samples) -
         for m, other in enumerate(errors[: k + 1]):
             size = 0.5 * _spread_of_square(first) if k == m else 1.0
             column = size * std[k] * std[m] * H[..., k, m]
-            if any(each is not None and each.scope is Scope.SAMPLE for each in (first, other)):
+            if Scope.SAMPLE in (first.scope, other.scope):
                 column = column / np.sqrt(samples)[:, None]
             if not column.any():
                 continue
@@ -74,38 +71,28 @@ def second_order(model: TableModel, angles: Array, c: Array, samples: Samples) -
             here = numbers[:, None] == several
             redrawn.append(np.where(here.any(axis=1)[:, None], 0.0, column)[..., None])
             shared.append(column[..., None] * here[:, None, :])
-    of_table = squares[..., : len(chain.errors)]
-    return SecondOrder(of_table, mean, np.concatenate(redrawn, axis=-1), np.concatenate(shared, axis=-1))
+    return SecondOrder(squares, mean, np.concatenate(redrawn, axis=-1), np.concatenate(shared, axis=-1))
 
 
-def _spread_of_square(error: Error | None) -> float:
-    """Standard deviation of the square, in units of the variance; that of a normal one for inputs of the site."""
-    if error is None:
-        return float(np.sqrt(2.0))
+def _spread_of_square(error: Error) -> float:
+    """Standard deviation of the square, in units of the variance."""
     distribution = error.distribution
     fourth = float(distribution.weights @ np.square(np.square(distribution.nodes - distribution.mean)))
     return float(np.sqrt(max(fourth / distribution.std**4 - 1.0, 0.0)))
 
 
 def _second_derivatives(model: TableModel, angles: Array, c: Array) -> Array:
-    """Second derivatives (n, c, k + r, k + r) of the readings by errors of the table and inputs of the site."""
+    """Second derivatives (n, c, k, k) of the readings by the errors of the table."""
     C_nb, slopes = model.chain.attitude(angles), model.chain.slopes(angles)
     turns = slopes @ np.swapaxes(C_nb, -1, -2)[:, None]  # dC/dchi = turn C, the turn in n
-    k, r = slopes.shape[1], len(model.references)
-    first = np.zeros((len(angles), k + r, 6))
-    second = np.zeros((len(angles), k + r, k + r, 6))
+    k = slopes.shape[1]
+    first, second = np.zeros((len(angles), k, 6)), np.zeros((len(angles), k, k, 6))
     for at, u_n in ((slice(0, 3), model.a_n), (slice(3, 6), model.w_n)):
-        first[:, :k, at] = u_n @ slopes
+        first[..., at] = u_n @ slopes
         # an error nearer the base stands on the left, whichever is which
         products = np.einsum("nki,nmij->nkmj", u_n @ turns, slopes)
         upper = np.triu(np.ones((k, k), dtype=bool))[..., None]
-        second[:, :k, :k, at] = np.where(upper, products, np.swapaxes(products, 1, 2))
-    for j, reference in enumerate(model.references, start=k):
-        for at, u_n in ((slice(0, 3), reference.a_n), (slice(3, 6), reference.w_n)):
-            first[:, j, at] = u_n @ C_nb
-            second[:, j, :k, at] = second[:, :k, j, at] = u_n @ slopes
-        if reference.source == "latitude":  # earth rate is a sine and a cosine of it
-            second[:, j, j, 3:] = -model.w_n @ C_nb
+        second[..., at] = np.where(upper, products, np.swapaxes(products, 1, 2))
     H = np.einsum("nci,nkmi->nckm", model.by_inputs(angles, c), second)
     bend = model.bend_by_inputs(angles, c)
     if bend is not None:

@@ -15,6 +15,9 @@ from inercal.rigs.chain import Chain
 from inercal.rigs.plans import Plan
 from inercal.units import Quantity, Unit
 
+BiasDrift = Literal["none", "linear", "exponential", "random_walk"]
+"""Drift of the biases over a test."""
+
 
 @dataclass(frozen=True)
 class Analysis:
@@ -37,11 +40,11 @@ class Instrument:
 
     Attributes
     ----------
-    kind, dwell, sample_rate, earth_rate
+    kind, dwell, sample_rate, bias_drift, earth_rate
         As their keys say; the kind is a key of `inercal.instruments.by_angle.CHANNELS`.
     unit : Unit
         Of its outputs in a record that is simulated. Coefficients and noise are in its SI unit where it is one of
-        rate or acceleration (then k_x is a pure number), else in the unit itself (count, V, 1).
+        rate or acceleration (then k_x is a pure number), else in that of their dimension (count, V, A, N*m, 1).
     terms : tuple of str or None
         Terms to be estimated, for any of its channels; None: those usual for the kind.
     coefficients : mapping
@@ -66,6 +69,9 @@ class Instrument:
         "samples per second of a simulation; one row a position if absent", "frequency", example="10 Hz",
         bounds=FREQUENCY,
     )  # fmt: skip
+    bias_drift: BiasDrift = option(
+        "drift of the biases that is fitted: none, linear, exponential (a warm-up) or random_walk", "none"
+    )
     earth_rate: Literal["fitted", "stated"] | None = option(
         "whether the response to earth rate is fitted; if absent where the plan allows", None
     )

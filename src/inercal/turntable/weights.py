@@ -33,6 +33,10 @@ class Weights:
         """Standard deviation (n, c) of each reading by all of it."""
         return np.asarray(np.sqrt(np.einsum("ncc->nc", self.within) + np.square(self.common).sum(axis=-1)))
 
+    def with_common(self, more: Array) -> Weights:
+        """With ``more`` (n, c, q) constants, each in its standard deviation."""
+        return Weights(self.within, np.concatenate([self.common, more], axis=-1)) if more.shape[-1] else self
+
 
 @dataclass(frozen=True, eq=False)
 class Whitened:

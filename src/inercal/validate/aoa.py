@@ -26,8 +26,7 @@ from inercal.arrays import Array
 from inercal.geometry.site import Site
 from inercal.studies.load import load_aoa_study
 from inercal.units import parse_quantity
-from inercal.validate.case import Case
-from inercal.validate.shipped import record_of, study_of
+from inercal.validate.case import Case, record_of, study_of
 
 _G = 9.80665
 _DEG = math.pi / 180.0

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.linear import least_squares
-from inercal.estimate.nonlinear import solve
+from inercal.estimate.least_squares import least_squares, solve
 from inercal.estimate.result import coverage_factor
 from inercal.geometry import earth, rotations
 from inercal.units import parse_quantity, parse_unit

@@ -20,8 +20,7 @@ from inercal.imu.settings import FerrarisSettings, ImuSettings
 from inercal.imu.task import calibrate
 from inercal.imu.temperature.sweep import fit_recording
 from inercal.studies.load import load_imu_study
-from inercal.validate.case import Case
-from inercal.validate.shipped import record_of, study_of
+from inercal.validate.case import Case, record_of, study_of
 
 _AXES = "xyz"
 

@@ -10,8 +10,7 @@ from inercal.noise.coefficients import noise_coefficients
 from inercal.noise.covariance import degrees_of_freedom
 from inercal.noise.deviation import allan_deviation
 from inercal.units import parse_unit
-from inercal.validate.case import Case
-from inercal.validate.shipped import record_of
+from inercal.validate.case import Case, record_of
 
 _STABLE32 = (2.9223e-1, 2.0102e-1, 1.4479e-1, 1.0570e-1, 6.1915e-2, 4.8082e-2, 3.6237e-2, 2.7674e-2)
 """Overlapping deviations at 1, 2, 4, .. 128 samples."""

@@ -22,9 +22,7 @@ from inercal.estimate.result import Estimate, timed
 from inercal.estimate.runs import Executor, Processes, Serial
 from inercal.examples import EXAMPLES, shipped
 from inercal.findings import Finding, Status
-from inercal.validate.case import Case, Numbers, Outcome, find, judge
-from inercal.validate.shipped import USED
-from inercal.validate.sources import SOURCES
+from inercal.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge
 
 SYSTEMS: Mapping[str, str] = {
     "foundation": "units, rotations, gravity, least squares",
@@ -51,21 +49,11 @@ def executor() -> Executor:
 
 
 def validate(executor: Executor, progress: Callable[[int, int], None] | None = None) -> Estimate:
-    """Run all cases.
+    """Run all cases; ``progress`` is told how many are done, of how many, after each system.
 
-    Parameters
-    ----------
-    executor : Executor
-        Where.
-    progress : callable, optional
-        Told how many cases are done, of how many, after each system.
-
-    Returns
-    -------
-    Estimate
-        Without parameters. Its status is ok where all cases passed, else inconsistent, and the message names those that
-        did not. ``result`` holds ``cases``, in the form of the JSON contract; ``provenance`` versions, machine and the
-        checksum of the package's sources.
+    The estimate has no parameters. Its status is ok where all cases passed, else inconsistent, and the message names
+    those that did not. ``result`` holds ``cases``, in the form of the JSON contract; ``provenance`` versions, machine
+    and the checksum of the package's sources.
     """
     began = time.perf_counter()
     systems = list(SYSTEMS)

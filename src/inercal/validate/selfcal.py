@@ -19,8 +19,7 @@ from inercal.selfcal.platform.plan import Plan, Rest, motion, path
 from inercal.selfcal.reading import recording_of
 from inercal.selfcal.settings import Noise, SelfcalSettings
 from inercal.studies.load import load_selfcal_study
-from inercal.validate.case import Case
-from inercal.validate.shipped import record_of, study_of
+from inercal.validate.case import Case, record_of, study_of
 
 _MICRO_G = 9.80665e-6
 _ARCSEC = np.pi / 648000.0

@@ -20,8 +20,22 @@ from inercal.arrays import Array
 from inercal.geometry.rotations import principal
 from inercal.report.coefficients import correlation
 from inercal.report.html import Picture, render
-from inercal.report.numbers import SETTLED, known, largest, middle, rms, settled, span
-from inercal.report.over_time import Flags, Marks, Panel, gaps, measured, over_time, stretches
+from inercal.report.over_time import (
+    SETTLED,
+    Flags,
+    Marks,
+    Panel,
+    gaps,
+    known,
+    largest,
+    measured,
+    middle,
+    over_time,
+    rms,
+    settled,
+    span,
+    stretches,
+)
 from inercal.report.spectra import of_angle
 from inercal.units import STANDARD_GRAVITY
 

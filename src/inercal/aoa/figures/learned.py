@@ -18,8 +18,7 @@ from inercal.instruments.terms import shown_unit
 from inercal.report import innovations as white_noise
 from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture
-from inercal.report.numbers import largest, middle, rms, settled
-from inercal.report.over_time import Marks, Panel, over_time
+from inercal.report.over_time import Marks, Panel, largest, middle, over_time, rms, settled
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:

@@ -16,13 +16,10 @@ from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.findings import EVERYTHING, Finding
-from inercal.records.checks.samples import plateaus
-from inercal.records.checks.values import is_dead, saturated
-from inercal.records.clocks import usable_interval
-from inercal.records.column import Column
+from inercal.records.checks.values import is_dead, plateaus, saturated
+from inercal.records.column import Column, usable_interval
 from inercal.records.places import counted, counted_names, places
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 Flags = NDArray[np.bool_]
 

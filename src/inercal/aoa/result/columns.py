@@ -22,8 +22,7 @@ from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings, Attitude
 from inercal.arrays import Array
 from inercal.inputs import Source
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.units import parse_unit
 
 _PITCH = (("theta", "deg"), ("u_theta", "deg"), ("rate", "deg/s"))

@@ -26,8 +26,7 @@ from inercal.imu.aided.table import Motion
 from inercal.imu.aided.verdict import findings, scatter, verdict
 from inercal.imu.settings import COMMAND, MASKED, AidedSettings, ImuSettings
 from inercal.instruments.terms import TERMS
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along frame "

@@ -12,8 +12,7 @@ from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import skew
 from inercal.imu.aided.blocks import small_turn
 from inercal.instruments.triad import TriadModel
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.rigs.chain import Chain
 from inercal.units import parse_unit
 

@@ -15,6 +15,7 @@ from inercal.imu.aided.diagnosis.fit_quality import variation
 from inercal.imu.aided.fit import Fit, Sensor
 from inercal.imu.limits import LIMITS
 from inercal.records.places import counted, counted_names
+from inercal.units import RAW
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
 _INPUT = {"acc": "specific force", "gyro": "rate"}
@@ -146,7 +147,7 @@ def _least(fit: Fit, triad: str) -> str:
 def _unit_words(fit: Fit, triad: str) -> str:
     """Findings about the unit of physical outputs, whose scale factors should be near nominal."""
     unit = of_triad(fit, triad)[0].side.blocks.triad.unit
-    if unit.dimension in ("count", "voltage"):
+    if unit.dimension in RAW:
         return ""
     gain = fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
     ratio = float(np.median(np.abs(np.diag(gain)))) * unit.factor

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.estimate.least_squares import NonlinearFit, solve
 from inercal.geometry.rotations import angle_between
 from inercal.imu.ferraris.detection import Detected
 from inercal.imu.ferraris.method import Inputs, Matrices, matrices

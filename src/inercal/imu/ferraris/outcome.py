@@ -22,8 +22,7 @@ from inercal.imu.ferraris.verdict import too_few, verdict
 from inercal.imu.settings import COMMAND, MASKED, FerrarisSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 MODEL = (
     "y = S M f + b, S = diag(K1), M = 1 + misalignment (full; M_ij: response of accelerometer i to specific force "

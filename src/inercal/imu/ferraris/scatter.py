@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.linear import LinearFit, least_squares
+from inercal.estimate.least_squares import LinearFit, least_squares
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import Matrices
 from inercal.imu.ferraris.names import UP

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.estimate.least_squares import NonlinearFit, solve
 from inercal.instruments.terms import ACCELEROMETER_TRIAD
 from inercal.instruments.triad import TriadModel, apart
 

@@ -99,7 +99,8 @@ def calibrate_multiposition(
         findings.append(_outlier_finding(recording, fitted, outliers, settings))
     else:
         u = np.sqrt(np.diag(uncertainty.covariance))
-        findings += squares_finding(fitted.joint, fitted.scatter, poses.means, gravity, u)
+        noise = float(np.mean(poses.noise_variance)), poses.noise_dof
+        findings += squares_finding(fitted.joint, fitted.scatter, poses.means, gravity, u, *noise)
     estimate = assemble(record, recording, poses, fitted.scatter, fitted.joint, settings, findings)
     return MultipositionCalibration(timed(estimate, clock), recording, poses, fitted.gyro, outliers)
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import WORST_BY_SIZE
+from inercal.imu.identified import pose_words
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.poses import Poses, dwells_at
-from inercal.imu.multiposition.verdict import curing_pose, pose_words
+from inercal.imu.multiposition.verdict import curing_pose
 from inercal.records.places import counted
 from inercal.report.coefficients import budget, correlation, values
 from inercal.report.html import Picture

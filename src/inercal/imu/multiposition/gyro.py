@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.identifiability import Identifiability, identify
-from inercal.estimate.linear import least_squares
-from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.estimate.least_squares import NonlinearFit, least_squares, solve
 from inercal.imu.multiposition.deletion import LinearFit
 from inercal.imu.multiposition.drivers import Drivers
 from inercal.imu.multiposition.earth_rate import EarthRate, UnknownRates, unknown_rates, vertical_output

@@ -12,20 +12,20 @@ from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import Uncertainty, combine
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status, settled
+from inercal.imu.identified import spread_words
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.deletion import held_out
 from inercal.imu.multiposition.gyro import GyroFit
 from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.multiposition.outliers import linear_poses
 from inercal.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
-from inercal.imu.multiposition.verdict import rms_miss, spread_words, verdict
+from inercal.imu.multiposition.verdict import rms_miss, verdict
 from inercal.imu.recording import Recording
 from inercal.imu.settings import COMMAND, MASKED, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
 from inercal.records.places import counted
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 
 MODEL = (
     "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "

@@ -20,12 +20,19 @@ from inercal.instruments.terms import shown_unit
 
 
 def squares_finding(
-    joint: Joint, scatter: Scatter, means: Array, gravity: float, u: Array
+    joint: Joint,
+    scatter: Scatter,
+    means: Array,
+    gravity: float,
+    u: Array,
+    noise: float = 0.0,
+    noise_dof: float = 0.0,
 ) -> Iterator[Finding]:
     """A finding where K2 shows, or may shift a value by more than its ``u`` (p,); none where it is fitted.
 
     K2 of each axis is 0 with the standard deviation `LIMITS.ordinary_k2` before the data, which may tell more of it.
-    ``means`` (n, 3) are the outputs in the poses, ``gravity`` [m/s^2].
+    ``means`` (n, 3) are the outputs, ``gravity`` [m/s^2] that of the site; ``noise`` is the variance [(m/s^2)^2] of |f|
+    that the sensors' noise explains, with ``noise_dof`` degrees of freedom, 0 where it is not known.
     """
     from scipy.special import fdtrc
 
@@ -43,8 +50,10 @@ def squares_finding(
     if allowed and acc.fit.dof > 3:
         estimate = -np.linalg.solve(K, unexplained.T @ acc.fit.residuals)
         gained = float(estimate @ K @ estimate)
-        left = (acc.fit.chi2 - gained) / (acc.fit.dof - 3)
-        if left > 0 and fdtrc(3, acc.fit.dof - 3, gained / 3.0 / left) < LIMITS.k2_probability:
+        left, dof = (acc.fit.chi2 - gained) / (acc.fit.dof - 3), float(acc.fit.dof - 3)
+        if noise > 0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
+            left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
+        if left > 0 and fdtrc(3, dof, gained / 3.0 / left) < LIMITS.k2_probability:
             size = np.sqrt(np.diag(np.linalg.inv(K)) * left) / unit[1]
             words = ", ".join(
                 f"{axis} {' ± '.join(rounded(value, each))}"

@@ -12,6 +12,7 @@ from inercal.arrays import Array
 from inercal.estimate.identifiability import WORST_BY_SIZE
 from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding, Status
+from inercal.imu.identified import pose_words
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.drivers import Drivers
@@ -21,16 +22,6 @@ from inercal.imu.multiposition.poses import Poses
 from inercal.imu.recording import Recording, unit_words
 from inercal.imu.turns import Turns, first_guess
 from inercal.records.places import counted
-
-
-def pose_words(direction: Array) -> str:
-    """A direction of specific force in words: ``+x +y`` is half-way between +x up and +y up."""
-    size = np.max(np.abs(direction))
-    return " ".join(
-        f"{'+' if c > 0 else '-'}{axis}"
-        for c, axis in zip(direction, "xyz", strict=True)
-        if abs(c) > 0.3 * size
-    )
 
 
 def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
@@ -46,14 +37,6 @@ def curing_pose(fit: AccelerometerFit, gravity: float) -> Array:
     # residual |f| - g changes with the parameters as f does along its own direction
     gain = np.einsum("ni,nip,p->n", grid, there.force_sensitivity(), weak)
     return np.asarray(grid[np.argmax(np.abs(gain))])
-
-
-def spread_words(means: Array) -> str:
-    """Spread of the mean outputs of the poses, in words, where they do not fill a sphere."""
-    s = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)
-    if s[1] < 0.05 * s[0]:
-        return "along one line"
-    return "in one plane" if s[2] < 0.05 * s[0] else "too unevenly"
 
 
 def rms_miss(gyro: GyroFit) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.linear import least_squares
+from inercal.estimate.least_squares import least_squares
 
 PARTS = 64
 """Equal parts of a sweep whose means are taken."""

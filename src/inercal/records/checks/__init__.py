@@ -17,7 +17,6 @@ from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.channels import may_be_empty, of_a_table
 from inercal.records.checks.angles import angle_findings
-from inercal.records.checks.time import time_axis, time_unit
 from inercal.records.checks.values import (
     accelerometer_unit,
     dead_channel,
@@ -25,6 +24,8 @@ from inercal.records.checks.values import (
     outliers,
     saturation,
     temperature_unit,
+    time_axis,
+    time_unit,
 )
 from inercal.records.column import Column
 from inercal.records.places import counted, places
@@ -34,12 +35,9 @@ _MEASURED = re.compile(r"acc_[xyz]|a\d+|gyro\w*|y_[xy]|temperature")
 
 
 def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
-    """Everything suspicious about the columns of a record, apart from what their readers have said.
+    """Everything suspicious about the ``columns`` of a record, by name, apart from what their readers have said.
 
-    Parameters
-    ----------
-    columns : mapping of str to Column
-        Those of a record, by name; each time axis they share is looked at once.
+    Each time axis that they share is looked at once.
     """
     clocks = {id(column.t): column for column in columns.values()}
     sampled = not of_a_table(columns)

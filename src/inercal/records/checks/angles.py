@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.channels import of_a_table
-from inercal.records.checks.samples import known, plateaus
-from inercal.records.clocks import counted_rows
-from inercal.records.column import Column
+from inercal.records.checks.values import known, plateaus
+from inercal.records.column import Column, counted_rows
 from inercal.records.places import counted, places
 
 _ANGLE = re.compile(r"phi[123]|th_[xyz]|theta_ref")
@@ -118,15 +117,10 @@ def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: boo
     1 deg/s by gyro, at least one of three axes turns at a third of it; none at a tenth is a standstill. One
     encoder of three is found so where its axis turns alone.
 
-    Parameters
-    ----------
-    rows : (n,) of the record, from 0
-    t : (n,) s
-    th : (n, 3) rad, all angles of the gimbals
-    rate : (n, 3) rad/s, of the platform about any axes of its own
-    biased : bool
-        True for a gyro: its rate counts from the median over the standstill. A standstill in which the platform
-        turns for most of the time is then not found.
+    ``rows`` (n,) of the record count from 0, ``t`` (n,) is in s; ``th`` (n, 3) [rad] are all angles of the gimbals,
+    ``rate`` (n, 3) [rad/s] is that of the platform about any axes of its own. ``biased`` is true for a gyro: its rate
+    counts from the median over the standstill, and a standstill in which the platform turns for most of the time is not
+    found.
     """
     limit = (1.0 if biased else 0.1) * _DEG
     size = max(1, round(min(1.0 / np.median(np.diff(t)), len(t))))

@@ -16,7 +16,7 @@ from inercal.findings import Finding
 from inercal.inputs import Source
 from inercal.records.checks import check
 from inercal.records.read.join import FileTable, joined
-from inercal.records.read.table import Format, Part
+from inercal.records.read.table import Format, Part, Reader
 from inercal.records.record import Record
 from inercal.units import Unit
 
@@ -46,6 +46,7 @@ def read(
     paths: str | Path | Sequence[str | Path],
     record_map: str | Path | RecordMap | None = None,
     progress: Callable[[int, int], None] | None = None,
+    counted: bool = False,
 ) -> Record:
     """Read one or several files into a record, and say what is suspicious about them.
 
@@ -61,6 +62,8 @@ def read(
         `sensor_msgs/Imu`.
     progress : callable, optional
         Called with bytes done and bytes in all.
+    counted : bool
+        Rows need no times and are then counted 0, 1, 2, ...: means of poses.
 
     Returns
     -------
@@ -83,13 +86,14 @@ def read(
     array([1.001, 0.999, 1.   ])
     """
     tables, record_map = _tables(paths, record_map, progress)
-    return _record(tables, record_map)
+    return _record(tables, record_map, counted)
 
 
 def read_runs(
     paths: str | Path | Sequence[str | Path],
     record_map: str | Path | RecordMap | None = None,
     progress: Callable[[int, int], None] | None = None,
+    counted: bool = False,
 ) -> list[Record]:
     """Read the records of one or several runs of a test: files with the same channels are repeat runs.
 
@@ -102,7 +106,7 @@ def read_runs(
         if Path(path).resolve() in (Path(other).resolve() for other in given[:index]):
             raise RecordError(path, "found it given twice, expected each run once")
     tables, record_map = _tables(paths, record_map, progress)
-    return [_record(run, record_map) for run in _runs(tables)]
+    return [_record(run, record_map, counted) for run in _runs(tables)]
 
 
 def _runs(tables: Sequence[FileTable]) -> list[list[FileTable]]:
@@ -144,7 +148,7 @@ def _tables(
     jobs = [(file, _CANONICAL) for file in files] if record_map is None else _assigned(files, record_map)
     if not jobs:
         raise RecordError("record", "found no file to read, expected one at least")
-    formats = [format_of(path) for path, _ in jobs]
+    formats = [_form(path, part) for path, part in jobs]
     sizes = [sum(file.stat().st_size for file in _files(path)) for path, _ in jobs]
     tables: list[FileTable] = []
     for index, (path, part) in enumerate(jobs):
@@ -153,9 +157,9 @@ def _tables(
     return tables, record_map
 
 
-def _record(tables: Sequence[FileTable], record_map: RecordMap | None) -> Record:
+def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: bool) -> Record:
     """The record of tables that belong together."""
-    columns = joined(tables, record_map)
+    columns = joined(tables, record_map, counted)
     sources = [
         *(file.source for file in tables),
         *([] if record_map is None else [source_of(record_map.path)]),
@@ -233,7 +237,7 @@ def canonical_units(paths: Sequence[Path]) -> dict[str, Unit] | None:
         return None
 
 
-def _read_one(form: Format, path: Path, part: Part, progress: Callable[[int], None]) -> list[FileTable]:
+def _read_one(form: Reader, path: Path, part: Part, progress: Callable[[int], None]) -> list[FileTable]:
     """The wanted columns of one file, a table for each clock, and the hash of its bytes."""
     try:
         before = _state(path)
@@ -261,6 +265,16 @@ def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, 
         progress(before + done, total)
 
 
+def _form(path: Path, part: Part) -> Reader:
+    """The module that reads a file as its part of the map says; raises `RecordError` if there is none."""
+    if not part.options.binary:
+        form = format_of(path)
+        return _module("transposed") if part.options.transpose and form is _module("text") else form
+    if not path.is_file():
+        raise RecordError(path, "found no such file, expected a recording")
+    return _module("binary")
+
+
 def format_of(path: Path) -> Format:
     """The module that reads a file; raises `RecordError` if there is no such file or none reads its suffix."""
     if (path / "metadata.yaml").is_file():
@@ -278,7 +292,11 @@ def format_of(path: Path) -> Format:
             path, "is a folder without metadata.yaml (a ROS 2 bag has one), expected a recording"
         )
     ending = "".join(Path(name).suffixes[-2:]) if name.endswith(".gz") else Path(name).suffix
-    raise RecordError(path, f"found the ending {ending or 'none'!r}, expected one of {', '.join(FORMATS)}")
+    raise RecordError(
+        path,
+        f"found the ending {ending or 'none'!r}, expected one of {', '.join(FORMATS)}; a raw binary "
+        "file needs a map with `binary` and `fields` under [file]",
+    )
 
 
 def _module(name: str) -> Format:

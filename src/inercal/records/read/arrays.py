@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,8 @@ from inercal.errors import InercalError, RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel
 from inercal.records.checks import missing, too_long
-from inercal.records.read.canonical import bare, canonical
 from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
+from inercal.records.titles import bare, canonical
 from inercal.units import parse_unit
 
 _LISTED = 20
@@ -82,6 +82,24 @@ class Contents:
         return f"the {'columns' if self.tabular else 'arrays'} {', '.join(names[:_LISTED])}{more}"
 
 
+def transposed(contents: Contents, path: Path) -> Contents:
+    """The contents with each array of several columns on its side: rows were channels.
+
+    Raises `RecordError` where the file is a table, whose columns have names.
+    """
+    if contents.tabular:
+        raise RecordError(
+            path, "found a table with named columns, expected none for `transpose` under [file]"
+        )
+    arrays = {
+        name: array
+        if array.columns == 1 or array.text
+        else held(np.stack([array.load(k) for k in range(array.columns)]), array.unit)
+        for name, array in contents.arrays.items()
+    }
+    return replace(contents, arrays=arrays)
+
+
 @dataclass(frozen=True)
 class ArrayFormat:
     """A format whose files hold named arrays: ``opened`` lends those of a file while it is open.
@@ -101,7 +119,8 @@ class ArrayFormat:
         progress: Callable[[int], None],
     ) -> list[Table]:
         """Read the wanted columns, or those that canonical names and units tell."""
-        with self._lent(path) as contents:
+        with self._lent(path) as lent:
+            contents = transposed(lent, path) if options.transpose else lent
             wanted = self_named(contents, path) if channels is None else channels
             wanted_tables = tables(contents, options, wanted, path, mapped=channels is not None)
         progress(path.stat().st_size)

@@ -35,15 +35,13 @@ class FileTable:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def joined(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str, Column]:
+def joined(
+    files: Sequence[FileTable], record_map: RecordMap | None, counted: bool = False
+) -> dict[str, Column]:
     """Columns by name, sign, scale and unit applied; tables whose time stamps are equal share one time axis.
 
-    Raises
-    ------
-    MapError
-        A mapped column is in none of the files.
-    RecordError
-        Two files hold the same channel, or a file has no time axis.
+    ``counted``: rows without times are counted, as means of poses. Raises `MapError` where a mapped column is in none
+    of the files, `RecordError` where two files hold the same channel, or one has no time axis.
     """
     if record_map is not None:
         check_present(files, record_map.path)
@@ -52,7 +50,7 @@ def joined(files: Sequence[FileTable], record_map: RecordMap | None) -> dict[str
     columns: dict[str, Column] = {}
     axes: list[Array] = []
     for file in files:
-        t = _time_axis(file, files, rate)
+        t = _time_axis(file, files, 1.0 if rate is None and counted else rate)
         t = next((axis for axis in axes if np.array_equal(axis, t, equal_nan=True)), t)
         axes.append(t)
         stamped = any("t" in other.table.values for other in files if other.part is file.part)

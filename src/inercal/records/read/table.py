@@ -21,7 +21,8 @@ class FileOptions:
     """Stated layout of a file; the reader finds out from the file what is None.
 
     ``delimiter`` " " is any run of blanks; ``comment`` begins lines to pass over (``#`` and ``%`` if None);
-    ``skip`` counts lines before the header; ``variable`` is the array of a file that holds several.
+    ``skip`` counts lines before the header, or bytes of a binary file; ``variable`` is the array of a file that holds
+    several. ``transpose``: rows are channels. A raw ``binary`` file has a type of NumPy for each of its ``fields``.
     """
 
     delimiter: str | None = None
@@ -29,6 +30,9 @@ class FileOptions:
     comment: str | None = None
     skip: int = 0
     variable: str | None = None
+    transpose: bool = False
+    binary: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -80,8 +84,8 @@ class Sample:
     units: tuple[str | None, ...] = ()
 
 
-class Format(Protocol):
-    """A module that knows one file format."""
+class Reader(Protocol):
+    """A module that reads files as a map describes them."""
 
     def read(
         self,
@@ -94,6 +98,10 @@ class Format(Protocol):
 
         A table for each clock, one at least. Without ``channels``, those that the file itself names.
         """
+
+
+class Format(Reader, Protocol):
+    """A module that knows one file format."""
 
     def header(self, path: Path) -> tuple[Channel, ...]:
         """The channels that the file itself names, with units; raises `InputError` where it names none."""

@@ -22,10 +22,9 @@ from inercal.findings import Finding
 from inercal.records.channels import Channel, may_be_empty
 from inercal.records.checks import too_long
 from inercal.records.places import counted, places
-from inercal.records.read.canonical import EXAMPLE, bare, canonical
-from inercal.records.read.layout import Layout, find_layout, is_rounded
-from inercal.records.read.lines import Block, blocks
+from inercal.records.read.layout import Block, Layout, blocks, find_layout, is_rounded
 from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
+from inercal.records.titles import EXAMPLE, bare, canonical
 from inercal.units import shown
 
 _HEADER_LINES = 50
@@ -138,7 +137,7 @@ def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, .
         raise RecordError(
             path,
             f"line {line + 1}: found {shown(lines[line])}, expected a header such as {EXAMPLE}, "
-            "or a map (`inercal new imu` writes one)",
+            "or a map (`inercal new` imu, turntable, selfcal or aoa writes one)",
         )
     return canonical(((index, title, None) for index, title in enumerate(layout.header)), where)
 

@@ -1,8 +1,7 @@
 """Bounds before the test: how well any unbiased estimator can know the coefficients along a path.
 
-The covariance of the error-state filter, linearised along the true path, is the Cramer-Rao bound of the model (Van
-Trees and Bell, Bayesian Bounds, 2007): its Riccati recursion needs no measurements, only the path, the noise, and the
-prior. Split by where errors come from, the same recursion says how much each source adds:
+The covariance of the error-state filter along the true path is the Cramer-Rao bound (Van Trees and Bell, Bayesian
+Bounds, 2007): its Riccati recursion needs no measurements. Split by source, it says how much each adds:
 
     P_s+ = (1 - K h)(F P_s F^T + Q_s)(1 - K h)^T + K R_s K^T,   sum of all P_s = P,   K the gain of the whole
 """
@@ -61,18 +60,10 @@ _PARTS: Final = np.array([2, 3])
 class PathBounds:
     """Cramer-Rao bounds of the coefficients along a path.
 
-    Attributes
-    ----------
-    names : length p
-    covariance : (p, p)
-        Of the coefficients at the end of the path, product form.
-    prior : (p,)
-        Standard deviations before it.
-    history : (n, p)
-        Standard uncertainties from row to row, linear form; no rows unless asked for.
-    contributions : mapping
-        Source (`SOURCES`) -> its part (p, p) of the covariance; they add up to it. Empty unless asked for. The first
-        encoder reading, which gives the attitude at the start, belongs to the encoder.
+    ``covariance`` (p, p) at its end, product form, and ``prior`` (p,) standard deviations before it; ``history`` (n, p)
+    standard uncertainties from row to row, linear form, no rows unless asked for. ``contributions``: source (`SOURCES`)
+    -> its part (p, p) of the covariance, to which they add up; empty unless asked for. The first encoder reading, which
+    gives the attitude at the start, belongs to the encoder.
     """
 
     names: tuple[str, ...]
@@ -101,19 +92,10 @@ def bounds(
     history: bool = False,
     contributions: bool = False,
 ) -> PathBounds:
-    """Bounds along a commanded motion.
+    """Bounds along a commanded motion, with noise, prior and near-level gate of the problem.
 
-    Parameters
-    ----------
-    motion : CommandedMotion
-    problem : FilterProblem
-        Noise, prior and near-level gating; the other settings of its filter play no part.
-    truth : (p,) or longer, optional
-        True coefficients, product form, that make the path; the nominal path if absent.
-    measured : (n, 4) bool, optional
-        Rows that accelerometers x, y, z and the encoders measure; all if absent. The first row's play no part.
-    history, contributions : bool
-        Return these too.
+    ``truth`` (p,) or longer, product form, makes the path, the nominal one if absent; ``measured`` (n, 4) rows that
+    accelerometers x, y, z and the encoders measure, all if absent. The first row's accelerometers play no part.
     """
     p = len(problem.prior)
     c = np.zeros(p) if truth is None else to_linear(truth[:p])
@@ -137,18 +119,8 @@ def recorded_bounds(
 ) -> PathBounds:
     """Bounds along a path as it was estimated, with the measurements that a recording has.
 
-    Parameters
-    ----------
-    recording : Recording
-    problem : FilterProblem
-    attitudes : (n, 4)
-        Estimated ``q_bp`` at its rows.
-    coefficients : (p,)
-        Estimated, linear form.
-    history, contributions : bool
-        Return these too.
-    restarts : sequence of int
-        Rows at which the attitude was taken anew from the encoders.
+    ``attitudes`` (n, 4) estimated q_bp at its rows, ``coefficients`` (p,) in the linear form; ``restarts`` the rows at
+    which the attitude was taken anew from the encoders.
     """
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     path = recording.th, recording.dt, recording.rate
@@ -234,13 +206,8 @@ class Path(NamedTuple):
 def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> None:
     """Covariance of the error state along a path, in place.
 
-    Parameters
-    ----------
-    P : (1 or 1 + sources, 3 + p, 3 + p) at the first row; the whole, then its parts
-    path : Path
-    c : (p,) coefficients, linear form
-    model : FilterModel
-    u : (n or 0, p) receives standard uncertainties
+    ``P`` (1 or 1 + sources, 3 + p, 3 + p) is that at the first row, the whole and then its parts; ``c`` (p,) are
+    coefficients, linear form; ``u`` (n or 0, p) receives standard uncertainties.
     """
     q, th, dt, w, seen = path
     world, noise, gate = model

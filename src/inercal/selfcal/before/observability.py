@@ -18,10 +18,7 @@ from inercal.selfcal.platform.coefficients import shown_units
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """A path judged by its bounds.
-
-    ``learned`` against the prior; ``to_goal`` u over the wanted u, by name, of those coefficients that have a goal.
-    """
+    """A path judged by its bounds, as ``learned`` against the prior; ``to_goal`` u over the wanted u, by name."""
 
     bounds: PathBounds
     learned: Learned
@@ -46,29 +43,23 @@ class Observability:
         """A finding for each coefficient at its prior, or wider than wanted."""
         ratio = dict(zip(self.bounds.names, self.learned.ratio, strict=True))
         u = {name: f"{size} {unit}" for name, size, unit in self._shown()}
-        left = [
-            Finding(
-                "at_prior",
-                f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]}",
-            )
+        left = {
+            name: f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]}"
             for name in self.at_prior
-        ]
-        wide = [
-            Finding(
-                "goal_missed",
-                f"{name}: the path leaves u = {u[name]}, {self.to_goal[name]:.3g} times the goal",
-            )
+        }
+        wide = {
+            name: f"{name}: the path leaves u = {u[name]}, {self.to_goal[name]:.3g} times the goal"
             for name in self.unmet
-            if name not in self.at_prior
-        ]
-        return (*left, *wide)
+        }
+        return (
+            *(Finding("at_prior", text) for text in left.values()),
+            *(Finding("goal_missed", text) for name, text in wide.items() if name not in left),
+        )
 
     def worst(self, count: int = 3) -> list[str]:
         """The worst-known combinations in words, with the share of its prior that is left of each."""
-        weakest = self.learned.weakest(count)
-        return [
-            f"{words}: {100 * left:.3g} %" for words, left in zip(weakest, self.learned.left, strict=False)
-        ]
+        weakest = zip(self.learned.weakest(count), self.learned.left, strict=False)
+        return [f"{words}: {100 * left:.3g} %" for words, left in weakest]
 
     def table(self) -> str:
         """Bounds over prior and over goal, as aligned text."""

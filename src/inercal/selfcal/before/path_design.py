@@ -40,18 +40,9 @@ class ComparedPath:
 @short_repr
 @dataclass(frozen=True, eq=False)
 class Designed:
-    """A path that was searched for.
-
-    Attributes
-    ----------
-    compare : tuple of ComparedPath
-        The path found first, then those it is compared with: the study's own, and the named ones that take no more
-        than the time; each has a rest at the end where it takes less.
-    message : str
-        The search, in words.
-    findings : tuple of Finding
-        Coefficients that the path found cannot see, and gimbal lock where it comes close.
-    """
+    """A path that was searched for, the first to ``compare`` with the study's own and the named ones that take no more
+    than its time, each with a rest at its end; a ``message`` on the search; ``findings``: coefficients that the path
+    cannot see, and gimbal lock where it comes close."""
 
     compare: tuple[ComparedPath, ...]
     message: str
@@ -95,21 +86,10 @@ class Designed:
 def design(
     settings: SelfcalSettings, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Designed:
-    """Search for a path within rate, time and limits, and set it beside others.
+    """Search for a path within rate, time and limits of the study, and set it beside others.
 
-    Bounds are those of the nominal path: the prior of the coefficients is enough.
-
-    Parameters
-    ----------
-    settings : SelfcalSettings
-        ``plan`` for rate, step, start and time; ``search``; ``limits``; ``goal``; prior and noise.
-    progress : callable
-        Told (done, total) of the search.
-
-    Raises
-    ------
-    StudyError
-        No time is stated, or no turn fits into time and limits.
+    Bounds are those of the nominal path: the prior of the coefficients is enough. ``progress`` is told (done, total).
+    Raises StudyError where no time is stated, or no turn fits into time and limits.
     """
     best = search(settings, progress)
     asked = settings.search
@@ -121,19 +101,12 @@ def design(
         left = best.duration - other.duration
         if left > -best.step / 2.0 and (settings.plan is None or other.moves != settings.plan.moves):
             plans[name] = lasting(other, best.duration)
-    judged = tuple(_judged(name, plan, settings) for name, plan in plans.items())
+    judged = tuple(_compared(name, plan, settings) for name, plan in plans.items())
     lock = float(np.abs(np.cos(best.angles()[:, 1])).min())
-    near = (
-        [
-            Finding(
-                "gimbal_lock",
-                f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found",
-                harm=(),
-            )
-        ]
-        if lock < LIMITS.path_cosine
-        else []
-    )
+    near = []
+    if lock < LIMITS.path_cosine:
+        text = f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found"
+        near = [Finding("gimbal_lock", text, harm=())]
     by = {"worst": "largest u", "mean": "geometric mean of u"}[asked.criterion]
     return Designed(
         judged,
@@ -151,12 +124,7 @@ def lasting(plan: Plan, time: float) -> Plan:
 
 def with_stops(plan: Plan, angle: float, rate: float) -> Plan:
     """Multi-position calibration on the same path and of the same time: turns in parts of at most ``angle`` [rad] at a
-    higher ``rate`` [rad/s], and rests of equal length after each.
-
-    Raises
-    ------
-    ValueError
-        At that rate the turns alone take longer than the plan.
+    higher ``rate`` [rad/s], and rests of equal length after each. Raises ValueError where the turns alone take longer.
     """
     parts = []
     for move in plan.moves:
@@ -165,9 +133,7 @@ def with_stops(plan: Plan, angle: float, rate: float) -> Plan:
             parts += [Turn(move.joint, move.angle / number, rate)] * number
     rest = (plan.duration - replace(plan, moves=tuple(parts)).duration) / len(parts)
     if rest < 0.0:
-        raise ValueError(
-            f"found turns at {rate:g} rad/s that take longer than the plan, expected a higher rate"
-        )
+        raise ValueError(f"found turns at {rate:g} rad/s longer than the plan, expected a higher rate")
     rest = plan.step * math.floor(rest / plan.step + 1e-9)
     stopping = replace(plan, moves=tuple(move for part in parts for move in (part, Rest(rest))))
     return lasting(stopping, plan.duration)
@@ -182,18 +148,17 @@ def at_rest(plan: Plan) -> Mask:
 
 def stated_moves(moves: tuple[Move, ...]) -> list[list[str]]:
     """Moves as a study states them: joint, angle and, unless it is the plan's, the rate; or a rest."""
-    return [_stated(move) for move in moves]
+    texts = []
+    for move in moves:
+        if isinstance(move, Rest):
+            texts.append(["rest", f"{move.duration:.10g} s"])
+        else:
+            rate = [] if move.rate is None else [f"{math.degrees(move.rate):.10g} deg/s"]
+            texts.append([move.joint, f"{math.degrees(move.angle):.10g} deg", *rate])
+    return texts
 
 
-def _stated(move: Move) -> list[str]:
-    """A move as a study states it."""
-    if isinstance(move, Rest):
-        return ["rest", f"{move.duration:.10g} s"]
-    rate = [] if move.rate is None else [f"{math.degrees(move.rate):.10g} deg/s"]
-    return [move.joint, f"{math.degrees(move.angle):.10g} deg", *rate]
-
-
-def _judged(name: str, plan: Plan, settings: SelfcalSettings) -> ComparedPath:
+def _compared(name: str, plan: Plan, settings: SelfcalSettings) -> ComparedPath:
     """A plan judged by its bounds."""
     along = bounds(motion(plan, settings.world), problem(settings))
     value = criterion(along, settings.goal, settings.search.criterion)

@@ -42,19 +42,10 @@ def search(
 ) -> Plan:
     """The best path that the search finds within rate, time, number of turns, and limits of the gimbals.
 
-    Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan. Where the study
-    does not limit the inner gimbal, it keeps a distance to gimbal lock (`LIMITS.path_cosine`).
+    Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan. An inner gimbal
+    without limits keeps `LIMITS.path_cosine` from lock. ``progress`` is told (done, total) of the random starts.
 
-    Parameters
-    ----------
-    settings : SelfcalSettings
-    progress : callable
-        Told (done, total) of the random starts.
-
-    Raises
-    ------
-    StudyError
-        No time is stated, or no turn fits into time and limits.
+    Raises StudyError where no time is stated, or no turn fits into time and limits.
     """
     ground = _ground(settings)
     rng = np.random.default_rng(settings.search.seed)
@@ -68,11 +59,8 @@ def search(
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """The ground of a search.
-
-    ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the start; ``number`` of
-    angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these steps.
-    """
+    """The ground of a search: ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the
+    start; ``number`` of angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these."""
 
     asked: Search
     model: Plan
@@ -85,7 +73,7 @@ class _Ground:
     goal: Mapping[str, float]
 
     def plan(self, turns: Sequence) -> Plan:
-        """The plan of a sequence."""
+        """The plan of a sequence, with a rest at its end."""
         turning, step = self._turning(turns), self.model.step
         rest = step * math.floor((self.time - turning.duration) / step + _EVEN)
         return replace(turning, moves=(*turning.moves, Rest(rest))) if rest > 0.0 else turning

@@ -8,8 +8,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import all_angles, attitude
 from inercal.selfcal.platform.model import Truth, simulate_truth
@@ -22,11 +21,8 @@ from inercal.units import parse_unit
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A plan on a rig, ready to be simulated many times.
-
-    ``motion`` as commanded; ``fine`` (n - 1, m, 3) [rad/s] the rates on which the platform acts in each finer step;
-    ``truth`` (p,) coefficients in the linear form.
-    """
+    """A plan on a rig, ready to be simulated many times: ``motion`` as commanded; ``fine`` (n - 1, m, 3) [rad/s] the
+    rates on which the platform acts in each finer step; ``truth`` (p,) coefficients in the linear form."""
 
     world: World
     noise: Noise
@@ -46,13 +42,7 @@ class Simulated:
 
 
 def experiment(settings: SelfcalSettings) -> Experiment:
-    """Prepare the simulation that a study states.
-
-    Raises
-    ------
-    StudyError
-        The study has no plan or no truth.
-    """
+    """Prepare the simulation that a study states; raises StudyError where it has no plan or no truth."""
     if settings.plan is None:
         raise StudyError("plan", "missing, expected the turns to be simulated")
     if settings.truth is None:

@@ -1,10 +1,8 @@
 """Errors of a recording that contradicts the model: all hypotheses asked in order, each named with its place.
 
-Units, signs and order were seen roughly when the recording was read (`inercal.selfcal.diagnosis.gross`). Then come
-gross faults of the accelerometers and of rows (`inercal.selfcal.diagnosis.rows`), each judged by what the error-state
-filter makes of the recording without it; single rows far off come last of these. Constant errors that the model leaves
-out follow (`inercal.selfcal.diagnosis.small`), and last the size and the whiteness of the innovations
-(`inercal.selfcal.diagnosis.noise_check`). Every limit keeps a risk of a false finding of about 1e-3.
+Units, signs and order were seen roughly when the recording was read (`gross`). Then come gross faults of accelerometers
+and rows (`rows`), judged by what the error-state filter makes of the recording without each, single rows last; constant
+errors that the model leaves out (`small`); and the size and whiteness of the innovations (`noise_check`).
 """
 
 from __future__ import annotations
@@ -41,14 +39,8 @@ def diagnose(
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
-    Parameters
-    ----------
-    recording : Recording
-    problem : FilterProblem
-    result : FilterResult
-        Of the study's estimator; the error-state filter judges the recording itself.
-    systematic : Hypothesis, optional
-        Systematic inputs of the study: no error within their uncertainties is named.
+    ``result`` is that of the study's estimator; the error-state filter judges the recording itself. No error within the
+    uncertainties of ``systematic`` inputs is named.
     """
     if any(finding.code in _BEYOND for finding in recording.findings) or not result.dims.any():
         return []

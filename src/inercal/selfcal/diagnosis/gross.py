@@ -1,10 +1,8 @@
 """Gross faults of a recording or its study: signs, units and order of rates, angles and accelerometers; another path.
 
-Before anything is filtered they are seen roughly, to some per cent: enough to tell wrong units, exchanged or reversed
-axes and another path from the coefficients to be estimated, which are a hundred times smaller. Whole recordings are
-compared, so that single bad stretches stay with the tests of the filters' innovations. Each other sign or order is a
-hypothesis, and the first with which two sensors agree is named. Accelerometers are also held to the innovations
-(`reordered_accelerometers`).
+Before anything is filtered they are seen roughly, to some per cent: the coefficients are a hundred times smaller.
+Whole recordings are compared, so that single bad stretches stay with the tests of the innovations. Each other sign or
+order is a hypothesis, and the first with which two sensors agree is named.
 """
 
 from __future__ import annotations
@@ -53,12 +51,9 @@ _EXCHANGED = {
 
 @dataclass(frozen=True, eq=False)
 class _Stretches:
-    """Motion in each of m steps between rows whose angles are known.
-
-    ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,) [s] between them, ``rate`` (m, 3) [rad] the turns against inertial
-    space, in p, by the rates; ``stretch`` (m,) the stretch of each step; ``recorded`` (m,) true where all rates in it
-    were recorded.
-    """
+    """Motion in each of m steps between rows whose angles are known: ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,)
+    [s] between them, ``rate`` (m, 3) [rad] the turns against inertial space, in p, by the rates; the ``stretch`` (m,)
+    of each step; ``recorded`` (m,) true where all rates in it were."""
 
     th: Array
     dt: Array
@@ -78,15 +73,10 @@ class _Stretches:
 
 
 def implausible(recording: Recording, settings: SelfcalSettings, where: object) -> list[Finding]:
-    """Contradictions between rates, angles and accelerometers.
+    """Contradictions between rates, angles and accelerometers: signs, order, units, or ``at_prior`` without any motion.
 
-    Codes are ``sign_suspect`` and ``channel_swap`` of gimbals, rates and accelerometers, ``contradiction``,
-    ``unit_suspect``, and ``at_prior`` without any motion. ``where`` is named in the error.
-
-    Raises
-    ------
-    RecordError
-        Rates many times as fast as the angles, or the reverse: a unit is wrong, and nothing can be computed.
+    Raises RecordError, naming ``where``, for rates many times as fast as the angles, or the reverse: a unit is wrong,
+    and nothing can be computed.
     """
     findings: list[Finding] = []
     complete = np.flatnonzero(np.isfinite(recording.th).all(axis=1))
@@ -97,10 +87,8 @@ def implausible(recording: Recording, settings: SelfcalSettings, where: object) 
     commanded = motion.summed(motion.rate)
     noise = LIMITS.noise_sigmas * settings.noise.encoder
     if moved.max() < noise:
-        still = (
-            "th: the platform does not turn, expected turns: most coefficients stay as they were known before"
-        )
-        findings.append(Finding("at_prior", still))
+        still = "the platform does not turn, expected turns: most coefficients stay as they were known before"
+        findings.append(Finding("at_prior", f"th: {still}"))
     else:
         _units(commanded, moved, noise, where)
         findings += _rig(motion, commanded, settings, "gyro" if recording.measured else "wc")
@@ -161,11 +149,8 @@ def _rig(motion: _Stretches, commanded: Array, settings: SelfcalSettings, sensor
     if suspect is not None:
         return [suspect]
     off = f"off by {100.0 * by_angles.misfit:.3g} % of the motion"
-    return [
-        Finding(
-            "contradiction", f"th: the angles do not follow the rates {sensor}_x..z, {off}", harm=EVERYTHING
-        )
-    ]
+    text = f"th: the angles do not follow the rates {sensor}_x..z, {off}"
+    return [Finding("contradiction", text, harm=EVERYTHING)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,10 +182,10 @@ def _other_angles(motion: _Stretches, settings: SelfcalSettings) -> Iterator[Hyp
     now = (*of_study.axes, *of_study.signs)
 
     def hypothesis(code: str, text: str, moved: _Stretches, rig: World) -> Hypothesis[_Pair]:
-        text = f"th: {text}"
-        return Hypothesis(
-            text, code, text, lambda pair, _: replace(pair, seen=moved.turned(rig)), harm=EVERYTHING
-        )
+        def without(pair: _Pair, _: Array) -> _Pair:
+            return replace(pair, seen=moved.turned(rig))
+
+        return Hypothesis(f"th: {text}", code, f"th: {text}", without, harm=EVERYTHING)
 
     def changes(other: Gimbals) -> int:
         return sum(a != b for a, b in zip((*other.axes, *other.signs), now, strict=True))
@@ -274,10 +259,8 @@ def _accelerometers(
     suspect = _fitting(pair, _other_axes("acc"))
     if suspect is not None:
         return [suspect]
-    off = f"off by {100.0 * pair.misfit:.3g} % of gravity"
-    return [
-        Finding("contradiction", f"acc: specific force does not follow the angles, {off}", harm=EVERYTHING)
-    ]
+    text = f"acc: specific force does not follow the angles, off by {100.0 * pair.misfit:.3g} % of gravity"
+    return [Finding("contradiction", text, harm=EVERYTHING)]
 
 
 def clipped(recording: Recording, settings: SelfcalSettings, channel: str) -> bool:
@@ -341,11 +324,8 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
 def off_the_path(
     recording: Recording, plan: Plan, world: World, began: float, rows: NDArray[np.int64]
 ) -> list[Finding]:
-    """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s].
-
-    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it: at gimbal lock they are not
-    unique.
-    """
+    """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s];
+    ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it, also at gimbal lock."""
     t = recording.t - began
     findings = []
     if t[-1] < plan.duration - LIMITS.missing_steps * plan.step:

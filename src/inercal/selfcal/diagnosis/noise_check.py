@@ -52,9 +52,8 @@ def _even(columns: Array, mean: float) -> bool:
     limit = sigmas(LIMITS.risk, LIMITS.even_parts)
     for part in np.array_split(columns, LIMITS.even_parts):
         finite = part[np.isfinite(part)]
-        if len(finite) and abs(np.mean(np.square(finite)) / mean - 1.0) > limit * math.sqrt(
-            2.0 / len(finite)
-        ):
+        off = abs(np.mean(np.square(finite)) / mean - 1.0) if len(finite) else 0.0
+        if off > limit * math.sqrt(2.0 / max(len(finite), 1)):
             return False
     return True
 
@@ -103,12 +102,8 @@ def _unexplained(z: Array) -> Finding:
     text = (
         f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1{_correlated(z)})"
     )
-    return Finding(
-        "contradiction",
-        f"{text}, and no fault that is looked for explains them",
-        places("row", worst + 2),
-        EVERYTHING,
-    )
+    text += ", and no fault that is looked for explains them"
+    return Finding("contradiction", text, places("row", worst + 2), EVERYTHING)
 
 
 def _correlated(z: Array) -> str:
@@ -117,8 +112,7 @@ def _correlated(z: Array) -> str:
     for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
         products = columns[1:] * columns[:-1]
         count = int(np.isfinite(products).sum())
-        if count and abs(
-            share := float(np.nanmean(products) / np.nanmean(np.square(columns)))
-        ) > LIMITS.nis_sigmas / math.sqrt(count):
+        share = float(np.nanmean(products) / np.nanmean(np.square(columns))) if count else 0.0
+        if abs(share) > LIMITS.nis_sigmas / math.sqrt(max(count, 1)):
             words += f"; {sensor}: correlated from row to row, by {share:.2g}"
     return words or ", or correlated in time"

@@ -1,9 +1,7 @@
 """Gross faults of rows: readings logged late, once too often, not at all, or far off.
 
-Each is judged by the error-state filter, not here: without it the sum of normalised innovations squared must fall by
-more than chance explains (`inercal.estimate.hypotheses.Hypothesis.chance`), of all hypotheses of a kind.
-
-Angles and commands are compared from row to row: `Turning` holds the rotation in between by each.
+Each is judged by the error-state filter, not here. Angles and commands are compared from row to row by the rotation in
+between (`Turning`).
 """
 
 from __future__ import annotations
@@ -80,10 +78,8 @@ class Turning:
     def jumps(self) -> NDArray[np.bool_]:
         """(n - 1,) true where the encoders differ from the command by more than noise and half of the command."""
         off = np.linalg.norm(self.seen - self.commanded, axis=1)
-        return np.asarray(
-            off
-            > LIMITS.noise_sigmas * self.noise + LIMITS.jump_share * np.linalg.norm(self.commanded, axis=1)
-        )
+        share = LIMITS.jump_share * np.linalg.norm(self.commanded, axis=1)
+        return np.asarray(off > LIMITS.noise_sigmas * self.noise + share)
 
 
 def turning(recording: Recording, problem: FilterProblem) -> Turning:
@@ -191,11 +187,8 @@ def _frozen(recording: Recording) -> Iterator[Hypothesis[Case]]:
             rows = np.arange(start + 1, end + 1)
             rest = read.copy()
             rest[rows[:, None], columns] = np.nan
-            which = (
-                "accelerometers and angles"
-                if len(columns) == 6
-                else ", ".join(f"acc_{'xyz'[i]}" for i in columns)
-            )
+            which = ", ".join(f"acc_{'xyz'[i]}" for i in columns if i < 3)
+            which = "accelerometers and angles" if len(columns) == 6 else which
             text = f"{which} repeat{'' if len(columns) > 1 else 's'} one reading in {counted(len(rows) + 1, 'row')}"
             without = replace(recording, acc=rest[:, :3], th=rest[:, 3:])
             left_out, where = len(rows) * len(columns), places("row", rows + 1)
@@ -292,8 +285,7 @@ def single_readings(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]
     rows = np.unique(rows)
     if not len(rows) or (len(rows) > 3 and np.ptp(rows) < 2 * len(rows)):
         return  # a change, not single readings
-    text = (
-        f"{counted(len(rows), 'reading')} far from what the filter expects, of {', '.join(sorted(channels))}"
-    )
+    where = ", ".join(sorted(channels))
+    text = f"{counted(len(rows), 'reading')} far from what the filter expects, of {where}"
     repaired, where = replace(recording, acc=acc, th=th), places("row", rows + 2)
     yield _fault("outlier", text, repaired, 2.0 * len(recording.t), left_out, len(rows), where)

@@ -58,14 +58,9 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     now = filtered(case)
     if not now.converged:
         return
+    step = 1e-3 * EARTH_RATE
     yield Hypothesis(
-        "latitude",
-        "site_suspect",
-        _latitude,
-        _other_earth,
-        ("north", "up"),
-        1e-3 * EARTH_RATE,
-        harm=EVERYTHING,
+        "latitude", "site_suspect", _latitude, _other_earth, ("north", "up"), step, harm=EVERYTHING
     )
     yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
     yield _vector(
@@ -224,14 +219,7 @@ def _harmonic(joint: int, order: int, angle: Array) -> Hypothesis[Case]:
         amplitude, periods = math.degrees(float(np.hypot(*fit.values))) * 3600.0, counted(order, "period")
         return f"{JOINTS[joint]} errs periodically with its angle: {amplitude:.2g} arcsec, {periods} a turn"
 
-    name = f"harmonic {order} of {JOINTS[joint]}"
+    name, many = f"harmonic {order} of {JOINTS[joint]}", LIMITS.harmonic_orders
     return Hypothesis(
-        name,
-        "unmodelled",
-        says,
-        without,
-        ("sin", "cos"),
-        1e-6,
-        alternatives=LIMITS.harmonic_orders,
-        harm=EVERYTHING,
+        name, "unmodelled", says, without, ("sin", "cos"), 1e-6, alternatives=many, harm=EVERYTHING
     )

@@ -10,7 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.rotations import boxminus
 from inercal.report.coefficients import budget, correlation
-from inercal.report.courses import Course, Line, converging, falling, lines_by_group, path
+from inercal.report.courses import Course, Line, converging, falling, lines_by_group
 from inercal.report.html import Picture, render
 from inercal.report.innovations import innovations, nis
 from inercal.selfcal.figures.filters import (
@@ -19,6 +19,7 @@ from inercal.selfcal.figures.filters import (
     bounds_beside,
     filters_apart,
     gimbals_on_base,
+    path_of,
 )
 from inercal.selfcal.filters import residuals
 from inercal.selfcal.filters.filter_result import product_form
@@ -55,27 +56,18 @@ def main(calibration: Calibration) -> Picture:
 def page(calibration: Calibration) -> str:
     """The report of a self-calibration as one self-contained HTML page, with or without other filters."""
     tables = [*compared(calibration), weak_combinations(calibration.bounds)]
-    return render(
-        calibration.estimate.shown(), pictures(calibration), "Self-calibration of a platform", tables
-    )
+    shown = calibration.estimate.shown()
+    return render(shown, pictures(calibration), "Self-calibration of a platform", tables)
 
 
 def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Picture]:
-    """All pictures of a calibration, the main one first.
+    """All pictures of a calibration of any status, the main one first.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        Of any status.
-    attitude : (n, 4), optional
-        True ``q_bp`` at each row, of a simulation; without it the attitude is drawn against the encoders'.
+    ``attitude`` (n, 4) is the true q_bp at each row of a simulation; without it the attitude is drawn against the
+    encoders'.
     """
-    recording, filtered, estimate = (
-        calibration.recording,
-        calibration.filtered,
-        calibration.estimate.shown(),
-    )
-    t, history = recording.t, filtered.history
+    filtered, estimate = calibration.filtered, calibration.estimate.shown()
+    t, history = calibration.recording.t, filtered.history
     drawings = [_bounds(calibration)] if estimate.names else []
     if history is not None and filtered.kind not in _AT_ONCE:
         drawings += convergence(calibration)
@@ -96,14 +88,8 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
 
 def _path(calibration: Calibration) -> Picture:
     """The angles of the gimbals over time."""
-    return path(
-        calibration.recording.t,
-        calibration.recording.th,
-        JOINTS,
-        "The path",
-        "Gimbal angles that the encoders read; the background has the colour of the joint that turns: th_x the "
-        "outer, th_y the inner one, th_z the platform's.",
-    )
+    recording = calibration.recording
+    return path_of(recording.t, recording.th, "The path", "Gimbal angles that the encoders read")
 
 
 def compare_pictures(calibration: Calibration) -> list[Picture]:
@@ -112,12 +98,11 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     if len(filters) < 2:
         return []
     values, u = product_form(calibration.filtered)
+    first = calibration.filtered.kind
     apart: dict[str, Array] = {
-        kind: (product_form(each)[0] - values) / u
-        for kind, each in filters.items()
-        if kind != calibration.filtered.kind
+        kind: (product_form(each)[0] - values) / u for kind, each in filters.items() if kind != first
     }
-    return [filters_apart(names(len(values)), apart, calibration.filtered.kind)]
+    return [filters_apart(names(len(values)), apart, first)]
 
 
 def convergence(calibration: Calibration) -> list[Picture]:

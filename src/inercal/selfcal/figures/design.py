@@ -1,4 +1,4 @@
-"""The page of a search for a path."""
+"""The page of a search for a path, and the facts of a study on any page of simulated self-calibration."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inercal.instruments.terms import shown_unit
 from inercal.report.coefficients import dots
-from inercal.report.courses import path
 from inercal.report.html import Picture
 from inercal.report.html import page as framed
-from inercal.selfcal.figures.facts import facts
+from inercal.report.style import plain_unit
+from inercal.selfcal.figures.filters import path_of
 from inercal.selfcal.platform.coefficients import shown_units
-from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.tables import bounds_by_path, paths, turns, weak_combinations
 
 if TYPE_CHECKING:
@@ -24,20 +24,16 @@ if TYPE_CHECKING:
 def main(designed: Designed) -> Picture:
     """The main picture: the path found."""
     plan = designed.plan
-    return path(
-        plan.step * np.arange(len(plan.angles()), dtype=float),
-        plan.angles(),
-        JOINTS,
-        "The path found",
-        "Gimbal angles; the background has the colour of the joint that turns: th_x the outer, th_y the inner one, "
-        "th_z the platform's.",
-    )
+    angles = plan.angles()
+    t = plan.step * np.arange(len(angles), dtype=float)
+    return path_of(t, angles, "The path found", "Gimbal angles")
 
 
 def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of a search for a path as one self-contained HTML page."""
     bounds, plan = designed.bounds, designed.plan
     units, size = shown_units(len(bounds.names))
+    goal = np.array([settings.goal.get(name, np.nan) for name in bounds.names]) / size
     pictures = [
         main(designed),
         dots(
@@ -47,9 +43,7 @@ def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> s
             bounds.names,
             units,
             {each.name: each.observability.bounds.u / size for each in designed.compare},
-            np.array([settings.goal.get(name, np.nan) for name in bounds.names]) / size
-            if settings.goal
-            else None,
+            goal if settings.goal else None,
         ),
     ]
     return framed(
@@ -61,3 +55,24 @@ def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> s
         pictures=pictures,
         details=[bounds_by_path(designed)],
     )
+
+
+def facts(settings: SelfcalSettings) -> list[tuple[str, str, str]]:
+    """Site, noise and path, as name, unit and text."""
+    noise, site = settings.noise, settings.site
+
+    def row(name: str, value: float, si: str) -> tuple[str, str, str]:
+        unit, size = shown_unit(si)
+        return name, plain_unit(unit), f"{value / size:.3g}"
+
+    rows = [
+        ("gravity", plain_unit("m/s^2"), f"{site.gravity:.7g}"),
+        row("angle random walk", noise.angle_random_walk, "rad/sqrt(s)"),
+        row("noise of an accelerometer's sample", noise.accelerometer, "m/s^2"),
+        row("noise of an encoder's sample", noise.encoder, "rad"),
+    ]
+    if site.latitude is not None:
+        rows.insert(0, ("latitude", "°", f"{np.degrees(site.latitude):.6g}"))
+    if settings.plan is not None:
+        rows.append(("path of the study", "", settings.plan.words()))
+    return rows

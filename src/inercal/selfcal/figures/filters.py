@@ -8,7 +8,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded
-from inercal.report.courses import Line, panels_of_lines
+from inercal.report.courses import Line, panels_of_lines, path
 from inercal.report.html import Picture
 from inercal.report.marks import Axis, Dots, Level, Mark, Panel, Strips
 from inercal.report.panels import draw
@@ -17,6 +17,15 @@ from inercal.report.style import ALARM, COLOURS, QUIET, plain_unit, power_of_ten
 from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals
 
 _MARKS = "osD^vP"
+
+
+def path_of(t: Array, th: Array, title: str, caption: str) -> Picture:
+    """Gimbal angles (n, 3) [rad] over ``t`` (n,) [s], coloured by the joint that turns."""
+    text = (
+        f"{caption}; the background has the colour of the joint that turns: th_x the outer, th_y the inner one, th_z "
+        "the platform's."
+    )
+    return path(t, th, JOINTS, title, text)
 
 
 def gimbals_on_base(base: Base, gimbals: Gimbals) -> Picture:
@@ -37,17 +46,14 @@ def gimbals_on_base(base: Base, gimbals: Gimbals) -> Picture:
 
 
 def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> Picture:
-    """Errors of the four components of the attitude over ``t`` (n,) [s].
-
-    ``truth`` (n, 4) and estimates (n, 4) by the name of the filter; q and -q are one attitude.
-    """
+    """Errors of attitudes (n, 4), by the name of the filter, against the ``truth`` (n, 4) over ``t`` (n,) [s]; q and -q
+    are one attitude."""
     errors = {}
     for label, q in attitudes.items():
         sign = np.where(np.sum(q * truth, axis=1) < 0.0, -1.0, 1.0)
         errors[label] = sign[:, None] * q - truth
-    largest = max(
-        (float(np.nanmax(np.abs(e), initial=0.0, where=np.isfinite(e))) for e in errors.values()), default=0.0
-    )
+    finite = (np.abs(e[np.isfinite(e)]) for e in errors.values())
+    largest = max((float(e.max(initial=0.0)) for e in finite), default=0.0)
     power = 3 * int(np.floor(np.log10(largest) / 3.0)) if 0.0 < largest < 1e100 else 0
     unit = f" [{power_of_ten(10.0**power)}]" if power else ""
     panels = {
@@ -68,20 +74,12 @@ def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> P
 
 
 def attitude_correction(t: Array, correction: Array, u: Array | None) -> Picture:
-    """Estimated attitude against the encoders' over ``t`` (n,) [s].
-
-    ``correction`` (n, 3) [rad] rotation from the encoders' attitude to the estimated one, about the axes of p; ``u``
-    (n, 3) [rad] standard uncertainties of the estimate.
-    """
+    """Rotation (n, 3) [rad] from the encoders' attitude to the estimated one, about the axes of p, over ``t`` (n,) [s],
+    with the standard uncertainties ``u`` (n, 3) [rad] of the estimate."""
     arcsec = np.radians(1.0 / 3600.0)
+    bands = [None] * 3 if u is None else list(2.0 * u.T / arcsec)
     panels = {
-        f"about {axis}_p [″]": [
-            Line(
-                "estimate less encoders",
-                correction[:, k] / arcsec,
-                None if u is None else 2.0 * u[:, k] / arcsec,
-            )
-        ]
+        f"about {axis}_p [″]": [Line("estimate less encoders", correction[:, k] / arcsec, bands[k])]
         for k, axis in enumerate("XYZ")
     }
     band = " Band: ± two standard uncertainties of the estimate." if u is not None else ""
@@ -97,10 +95,7 @@ def attitude_correction(t: Array, correction: Array, u: Array | None) -> Picture
 def bounds_beside(
     names: Sequence[str], units: Sequence[str], u: Array, bound: Array, prior: Array, goal: Array
 ) -> Picture:
-    """Standard uncertainties (p,) beside bounds and goals (p,), over the priors (p,); all in ``units``.
-
-    NaN, as of a goal that is not stated, has no mark.
-    """
+    """Standard uncertainties beside bounds and goals, over the priors (p,); all in ``units``; NaN unmarked."""
     rows = np.arange(len(names))
     marks: list[Mark] = [Strips((0.5, 1.0), ALARM, 0.08), Level(1.0, "", QUIET, 0.9, upright=True)]
     for label, own, mark, colour, size in (

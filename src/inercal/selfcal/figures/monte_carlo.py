@@ -15,7 +15,7 @@ from inercal.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel, Str
 from inercal.report.panels import draw
 from inercal.report.style import ALARM, COLOURS, INK, QUIET
 from inercal.selfcal.estimators import ESTIMATORS
-from inercal.selfcal.figures.facts import facts
+from inercal.selfcal.figures.design import facts
 from inercal.selfcal.result.tables import campaign_table
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ Unknowns are the attitude at every row and the coefficients (linear form). Each 
     each step: log(propagated^-1 next), of covariance ARW^2 dt I,
     each row: accelerometers, and log(q^-1 q_encoders) of covariance sigma^2 (J J^T + 0.05^2 I).
 
-Attitudes are tied to their neighbours alone, so that their part of the normal matrix has a band of five beside its
-diagonal; with them eliminated, the Schur complement is left for the coefficients. Its inverse is their covariance, the
-Cramer-Rao bound along the path found (Triggs et al. 2000, "Bundle adjustment - a modern synthesis", section 6).
+Attitudes are tied to their neighbours alone: their part of the normal matrix has a band of five beside its diagonal.
+The Schur complement without them is left for the coefficients, and its inverse is their covariance, the Cramer-Rao
+bound along the path found (Triggs et al. 2000, "Bundle adjustment - a modern synthesis", section 6).
 """
 
 from __future__ import annotations
@@ -86,9 +86,7 @@ def estimate_map(
     covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
     for _ in range(ITERATIONS):
         try:
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # what is lost is not finite, and refused below
+            with np.errstate(over="ignore", invalid="ignore"):  # lost numbers are refused below
                 terms = _terms(q, c, recording, problem, measured, first, loose)
                 step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
@@ -125,12 +123,9 @@ def _first_guess(
 
 
 class _Terms(NamedTuple):
-    """Whitened residuals and derivatives of the model, per change of coefficients over their prior.
-
-    ``first`` (3,) of the first attitude, ``by_first`` (3, 3); ``sensed`` of the measurements; ``process`` (n - 1, 3)
-    of the steps, by the attitude before (``by_last``) and after (``by_next``, both (n - 1, 3, 3)) and by the
-    coefficients (n - 1, 3, p); ``prior`` (p,) of the coefficients.
-    """
+    """Whitened residuals and derivatives of the model, per change of coefficients over their prior: of the ``first``
+    attitude (3,), of what is ``sensed``, of the steps (``process`` (n - 1, 3), by the attitude before and after and by
+    the coefficients), of the ``prior`` (p,)."""
 
     first: Array
     by_first: Array

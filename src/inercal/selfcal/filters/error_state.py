@@ -1,10 +1,8 @@
 """Estimator 4, the product's default: an error-state filter with analytic Jacobians.
 
 The attitude is a quaternion, its error a rotation vector in p (`inercal.selfcal.platform.linearised`); each step is
-exact for a rate held over it. The encoders come first, three decorrelated scalars: whatever the error of the
-prediction, their residual is linear in it. The accelerometers follow, linearised at what the encoders made of it, so
-that a prediction that is far off, as after a wrong start, does no harm. Innovations of accelerometers are those that
-are left once the encoders of the row are known.
+exact for a rate held over it. The encoders come first, three decorrelated scalars, their residual linear in any error
+of the prediction. The accelerometers follow, linearised at what the encoders made of it: a wrong start does no harm.
 """
 
 from __future__ import annotations
@@ -49,11 +47,8 @@ def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> St
 
 
 def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
-    """Take the filter through m steps.
-
-    The arrays of ``state`` become those of the new one. Without ``history`` the trace holds no more than the normalised
-    innovations squared.
-    """
+    """Take the filter through m steps; the arrays of ``state`` become those of the new one. Without ``history`` the
+    trace holds no more than the normalised innovations squared."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
     return state, Trace(out, gimbal_cosine=_advance(state, problem.model, steps, out))
 

@@ -35,10 +35,8 @@ class State(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Estimates after each of m steps, a row for each: as in `History` and `FilterResult`.
-
-    Without a history all arrays but ``nis`` and ``dims`` have no rows.
-    """
+    """Estimates after each of m steps, as in `History` and `FilterResult`; without a history no rows but of ``nis`` and
+    ``dims``."""
 
     attitude: Array
     attitude_u: Array
@@ -77,10 +75,8 @@ def remember(out: Estimates, k: int, q: Quaternion, c: Array, P: Array) -> None:
 
 
 class Trace(NamedTuple):
-    """Estimates of a recursive filter after each of m steps, and its health over all of them, as in `FilterResult`.
-
-    ``restarts`` are the steps after which the attitude was taken anew (`inercal.selfcal.filters.gaps`).
-    """
+    """Estimates of a recursive filter after each of m steps, and its health over all of them, as in `FilterResult`;
+    ``restarts`` are steps here."""
 
     estimates: Estimates
     lowest_eigenvalue: float = math.nan
@@ -129,37 +125,16 @@ def attitude_of(state: State, problem: FilterProblem) -> Array:
 class FilterResult:
     """Result of an estimator.
 
-    Attributes
-    ----------
-    kind : str
-    coefficients : (p,)
-        Linear form, at the end; ``covariance`` (p, p).
-    attitude : (4,)
-        q_bp at the last row.
-    nis : (n - 1,)
-        Normalised innovation squared of each row but the first, NaN where nothing was measured; ``dims`` (n - 1,)
-        how many scalars it is of. Of ``map`` and ``lm``, squared normalised residuals.
-    innovations : (n - 1, 6)
-        Of accelerometers (3) and of the attitude about the axes of p (3; gimbal angles for the gimbal-ukf), each over
-        its own standard deviation; NaN where not measured. (0, 6) where no history was asked for.
-    history : History or None
-    seconds : float
-        Time of the computation alone, kernels loaded.
-    converged : bool
-        False where the numbers must not be used: not finite, a covariance that lost its sign, an iteration that
-        did not end, a singularity of the gimbal angles; ``message`` says why.
-    lowest_eigenvalue : float
-        Lowest eigenvalue of the correlation matrix that was to be factored, over all steps; NaN where none was
-        computed. Below -1e-9 the filter is not converged.
-    fallbacks : int
-        Steps at which Cholesky's factor failed and the eigen factor was taken.
-    gimbal_cosine : float
-        Least |cos thy| on the path.
-    restarts : tuple of int
-        Rows at which the attitude was taken anew from the encoders, as these contradict a turn that was held
-        (`inercal.selfcal.filters.gaps`).
-    state : State or None
-        Of a recursive filter, at the end, with the joint covariance of attitude and coefficients.
+    ``coefficients`` (p,), linear form, and their ``covariance`` (p, p); ``attitude`` (4,) q_bp at the last row. ``nis``
+    (n - 1,) normalised innovation squared of each row but the first, NaN where nothing was measured, of ``dims``
+    (n - 1,) scalars; of ``map`` and ``lm`` squared normalised residuals. ``innovations`` (n - 1, 6) of accelerometers
+    and of the attitude about the axes of p (gimbal angles for the gimbal-ukf), each over its standard deviation, NaN
+    where not measured; no rows without a history. ``seconds`` of the computation alone, kernels loaded.
+
+    Not ``converged`` where the numbers must not be used, and the ``message`` says why. ``lowest_eigenvalue`` of the
+    correlation matrix that was factored, over all steps, NaN where none was; ``fallbacks`` steps at which Cholesky's
+    factor failed and the eigen factor was taken. ``gimbal_cosine`` least |cos thy| on the path; ``restarts`` rows at
+    which the attitude was taken anew (`inercal.selfcal.filters.gaps`); ``state`` of a recursive filter at the end.
     """
 
     kind: FilterKind

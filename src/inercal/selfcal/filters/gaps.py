@@ -1,13 +1,11 @@
 """Steps of which no rate was recorded: gaps between rows, and rows whose rate is no number.
 
-The platform is taken to turn on as before. Against the base it does so at a constant rate; earth rate, which it is
-commanded to follow besides, turns in p meanwhile. Holding the rate against inertial space instead is wrong by earth
-rate times half of the angle turned, 2 seconds of arc after 4 s at 1 deg/s.
+The platform is taken to turn on as before, over the base: earth rate, which it is commanded to follow besides, turns in
+p meanwhile, by 2 seconds of arc after 4 s at 1 deg/s.
 
 That is a guess. So nothing measured after such a step counts before the encoders read again, and where these contradict
-it, as where a turn began or ended meanwhile, the attitude is theirs from then on and owes nothing to the past:
-coefficients and their covariance stay, correlations with the attitude are dropped. Measured rates are dealt with in
-the same way: a servo that did not hold its rate through a gap is found out like a turn that ended.
+it, as where a turn began or ended meanwhile, the attitude is theirs from then on: coefficients and their covariance
+stay, correlations with the attitude are dropped. Measured rates are dealt with in the same way.
 """
 
 from __future__ import annotations
@@ -103,11 +101,8 @@ def advance(
     held: Sequence[int],
     history: bool = True,
 ) -> tuple[State, Trace]:
-    """Take a recursive filter through m steps, of which those ``held`` are guesses.
-
-    Other arguments as of `inercal.selfcal.filters.error_state.advance`. ``restarts`` of the trace are the steps after
-    which the attitude was taken anew.
-    """
+    """Take a recursive filter through m steps, of which those ``held`` are guesses; other arguments as of
+    `inercal.selfcal.filters.error_state.advance`."""
     if not held:
         state, trace = module.advance(state, problem, steps, history)
         return state, trace
@@ -177,11 +172,8 @@ def _contradicted(state: State, problem: FilterProblem, th: Array) -> bool:
 
 
 def anew(problem: FilterProblem, th: Array) -> Start:
-    """The attitude that encoders (3,) [rad] read, with the most that they leave uncertain about any axis.
-
-    Outer and platform axis are at an angle of 90 deg less the inner one, so that ``J J^T`` has no larger eigenvalue
-    than ``1 + |sin thy|``.
-    """
+    """The attitude that encoders (3,) [rad] read, with the most that they leave uncertain about any axis:
+    ``1 + |sin thy|`` is the largest eigenvalue of ``J J^T``."""
     q = np.array(attitude(th, problem.world.axes, problem.world.signs))
     return Start(q, problem.noise.encoder * math.sqrt(1.0 + abs(math.sin(th[1]))))
 

@@ -115,10 +115,8 @@ def _further(d: Vector, h: float, r: Vector) -> Vector:
 
 @kernel
 def step(at: Cosines, d: Vector, w: Vector, earth: Vector, dt: float, euler: bool) -> Vector:
-    """Angles after ``dt`` [s] against those of ``at``, which they differ from by ``d`` (3,) [rad] before.
-
-    ``w`` and ``earth`` as of `rates`, held.
-    """
+    """Angles after ``dt`` [s] against those of ``at``, from which they differ by ``d`` (3,) [rad] before; ``w`` and
+    ``earth`` as of `rates`, held."""
     r1 = rates(near(at, d), w, earth)
     if euler:
         return _further(d, dt, r1)
@@ -153,10 +151,8 @@ class GimbalStep(NamedTuple):
 def _predict(
     th: Array, c: Array, turn: GimbalStep, world: World, columns: Array, shifted: Array, z: Array
 ) -> None:
-    """Put into ``z`` (2 n + 1, 3) the angles of all points after a step, against ``th``.
-
-    ``columns`` (n, n) of the points before the step; ``shifted`` (p,) used up.
-    """
+    """Put into ``z`` (2 n + 1, 3) the angles of all points after a step, against ``th``; ``columns`` (n, n) are those
+    of the points before; ``shifted`` (p,) is used up."""
     axes, signs = world.axes, world.signs
     n, e = len(columns), parity(axes)
     at, earth_k = cosines(hat(th, e, signs)), along(world.earth, axes, e)
@@ -187,10 +183,8 @@ def _add_walk(P: Array, thy: float, variance: float, world: World) -> None:
 
 @kernel
 def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: Array, z: Array) -> None:
-    """Put into ``z`` (2 n + 1, 6) readings of accelerometers [m/s^2] and encoders [rad, against ``th``] at all points.
-
-    ``columns`` (n, n) of the points; ``shifted`` (p,) and ``f`` (3,) used up.
-    """
+    """Put into ``z`` (2 n + 1, 6) readings of accelerometers [m/s^2] and encoders [rad, against ``th``] at all points
+    of ``columns`` (n, n); ``shifted`` (p,) and ``f`` (3,) are used up."""
     axes, signs = world.axes, world.signs
     n, e = len(columns), parity(axes)
     at, up_k = cosines(hat(th, e, signs)), along(world.up, axes, 1.0)

@@ -44,10 +44,7 @@ WIDE = 3.0
 
 
 def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
-    """Take the filter through m steps, as `inercal.selfcal.filters.error_state.advance` does.
-
-    Innovations of the accelerometers are those that are left once the encoders are known.
-    """
+    """Take the filter through m steps, as `inercal.selfcal.filters.error_state.advance` does."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
     factor = FACTORS[problem.filter.factor or FACTOR_OF["mukf"]]
     health = _advance(state, problem.model, factor, steps, out)
@@ -71,10 +68,8 @@ def _deviation(q: Quaternion, before: Vector, turn: Vector) -> Vector:
 def _predict(
     q: Quaternion, c: Array, w: Vector, dt: float, world: World, columns: Array, shifted: Array, z: Array
 ) -> Quaternion:
-    """Attitude after a step of ``dt`` [s], from which ``z`` (2 n + 1, 3) receives the deviations of all points.
-
-    ``columns`` (n, n) of the points before the step; ``shifted`` (p,) used up.
-    """
+    """Attitude after a step of ``dt`` [s], from which ``z`` (2 n + 1, 3) receives the deviations of all points;
+    ``columns`` (n, n) are those of the points before, ``shifted`` (p,) is used up."""
     n = len(columns)
     rate = platform_rate(w, c)
     turn = (rate[0] * dt, rate[1] * dt, rate[2] * dt)

@@ -117,10 +117,8 @@ def problem(settings: SelfcalSettings) -> FilterProblem:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A start of an estimator other than the first encoder reading.
-
-    ``attitude`` (4,) q_bp at the first row, and its standard deviation ``sigma`` [rad] about each axis.
-    """
+    """A start other than the first encoder reading: ``attitude`` (4,) q_bp at the first row, and its standard deviation
+    ``sigma`` [rad] about each axis."""
 
     attitude: Array
     sigma: float

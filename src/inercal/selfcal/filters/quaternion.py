@@ -130,11 +130,8 @@ class PointReadings(NamedTuple):
 def _propagate(
     q: Quaternion, c: Array, columns: Array, turn: QuaternionStep, world: World, ck: Array, out: PointReadings
 ) -> None:
-    """Take all points through a step and read the accelerometers there.
-
-    ``q`` (4,) and ``c`` (p,) are the mean before; ``columns`` (n, n) the deviations of the points, row by row,
-    n = 4 + p; ``ck`` (p,) is used up.
-    """
+    """Take all points through a step and read the accelerometers there: ``q`` (4,) and ``c`` (p,) the mean before,
+    ``columns`` (n, n) the deviations of the points, row by row, n = 4 + p; ``ck`` (p,) is used up."""
     n, p = len(columns), len(c)
     w, dt, walk = turn
     centre, z, odd = out

@@ -37,17 +37,11 @@ from inercal.selfcal.platform.rig import World
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """Measurements of m rows, of which those missing or stopped by the near-level gate weigh nothing.
+    """Measurements of m rows; those missing or stopped by the near-level gate weigh nothing.
 
-    Attributes
-    ----------
-    acc : (m, 3) m/s^2, 0 where missing
-    acc_weight : (m, 3) s^2/m, reciprocal standard deviations
-    attitude : (m, 4) q_bp at the encoders' angles
-    root : (m, 3, 3) rad
-        Cholesky factor of the covariance ``sigma^2 (J J^T + 0.05^2 I)`` of that attitude about the axes of p.
-    whitening : (m, 3, 3) 1/rad, its inverse
-    used : (m, 6) bool, accelerometers and encoders
+    ``acc`` (m, 3) [m/s^2], 0 where missing, with reciprocal standard deviations ``acc_weight``; ``attitude`` (m, 4)
+    q_bp at the encoders' angles, with the Cholesky factor ``root`` (m, 3, 3) [rad] of its covariance about the axes of
+    p, ``sigma^2 (J J^T + 0.05^2 I)``, and ``whitening`` its inverse; ``used`` (m, 6) accelerometers and encoders.
     """
 
     acc: Array
@@ -215,10 +209,8 @@ def sensed(q: Array, c: Array, measured: Measurements, world: World) -> Sensed:
 
 
 def turns(rate: Array, dt: Array, c: Array) -> tuple[Array, Array]:
-    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step, at commanded ``rate`` (m, 3).
-
-    With them the rotations (m, 3, p), about the axes of p after the step, per change of each coefficient.
-    """
+    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step, at commanded ``rate`` (m, 3),
+    and the rotations (m, 3, p), about the axes of p after the step, per change of each coefficient."""
     x, y, z = rate.T
     slope = np.zeros((len(rate), 3, len(c)))
     slope[:, :, KG0] = np.eye(3)

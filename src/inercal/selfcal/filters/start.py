@@ -1,12 +1,11 @@
 """Estimator 5, to start with: attitude at the first row and coefficients, by Levenberg-Marquardt.
 
-The path follows from them alone (gyro noise left out), so that the fit has 3 + p unknowns. By itself it can end in a
-wrong minimum of the heading if started 100 degrees off. Hence the first guess turns all specific forces back to the
-first row by the commanded rates and solves Wahba's problem, in closed form and whatever the start. The heading comes
-from earth rate, which turns the vertical against inertial space by 15 degrees an hour.
+The path follows from them alone (gyro noise left out). The first guess turns all specific forces back to the first row
+by the commanded rates and solves Wahba's problem, in closed form and whatever the start: a fit started 100 degrees off
+can end in a wrong minimum of the heading, which comes from earth rate alone.
 
-The covariance of the estimates includes gyro noise: with G the gain of the fit, R the noise of the
-measurements, H their derivative by attitude and W = ARW^2 min(t_i, t_j) the covariance of the accumulated wander,
+The covariance includes gyro noise: with G the gain of the fit, R the noise of the measurements, H their derivative by
+attitude and W = ARW^2 min(t_i, t_j) the covariance of the accumulated wander,
 
     cov = G R G^T + G H W H^T G^T  (and the prior's share).
 
@@ -23,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.nonlinear import NonlinearFit, solve
+from inercal.estimate.least_squares import NonlinearFit, solve
 from inercal.geometry.rotations import (
     boxminus,
     boxplus,
@@ -138,12 +137,9 @@ def wahba(recording: Recording, problem: FilterProblem, measured: Measurements, 
 
 
 class _Along(NamedTuple):
-    """A path without gyro noise: attitudes ``q`` (n, 4), coefficients ``c`` (p,) and residuals ``sensed`` at all rows
-    but the first.
-
-    ``inertial`` (n, 4) attitudes against an inertial frame that is b at the first row; ``slope`` (n, 3, 3 + p)
-    rotations, about the axes of p, per unit of the unknowns.
-    """
+    """A path without gyro noise: attitudes ``q`` (n, 4), coefficients ``c`` (p,), residuals ``sensed`` at all rows but
+    the first; ``inertial`` (n, 4) attitudes against the frame that b is at the first row; ``slope`` (n, 3, 3 + p)
+    rotations, about the axes of p, per unit of the unknowns."""
 
     q: Array
     c: Array
@@ -214,8 +210,7 @@ def _fit(
 def _uncertainty(fit: NonlinearFit, at: _Along, recording: Recording, arw: float) -> tuple[Array, Array]:
     """Covariance (3 + p, 3 + p) of the unknowns of `_fit`, standard deviations (n, 3) [rad] of attitudes.
 
-    Wander is a sum of steps, isotropic in the inertial frame: each moves the estimates by what it does to all rows
-    after it, and the attitudes besides.
+    Each step of the wander, isotropic in the inertial frame, moves all rows after it, and the estimates by these.
     """
     root = arw * np.sqrt(recording.dt)
     C, m, p = to_matrix(at.inertial), len(root), len(at.c)

@@ -104,14 +104,10 @@ def joint_axes(th: Vector | Array, axes: Axes, signs: Array) -> tuple[Vector, Ve
 
 @kernel
 def commanded_rates(th: Array, dt: float, earth: Array, axes: Axes, signs: Array, out: Array) -> None:
-    """Rate of the platform against inertial space that takes it from row to row.
+    """Rates ``out`` (n - 1, 3) [rad/s] of the platform against inertial space, in p, that take it from row to row.
 
-    Parameters
-    ----------
-    th : (n, 3) rad, gimbal angles at the rows
-    dt : s, between rows
-    earth : (3,) rad/s, in b
-    out : (n - 1, 3) rad/s, in p; J and attitude are those of the middle of each step
+    ``th`` (n, 3) [rad] at the rows, ``dt`` [s] between them, ``earth`` (3,) [rad/s] in b; J and attitude are those of
+    the middle of each step.
     """
     for k in range(len(out)):
         middle = (

@@ -38,10 +38,8 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @kernel
 def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Vectors:
-    """Changes of a vector of the base, in p at attitude ``q``, per change of each component of beta.
-
-    ``v`` (3,) is the vector in the frame of the encoders, turned by beta already.
-    """
+    """Changes of a vector of the base, in p at attitude ``q``, per change of each component of beta; ``v`` (3,) is the
+    vector in the frame of the encoders, turned by beta already."""
     j = right_jacobian((-c[21], -c[22], -c[23]))
     back = (q[0], -q[1], -q[2], -q[3])
     return (
@@ -64,11 +62,8 @@ class Step(NamedTuple):
 
 @kernel
 def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Array) -> None:
-    """Covariance ``P`` (3 + p, 3 + p) of the error state after a step, in place.
-
-    ``c`` (p,) coefficients; ``noise`` [rad^2] the variance of the attitude gained in the step; ``top`` (6, 3 + p) is
-    used up.
-    """
+    """Covariance ``P`` (3 + p, 3 + p) of the error state after a step, in place; ``c`` (p,) coefficients, ``noise``
+    [rad^2] the variance of the attitude gained in the step; ``top`` (6, 3 + p) is used up."""
     n, w, rate, dt = len(P), step.commanded, step.rate, step.dt
     j = right_jacobian((rate[0] * dt, rate[1] * dt, rate[2] * dt))
     back = exp((-rate[0] * dt, -rate[1] * dt, -rate[2] * dt))

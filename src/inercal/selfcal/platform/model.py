@@ -69,18 +69,10 @@ class Truth(NamedTuple):
 
 @kernel
 def simulate_truth(q0: Array, w: Array, dt: float, noise: Array, c: Array, world: World, out: Truth) -> None:
-    """True attitudes and accelerometer outputs, integrated at a finer step.
+    """True attitudes and accelerometer outputs, integrated at finer steps of ``dt`` [s], m between rows.
 
-    Parameters
-    ----------
-    q0 : (4,) attitude at the first row
-    w : (n - 1, m, 3) rad/s, commanded in each of the m finer steps between rows
-    dt : s, of the finer steps
-    noise : (n - 1, m, 3) rad/s, of the gyros in each
-    c : (p,) coefficients, linear form
-    world : World
-    out : Truth
-        Receives both.
+    ``q0`` (4,) attitude at the first row; ``w`` (n - 1, m, 3) [rad/s] as commanded and ``noise`` (n - 1, m, 3) [rad/s]
+    of the gyros in each finer step; ``c`` (p,) coefficients, linear form.
     """
     q, acc = out
     at = (q0[0], q0[1], q0[2], q0[3])

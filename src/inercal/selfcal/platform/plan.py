@@ -18,10 +18,8 @@ JointName = Literal["x", "y", "z"]
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn of one joint (``x`` outer, ``y`` inner, ``z`` platform) by ``angle`` [rad] at ``rate`` [rad/s].
-
-    ``rate`` None: that of the plan.
-    """
+    """A turn of one joint (``x`` outer, ``y`` inner, ``z`` platform) by ``angle`` [rad] at ``rate`` [rad/s], None for
+    that of the plan."""
 
     joint: JointName
     angle: float
@@ -85,22 +83,18 @@ class Plan:
 
     def words(self) -> str:
         """The moves in words: ``(z +180 deg), (rest 60 s)``."""
-        return ", ".join(_words(move) for move in self.moves)
-
-
-def _words(move: Move) -> str:
-    """One move."""
-    if isinstance(move, Rest):
-        return f"(rest {move.duration:g} s)"
-    return f"({move.joint} {math.degrees(move.angle):+g} deg)"
+        return ", ".join(
+            f"(rest {move.duration:g} s)"
+            if isinstance(move, Rest)
+            else f"({move.joint} {math.degrees(move.angle):+g} deg)"
+            for move in self.moves
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class CommandedMotion:
-    """Motion that a plan commands: ``t`` (n,) [s], nominal ``angles`` (n, 3) [rad], ``rate`` (n - 1, 3) [rad/s].
-
-    ``rate`` is that of the platform against inertial space, in p, held from each row to the next.
-    """
+    """Motion that a plan commands: ``t`` (n,) [s], nominal ``angles`` (n, 3) [rad], and the ``rate`` (n - 1, 3) [rad/s]
+    of the platform against inertial space, in p, held from each row to the next."""
 
     t: Array
     angles: Array

@@ -31,24 +31,10 @@ class Steps(NamedTuple):
 class Recording:
     """A recording of a platform; NaN where a number is missing.
 
-    Attributes
-    ----------
-    t : (n,) s, increasing
-    rate : (n - 1, 3) rad/s
-        Of the platform against inertial space, in p, held from each row to the next: commanded, or ``measured`` by
-        gyros in their place.
-    th : (n, 3) rad
-        Gimbal angles at each row, continuous through full turns; the first row is complete.
-    acc : (n, 3) m/s^2
-        Accelerometers at each row; the first row is not used.
-    measured : bool
-    findings, sources
-        Of the record.
-    held : tuple of int
-        Steps whose rate was not recorded, and is that of a platform that turns on as before
-        (`inercal.selfcal.filters.gaps`).
-    temperature : Quantity or None
-        Mean and standard deviation of the recorded one.
+    ``t`` (n,) [s], increasing; ``rate`` (n - 1, 3) [rad/s] of the platform against inertial space, in p, held from each
+    row to the next: commanded, or ``measured`` by gyros. ``th`` (n, 3) [rad] gimbal angles, continuous through full
+    turns, the first row complete; ``acc`` (n, 3) [m/s^2], the first row not used. ``held``: steps whose rate was not
+    recorded (`inercal.selfcal.filters.gaps`). ``temperature``: mean and standard deviation of the recorded one.
     """
 
     t: Array

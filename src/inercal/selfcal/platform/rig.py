@@ -40,10 +40,8 @@ _AXES: Mapping[str, Array] = {
 
 @dataclass(frozen=True, eq=False)
 class Gimbals:
-    """The joints, outer first: ``axes`` of p along which they lie at zero angles, and their ``signs``.
-
-    A sign of -1 says that the angle counts left-handed about the axis.
-    """
+    """The joints, outer first: ``axes`` of p along which they lie at zero angles, and their ``signs``, -1 where the
+    angle counts left-handed."""
 
     axes: tuple[Axis, Axis, Axis] = ("z", "x", "y")
     signs: tuple[int, int, int] = (1, 1, 1)
@@ -70,19 +68,10 @@ class Gimbals:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """Attitude of frame b on the earth.
+    """Attitude of frame b on the earth: axes of b lie along those of ``frame`` at zero heading and tilt.
 
-    Attributes
-    ----------
-    frame : str
-        Axes of n, along which those of b lie at zero heading and tilt: ``nue``, ``enu`` or ``ned``.
-    heading : float
-        From north to east [rad]: the base turned clockwise as seen from above.
-    tilt : (float, float)
-        Then, about north and about east, right-handed [rad].
-    heading_u : float
-    tilt_u : (float, float)
-        Standard uncertainties [rad].
+    ``heading`` [rad] turns the base clockwise as seen from above, from north to east; ``tilt`` [rad] then about north
+    and about east, right-handed; both with standard uncertainties ``heading_u`` and ``tilt_u`` [rad].
     """
 
     frame: Frame = "nue"
@@ -112,11 +101,8 @@ class Base:
 
 
 class World(NamedTuple):
-    """Earth and gimbals of the platform, as kernels take them.
-
-    ``earth`` (3,) [rad/s] earth rate and ``up`` (3,) [m/s^2] the specific force at rest, both in b; ``axes`` (3,)
-    and ``signs`` (3,) of the gimbals.
-    """
+    """Earth rate (3,) [rad/s] and specific force at rest ``up`` (3,) [m/s^2], both in b, and ``axes`` (3,) and
+    ``signs`` (3,) of the gimbals, as kernels take them."""
 
     earth: Array
     up: Array

@@ -19,6 +19,7 @@ from inercal.selfcal.platform.coefficients import names, to_product
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.result.systematic import systematic_inputs
 from inercal.selfcal.settings import Noise, SelfcalSettings
+from inercal.units import parse_unit
 
 
 def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
@@ -30,18 +31,16 @@ def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> l
     roots = [np.linalg.cholesky(P / np.outer(prior, prior)) for P in (covariance, bounds.covariance)]
     to_filter = prior[:, None] * np.linalg.solve(roots[1].T, roots[0].T).T / prior
     levels = {
-        "angle random walk": (noise.angle_random_walk, "rad/sqrt(s)"),
-        "accelerometer": (noise.accelerometer, "m/s^2"),
-        "encoder": (noise.encoder, "rad"),
+        "angle random walk": ("angle random walk", noise.angle_random_walk, "rad/sqrt(s)"),
+        "accelerometer": ("accelerometer noise", noise.accelerometer, "m/s^2"),
+        "encoder": ("encoder noise", noise.encoder, "rad"),
     }
     sources: list[TypeA | TypeB] = []
     for source, part in bounds.contributions.items():
         P = to_filter @ part @ to_filter.T
         P = 0.5 * (P + P.T)  # where hardly anything is known, rounding is not the same on both sides
         if source in levels:
-            sources.append(
-                TypeA(f"{source} noise" if source != "angle random walk" else source, *levels[source], P, dof)
-            )
+            sources.append(TypeA(*levels[source], P, dof))
         else:
             # u in units of the prior standard deviations
             values, vectors = np.linalg.eigh(P / np.outer(prior, prior))
@@ -53,48 +52,28 @@ def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> l
 def systematic(
     recording: Recording, settings: SelfcalSettings, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
-    """Systematic inputs of site and base.
-
-    Parameters
-    ----------
-    recording : Recording
-    settings : SelfcalSettings
-    u : (p,)
-        Standard uncertainties of the coefficients by noise and prior.
-
-    Returns
-    -------
-    sources : list of `TypeB`
-        Inputs stated with an uncertainty.
-    exact : mapping
-        Input stated without one -> the error of it, in words, that does as much as one u of a coefficient.
-    """
+    """Inputs of site and base stated with an uncertainty; and for each that is stated without one the error of it, in
+    words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
     sources, exact = list[TypeB](), dict[str, str]()
-    for statement in systematic_inputs(settings):
-        by = statement.u or statement.step
+    for each in systematic_inputs(settings):
+        by = each.u or each.step
         ends = [
-            to_product(
-                estimate(
-                    recording, problem(statement.changed(each)), "error-state", history=False
-                ).coefficients
-            )
-            for each in (-by, by)
+            estimate(recording, problem(each.changed(change)), "error-state", history=False).coefficients
+            for change in (-by, by)
         ]
-        slope = (ends[1] - ends[0]) / (2.0 * by)
+        slope = (to_product(ends[1]) - to_product(ends[0])) / (2.0 * by)
         worst = int(np.argmax(np.abs(slope) / u))
-        if statement.name == "gravity" and statement.u:
+        if each.name == "gravity" and each.u:
             sources += [
-                TypeB(each.source, each.u, each.unit, each.sensitivity * slope)
-                for each in settings.site.inputs
-                if each.source != "latitude"
+                TypeB(part.source, part.u, part.unit, part.sensitivity * slope)
+                for part in settings.site.inputs
+                if part.source != "latitude"
             ]
-        elif statement.u:
-            sources.append(TypeB(statement.name, statement.u, "rad", slope))
+        elif each.u:
+            sources.append(TypeB(each.name, each.u, "rad", slope))
         elif not np.isfinite(slope).all():
-            exact[statement.name] = f"an unknown error of {statement.name}, as the filter does not follow it"
+            exact[each.name] = f"an unknown error of {each.name}, as the filter does not follow it"
         elif slope[worst] != 0.0:
-            error = u[worst] / abs(slope[worst]) / statement.size
-            exact[statement.name] = (
-                f"{error:.2g} {statement.unit} of {statement.name} ({names(len(u))[worst]})"
-            )
+            error = u[worst] / abs(slope[worst]) / parse_unit(each.unit).factor
+            exact[each.name] = f"{error:.2g} {each.unit} of {each.name} ({names(len(u))[worst]})"
     return sources, exact

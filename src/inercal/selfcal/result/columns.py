@@ -18,8 +18,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.inputs import Source
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import divisor, names, units
 from inercal.selfcal.platform.kinematics import all_angles
@@ -61,13 +60,7 @@ def rows(
 
 
 def history_record(filtered: FilterResult, recording: Recording, world: World) -> Record:
-    """The columns as a record with the time stamps of the recording.
-
-    Raises
-    ------
-    ValueError
-        The estimator kept no history.
-    """
+    """The columns as a record with the time stamps of the recording; raises ValueError where no history was kept."""
     history = filtered.history
     if history is None:
         raise ValueError("found no history, expected an estimate with one")

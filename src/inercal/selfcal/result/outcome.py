@@ -26,7 +26,7 @@ from inercal.selfcal.estimators import ESTIMATORS, FACTOR_OF
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import NAMES, names, product_slope, to_product, units
+from inercal.selfcal.platform.coefficients import EXTENDED, NAMES, names, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.result.budget import systematic, within
@@ -67,18 +67,8 @@ def assemble(
     bounds: PathBounds,
     findings: Sequence[Finding] = (),
 ) -> Estimate:
-    """Put the estimate together.
-
-    Parameters
-    ----------
-    recording : Recording
-    settings : SelfcalSettings
-    filtered : FilterResult
-    bounds : PathBounds
-        Along the path as it was estimated, with ``contributions``.
-    findings : sequence of Finding
-        Of the diagnosis, beside those of the recording.
-    """
+    """Put the estimate together; ``bounds`` along the path as it was estimated, with ``contributions``; ``findings`` of
+    the diagnosis, beside those of the recording."""
     p = len(filtered.coefficients)
     basis = studied(
         COMMAND,
@@ -111,42 +101,48 @@ def assemble(
         return Estimate.without(basis, *unusable, findings=all_findings, result=result)
 
     result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
-    used = _scalars(filtered)
-    dof = float(used - p - 3)
+    measured = np.isfinite(filtered.innovations)
+    dof = float((measured.sum() if len(measured) else filtered.dims.sum()) - p - 3)
     of_site, exact = systematic(recording, settings, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
     uncertainty = combine(names(p), sources)
-    covariance, budget = uncertainty.covariance, uncertainty.budget
     if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
         return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
-    if (unusable := singular(bounds.prior, covariance)) is not None:
+    if (unusable := singular(bounds.prior, uncertainty.covariance)) is not None:
         return Estimate.without(basis, *unusable, findings=all_findings, result=result)
     # all noises are judged by one set of innovations; their parts add up to them but for rounding
-    more = np.square(np.diag(covariance) / np.diag(by_filter))
+    more = np.square(np.diag(uncertainty.covariance) / np.diag(by_filter))
     effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
-    u = uncertainty.u
+    u, goal = uncertainty.u, settings.goal
 
     judged = observability(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
-    hidden = _hidden(judged, u / bounds.prior, budget)
+    hidden = _hidden(judged, u / bounds.prior, uncertainty.budget)
     result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
-    result["goal"] = _goal(settings.goal, names(p), u)
+    result["goal"] = {
+        name: {"wanted": goal[name], "u": float(each), "met": bool(each <= goal[name])}
+        for name, each in zip(names(p), u, strict=True)
+        if name in goal
+    }
     hints = _hardly_turned(recording, settings)
     all_findings += _left_at_prior(judged, hints)
     limit = _limit(agreement, recording, settings)
     status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
     # numbers that must not be used need no more findings
     if status is not Status.INCONSISTENT:
-        all_findings += _missed(result["goal"], units(p), hints)
+        all_findings += _missed(result["goal"], hints)
         all_findings += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
-        all_findings += _taken_as_exact(exact)
+        if exact:
+            text = (
+                f"{', '.join(exact)} taken as exact: an error as large as one u of a coefficient comes from "
+                f"{', '.join(exact.values())}; state them with uncertainties"
+            )
+            all_findings.append(Finding("stated_exact", text))
     lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNSEEN and name in NAMES}
     if status is Status.OK and lost:
-        status, message = (
-            Status.UNOBSERVABLE,
-            f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better",
-        )
+        status = Status.UNOBSERVABLE
+        message = f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better"
     return Estimate.of(
         basis,
         names(p),
@@ -158,7 +154,7 @@ def assemble(
         statistics={
             "dof": dof,
             "condition": judged.learned.condition**2,
-            "residual_rms": _rms(filtered),
+            "residual_rms": math.sqrt(float(np.nansum(filtered.nis)) / float(filtered.dims.sum())),
             "chi2": float(np.nansum(filtered.nis)),
             "nis_mean": agreement.mean,
             "nis_expected": agreement.expected,
@@ -185,18 +181,13 @@ def verdict(
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
     """Explanation of innovations that are too large: by the diagnosis, else by the reading of the recording."""
-    # saturated samples are not used, and explain nothing
-    read = [each for each in causes(recorded) if each.code != "saturation"]
-    explaining = [*(each for each in diagnosed if CODES[each.code].rank), *read]
+    explaining = [*(each for each in diagnosed if CODES[each.code].rank), *causes(recorded)]
     return explaining[0].message if explaining else "check noise, commands, signs and units"
 
 
 def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> float:
-    """Largest mean NIS of a recording that does not contradict the model.
-
-    It is that of an exact study, plus the part that disappears with the systematic inputs of site and base moved,
-    within their uncertainties, to where the recording fits best.
-    """
+    """Largest mean NIS of a recording that does not contradict the model: that of an exact study, plus the part that
+    disappears with systematic inputs moved, within their uncertainties, to where the recording fits best."""
     errors, of = stated_errors(settings), problem(settings)
     if errors is None:
         return agreement.limit(LIMITS.nis_sigmas)
@@ -254,12 +245,24 @@ def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str,
 def _left_at_prior(judged: Observability, hints: Mapping[str, str]) -> list[Finding]:
     """Coefficients of which more than half of the prior is left."""
     ratio = dict(zip(judged.learned.names, judged.learned.ratio, strict=True))
-    return [
-        Finding(
-            "at_prior", _with(f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left", hints.get(name))
-        )
-        for name in judged.at_prior
-    ]
+    texts = {name: f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left" for name in judged.at_prior}
+    return _hinted("at_prior", texts, hints)
+
+
+def _missed(goal: Mapping[str, Mapping[str, Any]], hints: Mapping[str, str]) -> list[Finding]:
+    """Goals that were not met."""
+    texts = {}
+    for name, unit in zip(EXTENDED, units(len(EXTENDED)), strict=True):
+        if name in goal and not goal[name]["met"]:
+            shown, size = shown_unit(unit)
+            u, wanted = goal[name]["u"] / size, goal[name]["wanted"] / size
+            texts[name] = f"{name}: u = {u:.2g} {shown}, wanted {wanted:.2g} {shown}"
+    return _hinted("goal_missed", texts, hints)
+
+
+def _hinted(code: str, texts: Mapping[str, str], hints: Mapping[str, str]) -> list[Finding]:
+    """A finding for each coefficient, with the hint to it, if any."""
+    return [Finding(code, f"{text}; {hints[k]}" if k in hints else text) for k, text in texts.items()]
 
 
 def _hidden(
@@ -273,57 +276,6 @@ def _hidden(
             why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
             hidden[name] = (float(left), why)
     return hidden
-
-
-def _with(text: str, hint: str | None) -> str:
-    """A sentence with its hint, if any."""
-    return text if hint is None else f"{text}; {hint}"
-
-
-def _goal(goal: Mapping[str, float], coefficients: tuple[str, ...], u: Array) -> dict[str, dict[str, Any]]:
-    """Wanted and reached u of each coefficient with a goal."""
-    return {
-        name: {"wanted": goal[name], "u": float(each), "met": bool(each <= goal[name])}
-        for name, each in zip(coefficients, u, strict=True)
-        if name in goal
-    }
-
-
-def _missed(
-    goal: Mapping[str, Mapping[str, Any]], si: tuple[str, ...], hints: Mapping[str, str]
-) -> list[Finding]:
-    """Goals that were not met."""
-    findings = []
-    for name, unit in zip(names(len(si)), si, strict=True):
-        if name in goal and not goal[name]["met"]:
-            shown, size = shown_unit(unit)
-            u, wanted = goal[name]["u"] / size, goal[name]["wanted"] / size
-            text = f"{name}: u = {u:.2g} {shown}, wanted {wanted:.2g} {shown}"
-            findings.append(Finding("goal_missed", _with(text, hints.get(name))))
-    return findings
-
-
-def _taken_as_exact(words: Mapping[str, str]) -> list[Finding]:
-    """``stated_exact``: inputs stated without an uncertainty, with the errors that would matter."""
-    if not words:
-        return []
-    text = (
-        f"{', '.join(words)} taken as exact: an error as large as one u of a coefficient comes from "
-        f"{', '.join(words.values())}; state them with uncertainties"
-    )
-    return [Finding("stated_exact", text)]
-
-
-def _scalars(filtered: FilterResult) -> int:
-    """Number of scalar measurements used."""
-    measured = np.isfinite(filtered.innovations)
-    return int(measured.sum() if len(measured) else filtered.dims.sum())
-
-
-def _rms(filtered: FilterResult) -> float:
-    """Root mean square of the normalised innovations; 1 where all is well."""
-    count = float(filtered.dims.sum())
-    return math.sqrt(float(np.nansum(filtered.nis)) / count) if count else math.nan
 
 
 def _conditions(recording: Recording, settings: SelfcalSettings) -> dict[str, Any]:

@@ -12,21 +12,17 @@ from inercal.estimate.hypotheses import Hypothesis
 from inercal.selfcal.diagnosis.fit_quality import Case
 from inercal.selfcal.settings import SelfcalSettings
 
-_DEG = math.radians(1.0)
-_SECOND = ("arcsec", _DEG / 3600.0)
-
 
 @dataclass(frozen=True)
 class SystematicInput:
     """One systematic input: its ``u`` (0 if exact), a ``step`` for the derivative, the study with it ``changed``, and
-    the ``unit`` in which its errors are shown, of ``size`` SI units."""
+    the ``unit`` in which its errors are shown."""
 
     name: str
     u: float
     step: float
     changed: Callable[[float], SelfcalSettings]
     unit: str
-    size: float
 
 
 def systematic_inputs(settings: SelfcalSettings) -> list[SystematicInput]:
@@ -36,32 +32,29 @@ def systematic_inputs(settings: SelfcalSettings) -> list[SystematicInput]:
     def with_base(**change: Any) -> SelfcalSettings:
         return replace(settings, base=replace(base, **change))
 
+    def with_gravity(by: float) -> SelfcalSettings:
+        return replace(settings, site=replace(site, gravity=site.gravity + by))
+
     by_gravity = (each for each in site.inputs if each.source != "latitude")
     gravity_u = math.hypot(*(each.u * each.sensitivity for each in by_gravity))
-    of_site = [
-        SystematicInput(
-            "latitude", site.latitude_u, 1e-4, lambda by: _moved(settings, by), "deg", _DEG
-        ),
-        SystematicInput(
-            "gravity", gravity_u, 1e-5 * site.gravity,
-            lambda by: replace(settings, site=replace(site, gravity=site.gravity + by)), "m/s^2", 1.0,
-        ),
-    ]  # fmt: skip
-    if settings.filter.extended:
-        return of_site
-    north, east = base.tilt
-    return [
-        *of_site,
-        SystematicInput(
-            "heading", base.heading_u, 1e-4, lambda by: with_base(heading=base.heading + by), "deg", _DEG
-        ),
-        SystematicInput(
-            "tilt about north", base.tilt_u[0], 1e-6, lambda by: with_base(tilt=(north + by, east)), *_SECOND
-        ),
-        SystematicInput(
-            "tilt about east", base.tilt_u[1], 1e-6, lambda by: with_base(tilt=(north, east + by)), *_SECOND
-        ),
+    inputs = [
+        SystematicInput("latitude", site.latitude_u, 1e-4, lambda by: _moved(settings, by), "deg"),
+        SystematicInput("gravity", gravity_u, 1e-5 * site.gravity, with_gravity, "m/s^2"),
     ]
+    if not settings.filter.extended:
+        (north, east), (north_u, east_u) = base.tilt, base.tilt_u
+        inputs += [
+            SystematicInput(
+                "heading", base.heading_u, 1e-4, lambda by: with_base(heading=base.heading + by), "deg"
+            ),
+            SystematicInput(
+                "tilt about north", north_u, 1e-6, lambda by: with_base(tilt=(north + by, east)), "arcsec"
+            ),
+            SystematicInput(
+                "tilt about east", east_u, 1e-6, lambda by: with_base(tilt=(north, east + by)), "arcsec"
+            ),
+        ]
+    return inputs
 
 
 def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
@@ -93,11 +86,10 @@ def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
     def without(case: Case, values: Array) -> Case:
         recording, problem = case
         earth, up = problem.world.earth, problem.world.up
-        for statement, value in zip(uncertain, values, strict=True):
-            if value == 0.0:
-                continue
-            there = statement.changed(float(value) * statement.u).world
-            earth, up = earth + there.earth - here.earth, up + there.up - here.up
+        for each, value in zip(uncertain, values, strict=True):
+            if value != 0.0:
+                there = each.changed(float(value) * each.u).world
+                earth, up = earth + there.earth - here.earth, up + there.up - here.up
         return recording, replace(problem, world=problem.world._replace(earth=earth, up=up))
 
     names = tuple(each.name for each in uncertain)

@@ -19,7 +19,6 @@ from inercal.turntable.figures.rates import residuals_by_rate
 from inercal.turntable.figures.table import rig
 from inercal.turntable.rate.calibration import RateCalibration
 from inercal.turntable.regression import Regression
-from inercal.turntable.weights import weights
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -79,7 +78,7 @@ def _residuals(readings: Readings, fit: Regression) -> Picture:
     """Residual of each reading, with what noise and table explain."""
     factor, n = readings.unit.factor, len(readings.y)
     few = n <= NUMBERED
-    weight = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples)
+    weight = fit.weights(fit.noise)
     band = weight.std / factor
     numbers, edges = np.arange(1, n + 1), np.arange(n + 1) + 0.5
     panels = []

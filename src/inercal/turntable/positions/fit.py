@@ -11,9 +11,18 @@ from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.findings import Finding
 from inercal.turntable.model import TableModel, table_model
+from inercal.turntable.positions.drift import Drift, fit_drift
 from inercal.turntable.readings import Readings
-from inercal.turntable.regression import Identified, Regression, fit, identify_channels
-from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.regression import (
+    Effects,
+    Identified,
+    Regression,
+    fit,
+    fit_to_order,
+    identify_channels,
+    second_order_matters,
+)
+from inercal.turntable.settings import BiasDrift, TurntableSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,13 +30,14 @@ class Fitting:
     """The terms that a plan identifies, and the fit if it identifies all.
 
     ``identified`` rank and null vectors by channel, of the terms of ``model``; ``fit`` None where a term is not
-    identified, and where the weights of the readings do not settle.
+    identified, and where the weights of the readings do not settle; with a ``drift`` where the study asks for one.
     """
 
     model: TableModel
     identified: tuple[Identified, ...]
     fit: Regression | None
     findings: tuple[Finding, ...] = ()
+    drift: Drift | None = None
 
 
 def fit_readings(means: Readings, settings: TurntableSettings) -> Fitting:
@@ -53,10 +63,26 @@ def fit_readings(means: Readings, settings: TurntableSettings) -> Fitting:
         with np.errstate(
             over="ignore", divide="ignore", invalid="ignore"
         ):  # what is lost is not finite, and no fit
+            if settings.instrument.bias_drift != "none":
+                drift = _with_drift(model, means, noise, settings.instrument.bias_drift)
+                return Fitting(model, what, drift.fit, (*findings, *drift.findings), drift)
             done = fit(model, means.angles, means.y, noise, samples=means.samples)
     except np.linalg.LinAlgError:
         return Fitting(model, what, None, tuple(findings))
     return Fitting(model, what, done, tuple(findings))
+
+
+def _with_drift(model: TableModel, means: Readings, noise: Sequence[float | None], kind: BiasDrift) -> Drift:
+    """The fit with a drift of that ``kind``; all fits by which it is found are of one order of the table's errors."""
+
+    def to_order(second: bool) -> Drift:
+        def fitted(y: Array, effects: Effects) -> Regression:
+            return fit_to_order(model, means.angles, y, noise, None, means.samples, effects, second)
+
+        return fit_drift(means, kind, fitted, means.unit.si)
+
+    straight = to_order(False)
+    return to_order(True) if second_order_matters(straight.fit) else straight
 
 
 def choose_terms(

@@ -18,17 +18,19 @@ from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
+from inercal.rigs.chain import Scope
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME, orthonormal
 from inercal.turntable.positions.application import in_use
+from inercal.turntable.positions.examination import examine
 from inercal.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
+from inercal.turntable.positions.latitude import of_latitude, stated_exact
+from inercal.turntable.positions.shifts import Scale, doubts, findings_of
 from inercal.turntable.positions.tolerance import alternatives, coefficient_shares, drift_shares, shifts
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression, worst_rank
 from inercal.turntable.settings import TurntableSettings
-from inercal.turntable.weights import weights
 
 COMMAND = "calibrate turntable"
 
@@ -39,8 +41,8 @@ MODELS = {
         "in units of the site's gravity (an accelerometer reads -a); w the earth rate"
     ),
     "gyro": (
-        "y_i = D_F_i + S_i (w_i + T_ij w_j + T_ik w_k) + G_ij f_j, f the specific force (+g up at rest), w the earth "
-        "rate"
+        "y_i = D_F_i + S_i (w_i + T_ij w_j + T_ik w_k) + G_ij f_j (+ G_ijk f_j f_k), f the specific force (+g up at "
+        "rest), w the earth rate"
     ),
     "accelerometer": (
         "y_i = K0 + K1 (f_i + M_ip f_p + M_io f_o + K2 f_i^2 + K3 f_i^3 + Koq f_i |f_i| + Kip f_i f_p + Kio f_i f_o "
@@ -81,13 +83,19 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
         sigma, dof = float(fit.noise[k]), float(fit.noise_dof[k])
         name = f"noise of {channel.channel}"
         if np.isinf(dof):
-            components.append(TypeB(name, sigma, unit, gain[..., k]))
+            components.append(TypeB(name, sigma, unit, gain[..., k], redrawn=True))
         else:
             components.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(
-            TypeB(error.source, std, "m" if error.is_offset else "rad", terms.slope @ shift / std)
+            TypeB(
+                error.source,
+                std,
+                "m" if error.is_offset else "rad",
+                terms.slope @ shift / std,
+                redrawn=error.scope in (Scope.POSITION, Scope.SAMPLE),
+            )
         )
     if fit.second is not None:
         columns = terms.slope @ fit.second.shifts(fit.gain)[1]
@@ -129,18 +137,26 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
 
     if fitting.fit is None:
         return nothing(*_without_fit(readings, fitting, settings))
-    fit = fitting.fit
+    fit, drift = fitting.fit, fitting.drift
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         terms = terms_of(fit)
         finite = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
     if not finite.all():
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
     names = fit.model.symbols
-    # stated noise is of type B, but not the same in repeat runs
-    uncertainty = combine(names, sources(fit, terms, unit))._replace(common=None)
-    findings += _too_large(fit) + of_site(
-        names, uncertainty.budget, [each.source for each in fit.model.references]
-    )
+    stated = [*sources(fit, terms, unit), *(drift.components(terms.slope) if drift else [])]
+    bent, poorly_known = of_latitude(fit, settings.site, names, terms.slope, combine(names, stated).u)
+    stated += bent
+    uncertainty = combine(names, stated)
+    findings += poorly_known
+    findings += (large := _too_large(fit))
+    if not large:  # cubes of the table's errors would be taken for faults
+        examination = examine(readings, fit, [settings.instrument.noise] * len(readings.channels))
+        scale = Scale(names, terms.slope, uncertainty.u)
+        findings += stated_exact(fit, settings.site, scale)
+        findings += findings_of(examination, fit, scale, readings.unit)
+        uncertainty = combine(names, [*stated, *doubts(examination, fit, scale, readings.unit)])
+    findings += of_site(names, uncertainty.budget, [each.source for each in fit.model.references])
     return Estimate.of(
         basis,
         names,
@@ -157,6 +173,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
             "noise": _noise(readings, fit, unit),
             "second_order": fit.second is not None,
         }
+        | ({"nuisances": drift.rows()} if drift else {})
         | in_use(fit, terms.slope, settings, unit),
     )
 
@@ -188,7 +205,7 @@ def _verdict(readings: Readings, fitting: Fitting) -> tuple[Status, str]:
 
 def _farthest(readings: Readings, fit: Regression) -> str:
     """The reading with the largest residual for its uncertainty."""
-    std = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).std
+    std = fit.weights(fit.noise).std
     k, c = np.unravel_index(int(np.argmax(np.abs(fit.residuals) / std)), fit.residuals.shape)
     return f"position {k + 1} of {readings.channels[c]}"
 
@@ -198,7 +215,7 @@ def _too_large(fit: Regression) -> list[Finding]:
     if fit.second is None:
         return []
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
-    within = weights(fit.model, fit.angles, fit.c, fit.noise, samples=fit.samples).within
+    within = fit.weights(fit.noise).within
     # where no noise is left, what is a thousand times below what changes from position to position does not matter
     limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.diagonal(within, axis1=1, axis2=2).mean(axis=0)))
     bent = []
@@ -230,7 +247,7 @@ def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collect
         f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(acting)}): with an exact site it would "
         "be less than half"
     )
-    return [Finding("uncertain_site", text)]
+    return [Finding("uncertain_site", text, "", ())]
 
 
 def _dead(fit: Regression, identified: NDArray[np.bool_]) -> str:

@@ -222,7 +222,7 @@ def _of_site(judged: JudgedPlan, settings: TurntableSettings) -> list[Finding]:
         f"rms u of the output is {rms / unit.factor:.3g} {unit.symbol}; with an exact site it would be "
         f"{best / unit.factor:.3g} {unit.symbol}: state the site better"
     )
-    return [Finding("uncertain_site", text)]
+    return [Finding("uncertain_site", text, "", ())]
 
 
 def expected_model(settings: TurntableSettings) -> tuple[TableModel, Array, list[Finding]]:

@@ -9,8 +9,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.records.record import Record, record_of
 from inercal.rigs.chain import Scope
 from inercal.turntable.disturbances import displaced, disturbed, magnetic_field, true_angles
 from inercal.turntable.limits import LIMITS

@@ -120,12 +120,14 @@ def alternatives(fit: Regression, slope: Array) -> Alternatives:
 
     ``slope`` (p, p) of the terms as reported by the linear coefficients; u is of those, in the unit of the fit.
     """
-    chain, rows, p = fit.model.chain, fit.model.rows(fit.angles), len(fit.c)
+    chain, rows, p = fit.model.chain, fit.rows, len(fit.c)
 
     def u(changed: Chain) -> Array:
         table = weights_of(changed, fit.slopes, fit.angles, fit.beside, np.zeros_like(fit.noise), fit.samples)
         noise = np.maximum(fit.noise, least_noise(table.within))
-        weight = replace(table, within=table.within + np.diag(np.square(noise)))
+        weight = replace(table, within=table.within + np.diag(np.square(noise))).with_common(
+            fit.effects.random
+        )
         root = solve(rows, np.zeros_like(fit.residuals), weight).root
         return np.asarray(np.linalg.norm(slope @ root[:p], axis=1))
 

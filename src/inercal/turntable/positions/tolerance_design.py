@@ -138,8 +138,8 @@ class ToleranceDesign:
         test = self.best.test
         times = "" if test.repeats == 1 else f", taken {test.repeats} times"
         return (
-            f"tolerances for {len(self.goal)} goals at a cost of {self.best.cost:.4g} (the present ones: "
-            f"{self.present_cost:.4g}), with {test.plan.name}{times}"
+            f"tolerances for {len(self.goal)} goals at a cost of {self.best.cost:.4g} (positions included; present "
+            f"tolerances alone: {self.present_cost:.4g}), with {test.plan.name}{times}"
         )
 
 

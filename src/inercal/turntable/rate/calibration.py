@@ -17,6 +17,7 @@ from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.turntable.display import displayed
 from inercal.turntable.limits import LIMITS
+from inercal.turntable.rate.cross_axis import axis_about, excess_across, fit_across
 from inercal.turntable.rate.ends import settled
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
 from inercal.turntable.rate.linearity import SEED
@@ -70,13 +71,28 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
     findings = [*record.findings]
     still = settled(chain, test.joint, readings.angles)
     along = turning_axis(still, test.joint, readings.angles)
-    taken = []
-    for channel in readings.channels:
-        if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine:
-            taken.append(channel)
-        else:
-            text = f"{channel} lies across the turning axis {test.joint} and is left out"
-            findings.append(Finding("weak_term", text))
+    taken = [
+        channel
+        for channel in readings.channels
+        if np.abs(along[:, "xyz".index(channel[-1])]).min() > LIMITS.turning_cosine
+    ]
+    about = axis_about(along)
+    across = []
+    for channel in (channel for channel in readings.channels if channel not in taken):
+        S = f"S_{channel[-1]}"
+        if not np.ptp(readings.y[:, readings.channels.index(channel)]):
+            text = f"{channel} reads the same at all rates and is left out: is it dead?"
+            findings.append(Finding("dead_channel", text, harm=()))
+            continue
+        wanted = [] if instrument.coefficients.get(S) else [f"{S} under [instrument.coefficients]"]
+        if readings.assumed:
+            wanted.append(f"the angle {test.joint} where each stay begins")
+        if about and not wanted:
+            across.append(channel)
+            continue
+        hint = f": with {' and '.join(wanted)} its T_{channel[-1]}{about} is found" if about else ""
+        text = f"{channel} lies across the turning axis {test.joint} and is left out{hint}"
+        findings.append(Finding("weak_term", text))
 
     def nothing(rank: int, text: str, words: Sequence[str] = ()) -> RateCalibration:
         return RateCalibration(
@@ -109,7 +125,7 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             return nothing(
                 0, f"{channel} reads the same at all rates, expected it to follow them: is it dead?"
             )
-    inputs = tuple(gyro_input(readings, settings, "xyz".index(channel[-1])) for channel in taken)
+    inputs = tuple(gyro_input(readings, settings, "xyz".index(channel[-1])) for channel in (*taken, *across))
     if readings.assumed:
         findings += _whole_turns(readings, inputs)
     full_scale = test.full_scale or float(np.abs(readings.rate).max())
@@ -125,9 +141,14 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             full_scale,
             np.random.default_rng(SEED),
         )
-        for channel, given in zip(taken, inputs, strict=True)
+        for channel, given in zip(taken, inputs, strict=False)
     )
     findings += [finding for fit in fits for finding in _excess(fit)]
+    if across:
+        others = tuple(fit_across(readings, settings, channel[-1], about) for channel in across)
+        inputs = (*inputs[: len(taken)], *(given for given, _ in others))
+        fits = (*fits, *(fit for _, fit in others))
+        findings += [finding for _, fit in others for finding in excess_across(fit)]
     estimate = assemble(record, readings, settings, findings, inputs, fits, full_scale, identified)
     return RateCalibration(estimate, readings, inputs, fits)
 

@@ -156,12 +156,12 @@ def fit_rates(
     c: Array = np.asarray(np.linalg.lstsq(rows, y, rcond=None)[0], dtype=float)
     sigma = floor
     for _ in range(ROUNDS):
-        weight = _weights(given.effects, float(c[1]), n)
+        weight = weights_of(given.effects, float(c[1]), n)
         noise_fit = scatter(rows[:, None, :], y[:, None], weight, [noise], np.array([floor]))
         sigma = float(noise_fit.std[0])
-        solution = _solve(rows, y, weight, sigma)
+        solution = weighted(rows, y, weight, sigma)
         c = solution.c
-    line = _solve(terms[:, :2], y, weight, sigma)
+    line = weighted(terms[:, :2], y, weight, sigma)
     remainder = np.eye(n) - terms[:, :2] @ line.gain[:, :, 0]
     residuals = y - terms[:, :2] @ line.c
     values, gain = _relative(c[:p], solution.gain[:p, :, 0])
@@ -250,7 +250,7 @@ def _left_over(axis: str, rate: Array, residuals: Array, remainder: Array) -> li
     return shown
 
 
-def _weights(effects: Sequence[Effect], scale: float, n: int) -> Weights:
+def weights_of(effects: Sequence[Effect], scale: float, n: int) -> Weights:
     """Covariance of the readings (one channel) without noise, for a scale factor."""
     none = [np.zeros((n, 0))]
     redrawn = scale * np.hstack(none + [effect.shift for effect in effects if effect.redrawn])
@@ -258,6 +258,6 @@ def _weights(effects: Sequence[Effect], scale: float, n: int) -> Weights:
     return Weights(np.square(redrawn).sum(axis=1)[:, None, None], common[:, None, :])
 
 
-def _solve(rows: Array, y: Array, weight: Weights, sigma: float) -> Solution:
+def weighted(rows: Array, y: Array, weight: Weights, sigma: float) -> Solution:
     """The weighted fit with that noise."""
     return solve(rows[:, None, :], y[:, None], Weights(weight.within + sigma**2, weight.common))

@@ -13,8 +13,7 @@ from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
-from inercal.records.record import Record
-from inercal.records.temperature import recorded_temperature
+from inercal.records.record import Record, recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME
 from inercal.turntable.positions.outcome import COMMAND, of_site, unit_of_term
@@ -24,7 +23,8 @@ from inercal.turntable.settings import RateTest, TurntableSettings
 
 MODEL = (
     "y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3), x the rate about the gyro's axis: the table's rate times the "
-    "cosine of the axes, and the mean of earth rate over the stay; D_F holds what gravity does at this attitude"
+    "cosine of the axes, and the mean of earth rate over the stay; D_F holds what gravity does at this attitude; of a "
+    "gyro i across the turning axis k: y = D_F + S (x + T_ik w_k), S as stated"
 )
 
 REFERENCES = (
@@ -49,13 +49,12 @@ def assemble(
     unit = dwells.unit.si
     names = tuple(name for fit in fits for name in fit.names)
     found_sources = sources(dwells, inputs, fits, unit)
-    # stated noise is of type B, but not the same in repeat runs
-    uncertainty = _bounded(names, combine(names, found_sources)._replace(common=None), fits)
+    uncertainty = _bounded(names, combine(names, found_sources), fits)
     values = np.concatenate([fit.values for fit in fits])
     u = uncertainty.u
     status = Status.OK
     message = f"{counted(len(names), 'term')} from {counted(len(dwells.rate), 'stay')} at rates"
-    for fit in fits:
+    for fit in (each for each in fits if f"S_{each.axis}" in names):
         k = names.index(f"S_{fit.axis}")
         if abs(values[k]) < LIMITS.scale_sigmas * u[k]:
             status = Status.INCONSISTENT
@@ -146,7 +145,7 @@ def sources(
         gain[begin : begin + len(fit.names)] = fit.gain
         name = f"noise of gyro_{fit.axis}"
         if np.isinf(fit.noise_dof):
-            made.append(TypeB(name, fit.noise, unit, gain))
+            made.append(TypeB(name, fit.noise, unit, gain, redrawn=True))
         else:
             made.append(TypeA(name, fit.noise, unit, fit.noise**2 * gain @ gain.T, fit.noise_dof))
     everything = {effect.source: effect for given in inputs for effect in given.effects}
@@ -164,7 +163,7 @@ def sources(
             )
         sensitivity = np.vstack(blocks)
         if np.any(sensitivity):
-            made.append(TypeB(source, effect.u, effect.unit, sensitivity))
+            made.append(TypeB(source, effect.u, effect.unit, sensitivity, redrawn=effect.redrawn))
     return made
 
 
@@ -176,7 +175,9 @@ def _bounded(names: Sequence[str], linear: Uncertainty, fits: Sequence[RateFit])
         expanded = coverage_factor(float(linear.dof[k])) * float(linear.u[k])
         if expanded > 0.0:
             wider[k] = each.half / expanded
-    return linear._replace(covariance=linear.covariance * np.outer(wider, wider))
+    scale = np.outer(wider, wider)
+    common = None if linear.common is None else linear.common * scale
+    return linear._replace(covariance=linear.covariance * scale, common=common)
 
 
 def _rows(dwells: RateDwells, given: Input, fit: RateFit, full_scale: float) -> list[dict[str, Any]]:

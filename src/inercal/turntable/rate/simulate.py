@@ -7,8 +7,8 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.instruments.by_angle import channel_model
-from inercal.records.made import record_of
-from inercal.records.record import Record
+from inercal.instruments.terms import TERMS
+from inercal.records.record import Record, record_of
 from inercal.rigs.chain import Chain, follows_angle
 from inercal.rigs.outputs import gravity_reference, rate_reference
 from inercal.turntable.disturbances import displaced, disturbed
@@ -40,7 +40,8 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
     Raises
     ------
     StudyError
-        No rates, an instrument that is no gyro, or a true value of S_nl, which follows from the others.
+        No rates, an instrument that is no gyro, drift by squares of force, or a true
+        value of S_nl, which follows from the others.
     """
     check_rate_test(settings)
     test, chain, instrument = settings.rate_test, settings.chain, settings.instrument
@@ -59,6 +60,12 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
             f"disturbances.{alien[0]}", "found in a study of a rate test, expected one of positions"
         )
     chain = displaced(chain, other)
+    squares = [symbol for symbol in instrument.coefficients if TERMS[symbol].unit == "output/(m/s^2)^2"]
+    if squares:
+        raise StudyError(
+            "instrument.coefficients",
+            f"found {squares[0]}, expected no squares of force in a simulated rate test",
+        )
     rate = np.array(test.rates)
     n = len(rate)
     t = np.asarray(instrument.dwell * (np.arange(n) + 0.5))

@@ -1,0 +1,104 @@
+"""``inercal inspect``, ``allan`` and ``monitor``: a recording looked at."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from inercal.cli.options import Files, MapFile, Output, ReportOutput, Span, read_record, working
+from inercal.cli.outcome import WHOLE, emit, give, timed
+from inercal.cli.streaming import Every, StreamFile, StreamOptions, interval_of, run_stream
+
+
+def inspect(
+    files: Files,
+    /,
+    *,
+    map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Look at a recording before it is used."""
+    from inercal._files import write_text
+    from inercal.estimate.files import save
+    from inercal.estimate.result import without_coefficients
+    from inercal.records.places import counted
+    from inercal.report.inspection import (
+        channels_table,
+        inspection_pictures,
+        norms,
+        render_inspection,
+        summary,
+    )
+
+    output.check(WHOLE, (*files, map_file))
+    record = read_record(files, map_file, output, span)
+    if {"wc_x", "th_x", "acc_x"} <= record.columns.keys():  # a platform in gimbals
+        from inercal.selfcal.reading import worth_saying
+
+        record = replace(record, findings=tuple(worth_saying(record, record.columns.values())))
+    words = counted(len(record.findings), "finding") if record.findings else "nothing suspicious"
+    result = {
+        "channels": [vars(row) for row in summary(record)],
+        "norms": [vars(row) for row in norms(record)],
+    }
+    estimate = timed(without_coefficients("inspect", words, result, record.sources, record.findings))
+    if output.out is not None:
+        save(estimate, output.out)
+        output.say(f"findings: {output.out}")
+    if output.report is not None:
+        write_text(output.report, render_inspection(record, estimate, inspection_pictures(record)))
+        output.say(f"report: {output.report}")
+    findings = [f"{f.code}: {f.message}{f' ({f.where})' if f.where else ''}" for f in record.findings] or [
+        words
+    ]
+    emit(estimate, "\n".join([channels_table(record).text(), "", *findings]), output)
+
+
+def allan(
+    files: Files,
+    /,
+    *,
+    map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Tell the noise of an instrument at rest."""
+    from inercal._files import write_text
+    from inercal.face.noise import allan as noise_of
+    from inercal.report.allan import curves_csv
+
+    output.check((*WHOLE, ".csv"), (*files, map_file))
+    clock = time.perf_counter()
+    record = read_record(files, map_file, output, span)
+    read_s = time.perf_counter() - clock
+    with working(output) as progress:
+        progress("noise")
+        result = noise_of(record)
+
+    def curves(path: Path) -> None:
+        write_text(path, curves_csv(result.evidence))
+
+    return give(result, output, read_s, "noise", curves)
+
+
+def monitor(
+    file: StreamFile = None,
+    /,
+    *,
+    map_file: MapFile = None,
+    every: Every = None,
+    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
+    output: Output = Output(),  # noqa: B008  (frozen)
+) -> None:
+    """Tell rest from motion, live, and measure the noise at rest."""
+    from inercal._jit import compiling
+    from inercal.noise.running import load_kernels
+    from inercal.stream.monitor import Monitor
+
+    interval = interval_of(every)
+    streaming.check(output, (file, map_file))
+    with compiling("monitor", output.say):
+        load_kernels()
+    run_stream(lambda lines: Monitor(lines, interval), file, map_file, output, streaming)

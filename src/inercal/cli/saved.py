@@ -1,0 +1,209 @@
+"""``inercal apply``, ``compare`` and ``convert``: what is done with saved calibrations."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from inercal.cli import EXIT_BAD_VERDICT
+from inercal.cli.options import FileOutput, MapFile, ReportOutput, Span, read_record, reading
+from inercal.cli.outcome import WHOLE, emit, give
+from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
+from inercal.errors import InputError
+
+if TYPE_CHECKING:
+    from inercal.convert.correction import Model
+    from inercal.convert.other_tools import Converted
+    from inercal.estimate.result import Estimate
+    from inercal.findings import Finding
+
+
+def apply(
+    calibration: Annotated[
+        Path, Parameter(help="Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out.")
+    ],
+    files: Annotated[
+        list[Path] | None, Parameter(help="Recordings; several files with distinct channels are one record.")
+    ] = None,
+    /,
+    *,
+    map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
+    invert: Annotated[bool, Parameter(help="From true values to outputs of the instrument.")] = False,
+    uncertainty: Annotated[
+        bool, Parameter(help="Also write the standard uncertainty of each corrected value (u_acc_x, ...).")
+    ] = False,
+    stream: Annotated[
+        bool, Parameter(help="Lines in, from standard input or one FILE, and corrected lines out.")
+    ] = False,
+    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Correct a recording with a calibration."""
+    if stream:
+        span.refuse("a stream")
+        from inercal.stream.apply import Apply
+
+        file = streamed(files)
+        streaming.check(output, (calibration, file, map_file))
+        model, findings, _ = _model(calibration, uncertainty)
+        output.say_findings(findings)
+        run_stream(
+            lambda lines: Apply(lines, model, invert, output.say_finding), file, map_file, output, streaming
+        )
+        return
+
+    from inercal.convert.correction import apply_to
+    from inercal.estimate.result import without_coefficients
+    from inercal.face.calibrations import worth_saying
+    from inercal.records.read import source_of
+    from inercal.records.write import SUFFIXES, write_record
+
+    paths = recorded("apply", files, streaming)
+    if output.out is None:
+        raise InputError("--out", "missing, expected the file to write, such as corrected.csv")
+    output.check(SUFFIXES, (calibration, *paths, map_file))
+    model, findings, estimate = _model(calibration, uncertainty)
+    record = apply_to(read_record(paths, map_file, output, span), model, invert)
+    with reading(output) as progress:
+        write_record(record, output.out, progress)
+    findings += worth_saying(record, estimate)
+    output.say_findings(findings)
+    result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
+    words = f"{result['rows']} rows written to {output.out}"
+    inputs = (*record.sources, source_of(calibration))
+    emit(without_coefficients("apply", words, result, inputs, findings), words, output)
+
+
+def _model(calibration: Path, uncertainty: bool) -> tuple[Model, tuple[Finding, ...], Estimate]:
+    """The instrument of a calibration that was saved, what to say of that, and the calibration."""
+    from inercal.convert.models import model_of, worth_knowing
+    from inercal.estimate.files import load
+
+    estimate = load(calibration)
+    return (
+        model_of(estimate, calibration, uncertainty),
+        worth_knowing(estimate, calibration),
+        estimate,
+    )
+
+
+_CALIBRATION = "Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out."
+
+
+def compare(
+    first: Annotated[Path, Parameter(help=_CALIBRATION)],
+    second: Annotated[Path, Parameter(help="The later one, of the same instrument.")],
+    /,
+    *,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Compare two calibrations of one instrument."""
+    from inercal.estimate.compare import Saved
+    from inercal.estimate.compare import compare as compared
+    from inercal.estimate.files import load
+    from inercal.face.calibrations import of_comparison
+    from inercal.records.read import source_of
+
+    output.check(WHOLE, (first, second))
+    clock = time.perf_counter()
+    files = [Saved(load(path), str(path)) for path in (first, second)]
+    inputs = (source_of(first), source_of(second))
+    read = time.perf_counter()
+    estimate = compared(*files)
+    timing = {"solve": time.perf_counter() - read}
+    result = of_comparison(replace(estimate, inputs=inputs, timing=timing), files[0].estimate)
+    return give(result, output, read - clock, "comparison")
+
+
+Tool = Literal["imu_tk", "imucal", "kalibr", "psins"]
+
+
+def convert(
+    files: Annotated[
+        list[Path], Parameter(help="Calibration; with --from imu_tk its accelerometers' and gyro's files.")
+    ],
+    /,
+    *,
+    to: Annotated[Tool | None, Parameter(help="The tool to write for.")] = None,
+    source: Annotated[Tool | None, Parameter(name="--from", help="The tool that wrote the file.")] = None,
+    acc_unit: Annotated[
+        str | None,
+        Parameter(help="With --from: unit of the accelerometers' outputs, if the file states none."),
+    ] = None,
+    gyro_unit: Annotated[
+        str | None, Parameter(help="With --from: unit of the gyro's outputs, if the file states none.")
+    ] = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Convert a calibration to or from another tool's."""
+    from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
+    from inercal.estimate.files import load
+    from inercal.findings import Status
+    from inercal.records.read import source_of
+
+    if to is None and source is None:
+        raise InputError("--to", "missing, expected --to or --from and one of " + ", ".join(CONVENTIONS))
+    output.check(WHOLE if to is None else CONVENTIONS[to].suffixes, files)
+    units = {sensor: unit for sensor, unit in (("acc", acc_unit), ("gyro", gyro_unit)) if unit is not None}
+    if source is None:
+        if units:
+            raise InputError(
+                "--acc-unit" if acc_unit else "--gyro-unit", "found without --from, expected with it"
+            )
+        if len(files) > 1:
+            raise InputError(files[1], "found a second calibration, expected one")
+        estimate = load(files[0])
+        estimate = replace(estimate, inputs=(*estimate.inputs, source_of(files[0])))
+    else:
+        estimate = from_tool(files, source, units)
+    if estimate.status is not Status.OK:
+        output.say(f"{estimate.status.value}: {estimate.message}")
+    if to is None:
+        _write_calibration(estimate, output)
+    else:
+        _write_texts(to_tool(estimate, to, files[0]), to, files, output)
+    return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
+
+
+def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
+    """The calibration, to its file and as a table."""
+    from inercal.estimate.files import save
+
+    output.say_findings(estimate.findings)
+    if output.out is not None:
+        save(estimate, output.out)
+        output.say(f"calibration: {output.out}")
+    emit(replace(estimate, timing={}), f"{estimate.table()}\n\n{estimate.message}", output)
+
+
+def _write_texts(converted: Converted, tool: Tool, files: list[Path], output: FileOutput) -> None:
+    """The files of the tool and the table of their terms; without --out their texts instead."""
+    from inercal._files import write_text
+
+    estimate = converted.estimate
+    output.say_findings(estimate.findings)
+    if output.out is None:
+        written = {}
+        text = "\n".join(converted.texts.values()).rstrip("\n")
+    else:
+        out = output.out
+        written = {
+            out.with_name(f"{out.stem}{end}{out.suffix}"): text for end, text in converted.texts.items()
+        }
+        for path in written:
+            replace(output, out=path).spare(files)
+        for path, content in written.items():
+            write_text(path, content)
+            output.say(f"{tool}: {path}")
+        text = f"{estimate.table()}\n\n{estimate.model}"
+    result = {
+        **estimate.result,
+        "texts": list(converted.texts.values()),
+        "files": [str(path) for path in written],
+    }
+    emit(replace(estimate, result=result, timing={}), text, output)

@@ -1,0 +1,1 @@
+"""A gyro on a platter or rate table of known rates, in unknown orientations."""

@@ -1,0 +1,1 @@
+"""A gyro alone, turned by known angles about each axis."""

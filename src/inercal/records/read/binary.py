@@ -1,0 +1,59 @@
+"""Raw binary files: rows of numbers one after the other, as a map describes them (`binary`, `fields`, `transpose`)."""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from inercal.errors import RecordError
+from inercal.findings import Finding
+from inercal.records.channels import Channel
+from inercal.records.read.arrays import Contents, held, tables
+from inercal.records.read.table import FileOptions, Table
+
+
+def read(
+    path: Path,
+    options: FileOptions,
+    channels: tuple[Channel, ...] | None,
+    progress: Callable[[int], None],
+) -> list[Table]:
+    """Read the wanted fields; bytes at the end that are no whole row are a finding.
+
+    Raises `RecordError` where there is no whole row.
+    """
+    raw = path.read_bytes()
+    if raw[:2] == b"\x1f\x8b":
+        try:
+            raw = gzip.decompress(raw)
+        except (OSError, EOFError, zlib.error) as error:
+            raise RecordError(path, f"cannot be read as gzip ({error})") from error
+    contents = contents_of(raw[options.skip :], options, path)
+    progress(path.stat().st_size)
+    return tables(contents, options, channels or (), path, mapped=True)
+
+
+def contents_of(raw: bytes, options: FileOptions, path: Path) -> Contents:
+    """The fields of rows as a table; of a transposed file each field stands as a whole, one after the other."""
+    row = np.dtype([(name, kind) for name, kind in zip(options.fields, options.binary, strict=True)])
+    rows, rest = divmod(len(raw), row.itemsize)
+    if rows == 0:
+        raise RecordError(
+            path, f"found {len(raw)} bytes, expected rows of {row.itemsize} bytes, as [file] binary has it"
+        )
+    columns = {}
+    begin = 0
+    for name, kind in zip(options.fields, options.binary, strict=True):
+        if options.transpose:
+            column = np.frombuffer(raw, kind, rows, begin)
+            begin += column.nbytes
+        else:
+            column = np.frombuffer(raw, row, rows)[name]
+        columns[name] = held(np.ascontiguousarray(column))
+    text = f"the file ends within a row: {rest} bytes left of a row of {row.itemsize}"
+    findings = (Finding("truncated", text, f"row {rows + 1}"),) if rest else ()
+    return Contents(columns, findings, tabular=True)

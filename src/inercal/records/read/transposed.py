@@ -1,0 +1,44 @@
+"""Text files that lie on their side: a line for each channel, a column for each sample or pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from inercal.errors import RecordError
+from inercal.records.channels import Channel
+from inercal.records.read.arrays import Contents, held, tables
+from inercal.records.read.layout import blocks, find_layout
+from inercal.records.read.table import FileOptions, Table
+
+
+def read(
+    path: Path,
+    options: FileOptions,
+    channels: tuple[Channel, ...] | None,
+    progress: Callable[[int], None],
+) -> list[Table]:
+    """Read the wanted lines as columns; a line may begin with a name, by which the map then finds it.
+
+    Raises `RecordError` where the lines have no numbers, or not equally many.
+    """
+    with path.open("rb") as file:
+        lines = [line for block in blocks(file, path) for line in block.lines]
+    layout = find_layout(lines, options, path).settled(lines)
+    rows = [layout.fields(line) for line in lines[options.skip :] if layout.is_row(line)]
+    if any(row is None for row in rows):
+        raise RecordError(
+            path, "found lines of different lengths, expected equally many numbers for each channel"
+        )
+    texts = [row for row in rows if row]
+    named = all(layout.number(row[0]) is None for row in texts)
+    names = [row[0].strip() if named else f"line {k}" for k, row in enumerate(texts, 1)]
+    numbers = [[layout.number(text) for text in row[named:]] for row in texts]
+    if any(value is None for row in numbers for value in row):
+        raise RecordError(path, "found words among the numbers, expected a line of numbers for each channel")
+    values = np.array(numbers, dtype=float)
+    progress(path.stat().st_size)
+    columns = {name: held(row) for name, row in zip(names, values, strict=True)}
+    return tables(Contents(columns, tabular=True), options, channels or (), path, mapped=True)

@@ -1,0 +1,238 @@
+"""The platform of a self-calibration in a study: its gimbals, the base below them, and the plan of its turns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, StrictInt
+from pydantic_core import core_schema
+
+from inercal._toml import Strict
+from inercal.errors import StudyError
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.plan import JointName, Move, Plan, Rest, Turn, path
+from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals
+from inercal.studies.fields import AsTyped, Duration, QuantityText, Several, SeveralTexts, positive, refusal
+from inercal.studies.rig import Angle, Limits
+from inercal.units import Quantity, shown
+
+_ENDS = SeveralTexts(QuantityText("angle", "-90 deg"), "the lowest, the highest angle")
+_TILT = SeveralTexts(
+    QuantityText("angle", "0 arcmin", lambda a: abs(a) <= 0.5 * math.pi, "an angle from -90 deg to 90 deg"),
+    "the one about north, the one about east",
+)
+
+
+def _once_each(axes: object) -> object:
+    """Refuse anything but x, y and z in some order."""
+    if not isinstance(axes, list) or sorted(map(str, axes)) != ["x", "y", "z"]:
+        raise refusal(f'found {shown(axes)}, expected "x", "y" and "z" once each, the outer joint first')
+    return axes
+
+
+def _signs(signs: object) -> object:
+    """Refuse anything but three signs."""
+    good = isinstance(signs, list) and len(signs) == 3
+    if not good or any(type(sign) is not int or sign not in (1, -1) for sign in signs):  # type: ignore[attr-defined]
+        raise refusal(f"found {shown(signs)}, expected three of 1 and -1, for the joints x, y, z")
+    return signs
+
+
+AxisName = Literal["x", "y", "z"]
+Order = Annotated[list[AxisName], BeforeValidator(_once_each), Field(min_length=3, max_length=3)]
+Signs = Annotated[
+    list[Annotated[StrictInt, Field(json_schema_extra={"enum": [1, -1]})]],
+    BeforeValidator(_signs),
+    Field(min_length=3, max_length=3),
+]
+
+
+class GimbalLimitsTable(Strict):
+    """Ranges within which the gimbals turn; no limits if absent."""
+
+    x: Annotated[Several, _ENDS] | None = Field(
+        default=None, description="lowest and highest outer angle", examples=[["-180 deg", "180 deg"]]
+    )
+    y: Annotated[Several, _ENDS] | None = Field(
+        default=None, description="of the inner joint", examples=[["-80 deg", "80 deg"]]
+    )
+    z: Annotated[Several, _ENDS] | None = Field(
+        default=None, description="of the joint of the platform", examples=[["-360 deg", "360 deg"]]
+    )
+
+
+class GimbalsTable(Strict):
+    """The platform in its gimbals, and the base that carries them."""
+
+    kind: Literal["three_axis_gimbals"] = Field(description="three gimbals: outer x, inner y, platform z")
+    heading: Angle | Literal["unknown"] | None = Field(
+        default=None,
+        description="of the base, from north to east; may carry an uncertainty; unknown: found from the record; 0 if "
+        "absent",
+    )
+    tilt: Annotated[Several, _TILT] | None = Field(
+        default=None,
+        description="of the base, about north and about east; may carry uncertainties; level if absent",
+    )
+    frame: Literal["nue", "enu", "ned"] = Field(
+        default="nue",
+        description="axes of the platform at zero angles: north-up-east, east-north-up, north-east-down",
+    )
+    gimbals: Order = Field(
+        default=["z", "x", "y"],
+        examples=[["z", "x", "y"]],
+        description="axis of the platform along which each joint lies at zero angles, outer first",
+    )
+    signs: Signs = Field(default=[1, 1, 1], description="of the angles: -1 where one counts left-handed")
+    limits: GimbalLimitsTable = Field(
+        default=GimbalLimitsTable(), title="Limits", description="ranges of the joints; none if absent"
+    )
+
+
+def gimbals_of(table: GimbalsTable) -> Gimbals:
+    """Order and signs."""
+    x, y, z = table.gimbals
+    outer, inner, platform = table.signs
+    return Gimbals((x, y, z), (outer, inner, platform))
+
+
+def base_of(table: GimbalsTable) -> Base:
+    """Attitude of the base."""
+    heading = None if table.heading == "unknown" else table.heading
+    north, east = (0.0, 0.0) if table.tilt is None else table.tilt.values
+    tilt_u = (0.0, 0.0) if table.tilt is None else tuple(each.u for each in table.tilt.quantities)
+    return Base(
+        table.frame,
+        0.0 if heading is None else heading.value,
+        (north, east),
+        0.0 if heading is None else heading.u,
+        (tilt_u[0], tilt_u[1]),
+    )
+
+
+def limits_of(table: GimbalsTable, where: object) -> dict[str, tuple[float, float]]:
+    """Allowed range (low, high) [rad] of the gimbal angles that have one, by name.
+
+    Raises `StudyError` for ends out of order.
+    """
+    limits: dict[str, tuple[float, float]] = {}
+    for name, joint in zip(JOINTS, GimbalLimitsTable.model_fields, strict=True):
+        ends: Several | None = getattr(table.limits, joint)
+        if ends is None:
+            continue
+        low, high = ends.values
+        if not low < high:
+            raise StudyError(
+                where, f"rig.limits.{joint}: found {shown(ends.typed)}, expected the lower end first"
+            )
+        limits[name] = (low, high)
+    return limits
+
+
+FEWEST = 10
+"""Rows of a plan below which there is nothing to find out."""
+
+_ANGLE = QuantityText("angle", "180 deg", lambda angle: angle != 0.0, "an angle other than 0")
+_RATE = QuantityText("rate", "1 deg/s", positive, "a rate above zero")
+_TIME = QuantityText("time", "60 s", positive, "a time above zero")
+_START = SeveralTexts(QuantityText("angle", "0 deg"), "x, y, z")
+_EXPECTED = '["z", "180 deg"], with a third entry for its rate, or ["rest", "60 s"]'
+
+RateAbove = Annotated[Quantity, _RATE]
+
+
+@dataclass(frozen=True)
+class TypedMove:
+    """A turn or a rest, and the list of texts that was typed."""
+
+    move: Move
+    typed: list[str]
+
+
+class MoveTexts(AsTyped):
+    """Makes a pydantic field read a turn or a rest."""
+
+    def parse(self, typed: object) -> TypedMove:
+        """Read one; refusals go to pydantic, which knows the key."""
+        match typed:
+            case ["rest", str(time)]:
+                return TypedMove(Rest(_TIME.parse(time).value), ["rest", time])
+            case ["x" | "y" | "z" as joint, str(angle)]:
+                return TypedMove(Turn(joint, _ANGLE.parse(angle).value), [joint, angle])
+            case ["x" | "y" | "z" as joint, str(angle), str(rate)]:
+                turn = Turn(joint, _ANGLE.parse(angle).value, _RATE.parse(rate).value)
+                return TypedMove(turn, [joint, angle, rate])
+        raise refusal(f"found {shown(typed)}, expected a turn such as {_EXPECTED}")
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """A list of texts that begins with a joint, or with rest."""
+        angle, rate, time = (
+            each.__get_pydantic_json_schema__(schema, handler) for each in (_ANGLE, _RATE, _TIME)
+        )
+        joint = {"enum": list(get_args(JointName))}
+        return {
+            "type": "array",
+            "minItems": 2,
+            "anyOf": [
+                {"prefixItems": [joint, angle, rate], "maxItems": 3},
+                {"prefixItems": [{"const": "rest"}, time], "maxItems": 2},
+            ],
+        }
+
+
+class PlanTable(Strict):
+    """Commands to the gimbals: turns one after the other, or a path by its name."""
+
+    turns: list[Annotated[TypedMove, MoveTexts()]] | None = Field(
+        default=None,
+        min_length=1,
+        description=f"one after the other, each a joint and an angle, as {_EXPECTED}",
+    )
+    path: Literal["paper", "paper two turns", "best", "plain"] | None = Field(
+        default=None, description="instead: a path by its name, at the rate of the plan"
+    )
+    rate: RateAbove | None = Field(default=None, description="of the turns; 1 deg/s if absent")
+    step: Duration | None = Field(default=None, description="from row to row; 0.2 s if absent")
+    start: Annotated[Several, _START] | None = Field(
+        default=None, description="angles of the joints x, y, z at the start; 0 if absent"
+    )
+
+
+def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
+    """The plan; its angles within the ``limits`` [rad].
+
+    Raises `StudyError` for neither or both of turns and path, too few or too many rows, or angles beyond the limits.
+    """
+    match table:
+        case PlanTable(turns=None, path=str(name)):
+            plan = path(name)
+        case PlanTable(turns=list(turns), path=None):
+            plan = Plan(tuple(each.move for each in turns))
+        case _:
+            given = "both turns and path" if table.turns else "neither turns nor path"
+            raise StudyError(where, f"plan: found {given}, expected one of them")
+    if table.rate is not None:
+        plan = replace(plan, rate=table.rate.value)
+    if table.step is not None:
+        plan = replace(plan, step=table.step.value)
+    if table.start is not None:
+        x, y, z = table.start.values
+        plan = replace(plan, start=(x, y, z))
+    rows = plan.duration / plan.step
+    if not FEWEST <= rows <= LIMITS.most_rows:
+        raise StudyError(
+            where,
+            f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {LIMITS.most_rows:,}",
+        )
+    if beyond := plan.beyond(limits):
+        low, high = limits[beyond[0]]
+        raise StudyError(
+            where,
+            f"plan: found turns that take {beyond[0]} beyond rig.limits, expected them within "
+            f"{math.degrees(low):.6g} deg to {math.degrees(high):.6g} deg",
+        )
+    return plan

@@ -1,0 +1,223 @@
+"""Faults that the residuals of a test show, and those that they could not show: F-tests at a stated risk.
+
+A fault with columns Z changes the readings by Z theta. Where it is fitted beside the terms, with the noise estimated
+anew, and C is the covariance of theta, ``theta^T C^-1 theta / m`` follows F(m, nu) in a sound test: exactly where there
+is noise alone, and as nearly as Welch and Satterthwaite's nu says where the stated errors of the table cause a part.
+The same risk, divided by the number of faults, holds for each. Candidates come from `inercal.estimate.hypotheses`,
+ranked by their score, which costs no fit.
+
+Of faults that are not significant, one beyond what chance does to most counts in u with the shift that it would be:
+else a fault that is too small for the test, and large for a value, would pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.hypotheses import Fits, Hypothesis, search
+from inercal.turntable.limits import LIMITS
+from inercal.turntable.positions.faults import Fault, faults
+from inercal.turntable.readings import Readings
+from inercal.turntable.regression import Regression
+from inercal.turntable.weights import whitened
+
+MOST = 4
+"""Faults named at most, one beside the other."""
+
+SIMPLER = 0.8
+"""Logarithm of the chance of a fault, over that of the likeliest, with which one of fewer parameters goes before it."""
+
+TINY = 1e-300
+"""Least chance that has a logarithm."""
+
+SEEN = 0.01
+"""Part of a fault's effect outside the terms below which it counts as no more than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A fault in the residuals: ``base`` (m, r) its parameters that show, ``columns`` (n c + q, r) what is left of them
+    beside the terms, and ``spread`` (m, m) a root of the covariance of all its parameters."""
+
+    fault: Fault
+    base: Array
+    columns: Array
+    spread: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tested:
+    """A fault that was fitted beside the terms: its ``values`` (m,), and their probability by ``chance``."""
+
+    fault: Fault
+    values: Array
+    chance: float
+
+
+@dataclass(frozen=True)
+class Examination:
+    """The faults in the residuals: ``significant`` ones, ``doubtful`` ones of which chance is the likelier cause, and
+    all that were ``asked`` for."""
+
+    significant: tuple[Tested, ...]
+    doubtful: tuple[Tested, ...]
+    asked: tuple[Seen, ...]
+
+
+class _White:
+    """The judge of residuals that are white already."""
+
+    def residuals(self, case: Array) -> Array:
+        """The residuals themselves."""
+        return case
+
+    def misfit(self, case: Array) -> float:
+        """Sum of their squares."""
+        return float(case @ case)
+
+
+def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> Examination:
+    """Ask a fit of the readings for every fault; ``noise`` (c,) as stated."""
+    first_fit = fit
+    first, residuals = _seen(fit, faults(means, fit))
+    asked, significant = first, list[Tested]()
+    while True:
+        tested = _likely(fit, noise, asked, residuals)
+        risk = LIMITS.residual_risk / max(len(first), 1)
+        if not tested or tested[0].chance > risk or len(significant) == MOST:
+            break
+        significant.append(tested[0])
+        fit = _refitted(fit, noise, next(each for each in asked if each.fault is tested[0].fault))
+        names = {each.fault.name for each in significant}
+        asked, residuals = _seen(fit, (each for each in faults(means, fit) if each.name not in names))
+    if not first_fit.effects.free.size + first_fit.effects.random.size:
+        significant += _within_dwells(means, first, {each.fault.code for each in significant})
+    named = {_place(each.fault) for each in significant}
+    doubtful: dict[tuple[str, bytes], Tested] = {}
+    for each in tested:
+        if each.chance < LIMITS.doubtful and _place(each.fault) not in named:
+            doubtful.setdefault(_place(each.fault), each)
+    return Examination(tuple(significant), tuple(doubtful.values()), tuple(first))
+
+
+def _place(fault: Fault) -> tuple[str, bytes]:
+    """Code of a fault with the channels that it acts on."""
+    return fault.code, np.any(fault.columns, axis=(0, 2)).tobytes()
+
+
+def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> Iterator[Tested]:
+    """Drifts that the samples within the dwells show, the likeliest of each code but of ``codes``.
+
+    The slopes scatter from dwell to dwell as they do, whatever the noise: an F-test of one and n - 1 degrees of
+    freedom.
+    """
+    from scipy.special import fdtrc
+
+    slopes = means.slopes * (means.times[-1] - means.times[0])
+    tested = []
+    for fault in (
+        each.fault for each in asked if each.fault.within is not None and each.fault.code not in codes
+    ):
+        assert fault.within is not None
+        k = int(np.argmax(np.abs(fault.within).max(axis=0)))
+        rate, slope = fault.within[:, k], slopes[:, k]
+        if np.isfinite(slope).all() and len(slope) > 2:
+            value = float(rate @ slope / (rate @ rate))
+            left = float(np.square(slope - rate * value).sum()) / (len(slope) - 1)
+            chance = float(fdtrc(1, len(slope) - 1, value**2 * (rate @ rate) / left)) if left else 1.0
+            what = f"{fault.what.rstrip(',')}, as it drifts within the dwells,"
+            tested.append(Tested(replace(fault, what=what), np.array([value]), chance))
+    named: set[str] = set()
+    for each in sorted(tested, key=lambda each: each.chance):
+        if each.chance < LIMITS.dwell_risk / len(tested) and each.fault.code not in named:
+            named.add(each.fault.code)
+            yield each
+
+
+def _likely(
+    fit: Regression, noise: Sequence[float | None], asked: Sequence[Seen], residuals: Array
+) -> list[Tested]:
+    """Faults whose score is beyond what is usual by chance, with their F-tests, the least by chance first."""
+    by_name, tested = {each.fault.name: each for each in asked}, list[Tested]()
+
+    def try_all(case: Array, fits: Iterator[Fits[Array]]) -> None:
+        tested.extend(f_test(fit, noise, by_name[each[-1].hypothesis.name]) for each in fits)
+
+    table = [_hypothesis(each) for each in asked]
+    search(residuals, lambda _: table, _White(), LIMITS.screen * len(table), 1, choose=try_all)
+    tested.sort(key=lambda each: each.chance)
+    # a heading that is wrong is a field to the ground too: of faults that explain about as much the simplest
+    as_good = [
+        each for each in tested if np.log(each.chance + TINY) < SIMPLER * np.log(tested[0].chance + TINY)
+    ]
+    simplest = min(as_good, key=lambda each: len(each.values), default=None)
+    return tested if simplest is None else [simplest, *(each for each in tested if each is not simplest)]
+
+
+def _seen(fit: Regression, asked: Iterable[Fault]) -> tuple[list[Seen], Array]:
+    """The faults beside the terms, and the whitened residuals, both orthogonal to all that is fitted."""
+    weight = fit.weights(fit.noise)
+    n, c, _ = fit.rows.shape
+    white = whitened(fit.rows, fit.residuals, weight)
+    Q = np.linalg.qr(white.rows)[0]
+    pad = white.rows.shape[0] - n * c
+
+    def beside(columns: Array) -> Array:
+        whole = np.concatenate([columns, np.zeros((pad, columns.shape[1]))])
+        return np.asarray(whole - Q @ (Q.T @ whole))
+
+    made = []
+    for fault in asked:
+        whole = (white.inverse @ fault.columns).reshape(n * c, -1)
+        size = np.linalg.norm(whole, axis=0)
+        size[size == 0.0] = 1.0
+        left = beside(whole / size)
+        _, s, vt = np.linalg.svd(left, full_matrices=False)
+        known = s > SEEN
+        spread = vt.T / np.maximum(s, SEEN) / size[:, None]
+        base = spread[:, known]
+        made.append(Seen(fault, base, beside(whole @ base), spread))
+    return made, beside(white.right[:, None])[:, 0]
+
+
+def _hypothesis(seen: Seen) -> Hypothesis[Array]:
+    """A fault as the search takes it, in units of its parameters' uncertainties."""
+    names = tuple(str(k) for k in range(seen.base.shape[1]))
+    return Hypothesis(
+        seen.fault.name,
+        seen.fault.code,
+        seen.fault.what,
+        lambda residuals, values: residuals - seen.columns @ values,
+        names,
+        left_out=0 if names else 10**9,  # one that cannot be seen is never found
+    )
+
+
+def _refitted(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Regression:
+    """The fit with a fault beside its terms."""
+    return fit.with_effects(fit.effects.beside(seen.fault.columns @ seen.base), noise)
+
+
+def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested:
+    """The F-test of a fault beside a fit, with the ``noise`` (c,) as stated."""
+    from scipy.special import chdtrc, fdtrc
+
+    before, m = len(fit.effect), seen.base.shape[1]
+    try:
+        now = _refitted(fit, noise, seen)
+    except np.linalg.LinAlgError:
+        return Tested(seen.fault, np.zeros(seen.base.shape[0]), 1.0)
+    values, C = now.effect[before:], now.effect_covariance[before:, before:]
+    statistic = float(values @ np.linalg.solve(C, values)) / m
+    # share of each channel's noise in the covariance of the fault
+    parts = [
+        np.trace(np.linalg.solve(C, s**2 * g @ g.T)) / m
+        for s, g in zip(now.noise, np.moveaxis(now.effect_gain[before:], -1, 0), strict=True)
+    ]
+    nu = 1.0 / max(float(np.sum(np.square(parts) / now.noise_dof)), 1e-12)
+    chance = float(fdtrc(m, nu, statistic)) if nu < 1e6 else float(chdtrc(m, m * statistic))
+    return Tested(seen.fault, seen.base @ values, chance)

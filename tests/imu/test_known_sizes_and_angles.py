@@ -1,0 +1,312 @@
+"""Pose means, known rates and known turns: against truth by simulators of plain NumPy, and against real recordings."""
+
+import numpy as np
+import pytest
+from recordings import shipped
+
+from inercal.findings import Status
+from inercal.geometry.site import GravityInput, Site
+from inercal.imu.figures import page, pictures
+from inercal.imu.settings import (
+    Exclusion,
+    ImuSettings,
+    KnownRatesSettings,
+    KnownTurnsSettings,
+    MeansSettings,
+)
+from inercal.imu.task import calibrate, calibrate_files
+from inercal.inputs import Source
+from inercal.instruments.terms import GYRO_TRIAD
+from inercal.records.column import Column
+from inercal.records.record import Record
+from inercal.units import parse_unit
+
+G = 9.81
+SITE = Site(G, (GravityInput("gravity", 2e-4, "m/s^2", 1.0),), 0.8, 0.0)
+RPM = np.pi / 30.0
+RATES, RATES_U = RPM * np.array([0.0, 33.333, 45.0]), RPM * np.array([0.0, 0.015, 0.02])
+ANGLES, ANGLES_U = np.radians([361.338, 367.160, 363.670]), np.radians([0.05, 0.05, 0.05])
+TILT = np.radians(0.1)
+
+
+def record_of(sensor, values, t=None, unit="count"):
+    """A record of one triad (n, 3), its rows counted where there is no time."""
+    t = np.arange(len(values), dtype=float) if t is None else t
+    source = Source("made", "")
+    columns = [
+        Column(f"{sensor}_{axis}", parse_unit(unit), np.ascontiguousarray(column), t, source)
+        for axis, column in zip("xyz", values.T, strict=True)
+    ]
+    return Record({column.name: column for column in columns}, (), (source,))
+
+
+def directions(rng, n):
+    x = rng.normal(size=(n, 3))
+    return x / np.linalg.norm(x, axis=1, keepdims=True)
+
+
+def triad(rng, scale):
+    """True bias, scale and upper misalignments (9,), and the outputs for inputs (n, 3)."""
+    truth = np.concatenate(
+        [100.0 * rng.normal(size=3), scale * (1 + 0.02 * rng.normal(size=3)), 0.01 * rng.normal(size=3)]
+    )
+    M = np.array([[1.0, truth[6], truth[7]], [0.0, 1.0, truth[8]], [0.0, 0.0, 1.0]])
+    return truth, lambda x: x @ (truth[3:6, None] * M).T + truth[:3]
+
+
+def pose_means(rng, n=24, noise=0.3):
+    truth, outputs = triad(rng, 400.0)
+    gravity = G + 2e-4 * rng.normal()
+    return truth, outputs(gravity * directions(rng, n)) + noise * rng.normal(size=(n, 3))
+
+
+def platter(rng, noise=0.5, wow=1e-4, off=(0.0, 0.0, 0.0), orientations=(6, 15, 15)):
+    """Truth, and the rows of each rate, whose true values are off by what is stated and a relative ``off`` more."""
+    truth, outputs = triad(rng, 4000.0)
+    rows = []
+    for rate, u, more, n in zip(RATES, RATES_U, off, orientations, strict=True):
+        true = (rate + u * rng.normal()) * (1.0 + more)
+        x = true * (1.0 + wow * rng.normal(size=(n, 1))) * directions(rng, n)
+        rows.append(outputs(x) + noise * rng.normal(size=(n, 3)))
+    return truth, rows
+
+
+def turns(rng, tilt=TILT, drift=0.0, noise=2.0):
+    """Truth (12,) and recordings of 16 s at 100 Hz, each with a turn of 6 s after 5 s."""
+    scale = 940.0 * (1 + 0.02 * rng.normal(size=3))
+    T = np.where(np.eye(3) > 0, 1.0, 0.01 * rng.normal(size=(3, 3)))
+    bias = 20.0 * rng.normal(size=3)
+    t = np.arange(0.0, 16.0, 0.01)
+    profile = np.where((t > 5.0) & (t < 11.0), 1.0 - np.cos(2.0 * np.pi * (t - 5.0) / 6.0), 0.0) / 6.0
+    records = []
+    for j in range(3):
+        axis = np.eye(3)[j] + tilt * rng.normal(size=3) * (np.arange(3) != j)
+        rate = (ANGLES[j] + ANGLES_U[j] * rng.normal()) * np.outer(profile, axis / np.linalg.norm(axis))
+        output = (
+            rate @ (scale[:, None] * T).T + bias + drift * t[:, None] + noise * rng.normal(size=rate.shape)
+        )
+        records.append(record_of("gyro", output, t))
+    off_diagonal = [T[i, j] for i in range(3) for j in range(3) if i != j]
+    return np.concatenate([bias + 8.0 * drift, scale, off_diagonal]), records
+
+
+def by_means(values, **more):
+    return calibrate(record_of("acc", values), ImuSettings(SITE, method=MeansSettings(), **more)).estimate
+
+
+def by_rates(rows, rates=RATES, u=RATES_U):
+    records = [record_of("gyro", each) for each in rows]
+    return calibrate_files(
+        records, ImuSettings(SITE, method=KnownRatesSettings(tuple(rates), tuple(u)))
+    ).estimate
+
+
+def by_turns(records, alignment=TILT):
+    options = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), alignment)
+    return calibrate_files(records, ImuSettings(SITE, method=options)).estimate
+
+
+def drawn(method, rng):
+    """The truth of one draw, and its estimate."""
+    if method == "means":
+        truth, values = pose_means(rng)
+        return truth, by_means(values)
+    if method == "known_rates":
+        truth, rows = platter(rng)
+        return truth, by_rates(rows)
+    truth, records = turns(rng)
+    return truth, by_turns(records)
+
+
+def covered(method, runs, seed):
+    """Share of coefficients in their intervals of 95 %, and of runs that end ok."""
+    rng = np.random.default_rng(seed)
+    inside, ok = [], []
+    for _ in range(runs):
+        truth, estimate = drawn(method, rng)
+        ends = [p.interval() for p in estimate.parameters.values()]
+        inside += [low <= value <= high for (low, high), value in zip(ends, truth, strict=True)]
+        ok.append(estimate.status is Status.OK)
+    return float(np.mean(inside)), float(np.mean(ok))
+
+
+@pytest.mark.parametrize("method", ["means", "known_rates", "known_turns"])
+def test_intervals_cover_the_truth(method):
+    """Coefficients of a run are correlated: some three independent ones a run at worst, 60 of 95 %; 3.3 sigma low."""
+    share, ok = covered(method, 20, 11)
+    assert share > 0.95 - 3.3 * np.sqrt(0.95 * 0.05 / 60.0)
+    assert ok >= 0.9
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("method", ["means", "known_rates", "known_turns"])
+def test_intervals_cover_the_truth_in_many_runs(method):
+    share, ok = covered(method, 500, 12)
+    assert 0.95 - 3.3 * np.sqrt(0.95 * 0.05 / 1500.0) < share
+    assert ok >= 0.98
+
+
+def test_exact_rows_give_the_truth():
+    """Closed form: rows without noise are fitted to rounding."""
+    rng = np.random.default_rng(1)
+    truth, outputs = triad(rng, 400.0)
+    np.testing.assert_allclose(by_means(outputs(G * directions(rng, 14))).values, truth, rtol=1e-8, atol=1e-8)
+    truth, outputs = triad(rng, 4000.0)
+    rows = [outputs(rate * directions(rng, 12)) for rate in RATES]
+    np.testing.assert_allclose(by_rates(rows).values, truth, rtol=1e-7, atol=1e-6)
+
+
+def test_an_exact_turn_gives_the_column_of_its_axis():
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, 12.0, 0.01)
+    rate = np.where((t > 3.0) & (t < 8.0), 1.0, 0.0)
+    gain = np.array([[940.0, 9.0, -5.0], [3.0, 950.0, 8.0], [-7.0, 2.0, 930.0]])
+    records = []
+    for j in range(3):
+        turned = ANGLES[j] / np.trapezoid(rate, t) * np.outer(rate, gain[:, j])
+        records.append(record_of("gyro", turned + 3.0 + 1e-9 * rng.normal(size=turned.shape), t))
+    estimate = by_turns(records)
+    scale = np.diag(gain)
+    T = [gain[i, j] / scale[i] for i in range(3) for j in range(3) if i != j]
+    np.testing.assert_allclose(estimate.values, [3.0, 3.0, 3.0, *scale, *T], rtol=1e-9, atol=1e-9)
+    assert estimate.names == GYRO_TRIAD
+
+
+def test_poses_in_a_plane_leave_terms_open_and_say_so():
+    rng = np.random.default_rng(3)
+    _, outputs = triad(rng, 400.0)
+    angle = np.linspace(0.0, 2.0 * np.pi, 15)[:-1]
+    flat = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    estimate = by_means(outputs(G * flat) + 0.3 * rng.normal(size=(14, 3)))
+    assert estimate.status is Status.UNOBSERVABLE
+    assert "z up" in estimate.message
+    assert by_means(outputs(G * directions(rng, 8))).status is Status.TOO_FEW_INTERVALS
+
+
+def test_the_mean_of_a_moving_pose_is_named_and_can_be_left_out():
+    rng = np.random.default_rng(4)
+    truth, values = pose_means(rng)
+    values[7] = truth[:3] + 1.005 * (values[7] - truth[:3])
+    estimate = by_means(values)
+    (finding,) = [each for each in estimate.findings if each.code == "outlying_pose"]
+    assert "pose 8" in finding.message
+    assert estimate.status is Status.SUSPECT
+    without = by_means(values, exclude=Exclusion(poses=(8,)))
+    assert without.status is Status.OK
+    assert np.all(np.abs(without.values - truth) < 4.0 * without.u)
+
+
+def test_samples_of_a_recording_are_no_pose_means():
+    from inercal.errors import RecordError
+
+    record, _ = shipped("xsens")
+    with pytest.raises(RecordError, match=r'most of them like the one before.* imu.method = "multiposition"'):
+        calibrate(record, ImuSettings(SITE, method=MeansSettings()))
+
+
+def test_rates_that_contradict_each_other_are_found():
+    """45 rpm that is 0.4 % less, nine times the u of the two; files in another order."""
+    _, rows = platter(np.random.default_rng(5), off=(0.0, 0.0, -0.004))
+    estimate = by_rates(rows)
+    assert estimate.status is Status.SUSPECT
+    (finding,) = [each for each in estimate.findings if each.code == "rate_suspect"]
+    assert "against 33.333 rpm 45 rpm seems -" in finding.message
+    swapped = by_rates([rows[0], rows[2], rows[1]])
+    assert swapped.status is not Status.OK
+
+
+def test_an_orientation_that_moved_is_named():
+    truth, rows = platter(np.random.default_rng(6))
+    rows[1][3] = truth[:3] + 1.01 * (rows[1][3] - truth[:3])
+    estimate = by_rates(rows)
+    (finding,) = [each for each in estimate.findings if each.code == "outlying_pose"]
+    assert "row 4" in finding.message
+    assert estimate.status is Status.SUSPECT
+
+
+def test_steady_stretches_of_a_recording_are_the_orientations():
+    """A platter that is stopped between orientations: the rows are found, the stops left out."""
+    rng = np.random.default_rng(7)
+    truth, outputs = triad(rng, 4000.0)
+    records = []
+    for rate, n in zip(RATES, (3, 14, 14), strict=True):
+        level, moving = [], []
+        for axis in directions(rng, n):
+            level += [rate * axis] * 500 + [np.zeros(3)] * 620
+            moving += [False] * 500 + [True] * 60 + [False] * 500 + [True] * 60
+        x = np.array(level) + np.array(moving)[:, None] * 0.5 * rng.normal(size=(len(level), 3))
+        t = np.arange(len(x)) / 100.0
+        records.append(record_of("gyro", outputs(x) + 3.0 * rng.normal(size=x.shape), t))
+    options = KnownRatesSettings(tuple(RATES), tuple(RATES_U))
+    calibration = calibrate_files(records, ImuSettings(SITE, method=options))
+    assert np.count_nonzero(calibration.orientations.file > 0) == 28
+    assert calibration.orientations.left_out >= 20
+    estimate = calibration.estimate
+    assert np.all(np.abs(estimate.values - truth) < 4.0 * estimate.u)
+
+
+def test_turns_against_their_sense_or_about_another_axis_are_found():
+    _, records = turns(np.random.default_rng(8))
+    estimate = by_turns([records[1], records[0], records[2]])
+    assert estimate.status is Status.INCONSISTENT
+    assert "channel_swap" in {finding.code for finding in estimate.findings}
+    options = KnownTurnsSettings((-ANGLES[0], ANGLES[1], ANGLES[2]), tuple(ANGLES_U))
+    estimate = calibrate_files(records, ImuSettings(SITE, method=options)).estimate
+    assert "sign_suspect" in {finding.code for finding in estimate.findings if finding.harm}
+
+
+def test_a_turn_without_rest_is_refused_in_words():
+    _, records = turns(np.random.default_rng(9))
+    estimate = by_turns([records[0].between(4.8), *records[1:]])
+    assert estimate.status is Status.TOO_FEW_INTERVALS
+    assert "turn about x" in estimate.message
+
+
+@pytest.mark.slow
+def test_pose_means_of_a_real_unit_give_what_its_recording_gives():
+    record, settings = shipped("xsens")
+    whole = calibrate(record, settings)
+    means = calibrate(
+        record_of("acc", whole.poses.means), ImuSettings(settings.site, method=MeansSettings())
+    ).estimate
+    np.testing.assert_allclose(means.values, whole.estimate.values[:9], rtol=1e-6, atol=1e-6)
+    assert means.status is Status.OK
+
+
+def test_turns_of_a_real_unit_give_what_ferraris_gives():
+    """The turns of a session by hand, each with the rest around it, and the gyro alone."""
+    record, settings = shipped("ferraris-si")
+    whole = calibrate(record, settings)
+    begin = float(record["gyro_x"].t[0])
+    sections = {row["section"]: row for row in whole.estimate.result["sections"]}
+    records = [
+        record.between(
+            sections[f"{axis}_rot"]["start_s"] - begin - 2.0, sections[f"{axis}_rot"]["end_s"] - begin + 2.0
+        )
+        for axis in "xyz"
+    ]
+    turn = settings.method.turn
+    options = KnownTurnsSettings((turn,) * 3, (np.radians(2.0),) * 3, np.radians(0.5))
+    alone = calibrate_files(records, ImuSettings(settings.site, method=options)).estimate
+    for axis in "xyz":
+        here, there = alone[f"S_{axis}"], whole.estimate[f"S_{axis}"]
+        assert abs(here.value - there.value) < 3.0 * np.hypot(here.u, there.u)
+
+
+@pytest.mark.parametrize("method", ["means", "known_rates", "known_turns"])
+def test_pages_show_the_method(method):
+    rng = np.random.default_rng(10)
+    if method == "means":
+        records = [record_of("acc", pose_means(rng)[1])]
+        options = MeansSettings()
+    elif method == "known_rates":
+        records = [record_of("gyro", each) for each in platter(rng)[1]]
+        options = KnownRatesSettings(tuple(RATES), tuple(RATES_U))
+    else:
+        records = turns(rng)[1]
+        options = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), TILT)
+    calibration = calibrate_files(records, ImuSettings(SITE, method=options))
+    titles = [picture.title for picture in pictures(calibration)]
+    assert titles[0] == {"means": "Poses", "known_rates": "Orientations", "known_turns": "Turns"}[method]
+    assert len(titles) >= 4
+    assert titles[0] in page(calibration)
