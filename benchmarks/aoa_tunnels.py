@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from benchmarks.independent.aoa import AXES, BUFFETS, CASES, DEG, G, R, Tunnel, simulate
 
-from inercal.aoa.diagnosis.snap import with_snap
+from inercal.aoa.diagnosis.choice import decided
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.layout import Layout
@@ -41,7 +41,7 @@ def rows(seeds: int) -> Iterator[tuple[str, tuple[float, float, float], tuple[fl
             run = simulate(Tunnel(kind, duration=30.0, **CASES[name]), seed)
             recording, late = plain(run.t, run.acc, run.gyro), run.t > 2.0
             prompt = replace(STUDY, timing=Timing(0.0))
-            for k, settings in enumerate((prompt, with_snap(recording, STUDY))):
+            for k, settings in enumerate((prompt, decided(recording, STUDY))):
                 filtered = estimate(recording, problem(settings))
                 error, u = (filtered.theta - run.theta)[late], filtered.u[late]
                 answered = np.isfinite(error)

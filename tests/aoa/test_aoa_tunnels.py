@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from benchmarks.independent.aoa import CASES, DEG, G, Tunnel, simulate
+from benchmarks.independent.aoa import CASES, DEG, LINES, G, Tunnel, simulate
 from sting_study import study
 
-from inercal.aoa.diagnosis.snap import with_snap
+from inercal.aoa.diagnosis.choice import decided
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.recording import plain
@@ -63,7 +63,7 @@ def test_in_a_buffet_the_snap_is_that_of_the_data(kind):
     for name in BUFFETS:
         for seed in range(3):
             recording, run = recorded(name, seed, duration=20.0, kind=kind)
-            chosen = with_snap(recording, study())
+            chosen = decided(recording, study())
             filtered = estimate(recording, problem(chosen))
             late = run.t > 2.0
             error = (filtered.theta - run.theta)[late]
@@ -75,21 +75,54 @@ def test_in_a_buffet_the_snap_is_that_of_the_data(kind):
 
 def test_a_calm_motion_keeps_the_usual_snap():
     for kind in ("sine", "polar", "rest"):
-        settings = study()
-        assert with_snap(recorded("quiet", 1, duration=12.0, kind=kind)[0], settings) is settings
+        chosen = decided(recorded("quiet", 1, duration=12.0, kind=kind)[0], study())
+        assert chosen.estimator.snap is None
+        assert not len(chosen.band.sections)
 
 
 def test_a_snap_is_chosen_by_its_size_and_not_by_noise():
     """0.1 deg rms of 5 to 40 Hz asks for 1e11; four times the stated noise alone for nothing."""
     recording, _ = recorded("buffet 0.1 deg, 5-40 Hz", 1, duration=12.0)
-    assert with_snap(recording, study()).estimator.snap == 1e11
+    assert decided(recording, study()).estimator.snap == 1e11
     stated = study(estimator=Estimator(snap=3e9))
-    assert with_snap(recording, stated) is stated
+    assert decided(recording, stated).estimator.snap == 3e9
     loud, _ = recorded("quiet", 1, duration=12.0, acc_noise=4e-4 * G, gyro_noise=0.8 * DEG)
-    assert with_snap(loud, study()).estimator.snap is None
+    assert decided(loud, study()).estimator.snap is None
 
 
-def test_nor_does_it_hide_what_is_no_motion():
-    """Lines, mains and local vibration are no rotation: no snap fits them, and the verdict stays what it was."""
-    for name in ("lines 0.05 g, 47, 112, 230 Hz", "mains 50 mg", "local 0.5 g, 120-240 Hz"):
-        assert with_snap(recorded(name, 1, duration=12.0)[0], study()).estimator.snap is None
+VIBRATIONS = [name for name in LINES if name != "quiet"]
+
+
+def test_lines_and_what_lies_above_the_motion_are_taken_out():
+    """They are no rotation: no snap fits them. A line is notched; of vibration over a whole band is what is below."""
+    chosen = {name: decided(recorded(name, 1, duration=12.0)[0], study()).band for name in VIBRATIONS}
+    assert chosen["mains 50 mg"].notch == pytest.approx([50.0], abs=0.1)
+    of_lines = chosen["lines 0.05 g, 47, 112, 230 Hz"].notch
+    assert sorted(of_lines)[:2] == pytest.approx([47.0, 112.0], abs=0.2)
+    assert 35.0 <= chosen["local 0.5 g, 120-240 Hz"].low_pass <= 70.0
+
+
+def test_a_motion_that_is_there_keeps_its_band():
+    """A buffet of 40 Hz beside lines: no low pass below 80 Hz."""
+    both = {"lines": LINES["lines 0.3 g, 112 and 230 Hz"]["lines"], "buffet": (0.1 * DEG, 5.0, 40.0)}
+    run = simulate(Tunnel("sine", duration=12.0, **both), 1)
+    chosen = decided(plain(run.t, run.acc, run.gyro), study())
+    assert chosen.band.low_pass > 2.0 * 38.0
+    assert sorted(chosen.band.notch)[0] == pytest.approx(112.0, abs=0.2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("smoothed", [False, True])
+@pytest.mark.parametrize("kind", ["sine", "polar", "rest"])
+def test_in_vibration_the_angle_is_good_and_u_is_its_size(kind, smoothed):
+    """Without a band 0.3 to 70 deg off, 24 to 210 u."""
+    ratios = []
+    for name in VIBRATIONS:
+        for seed in range(3):
+            recording, run = recorded(name, seed, duration=20.0, kind=kind)
+            filtered = estimate(recording, problem(decided(recording, study())), smoothed)
+            late = (run.t > 2.0) & (run.t < 19.8)
+            error = (filtered.theta - run.theta)[late]
+            assert np.sqrt(np.mean(error**2)) < 0.05 * DEG, (name, seed)
+            ratios.append(np.mean(np.square(error / filtered.u[late])))
+    assert np.sqrt(np.mean(ratios)) < 1.4

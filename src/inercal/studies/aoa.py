@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from inercal._toml import Strict, check
+from inercal.aoa.band import Band
 from inercal.aoa.settings import (
     DELAY,
     AoaSettings,
@@ -131,6 +132,36 @@ class TimingTable(Strict):
     )
 
 
+def _low_pass(value: object) -> float | None:
+    """A corner frequency [Hz], infinite for none, None for auto."""
+    if value in ("auto", "none"):
+        return None if value == "auto" else math.inf
+    if not isinstance(value, str):
+        raise refusal(f'found {shown(value)}, expected "auto", "none" or a frequency, such as "35 Hz"')
+    return QuantityText("frequency", "35 Hz", FREQUENCY.accept, FREQUENCY.words).parse(value).value
+
+
+_LowPass = Annotated[
+    float | None,
+    PlainValidator(_low_pass),
+    PlainSerializer(lambda f: "auto" if f is None else "none" if f == math.inf else f"{f!r} Hz"),
+    WithJsonSchema({"type": "string", "examples": ["auto", "35 Hz", "none"]}),
+]
+
+
+class BandTable(Strict):
+    """The filter of all sensors before the fusion: causal, its delay known to the model; zero phase if smoothed."""
+
+    low_pass: _LowPass = Field(
+        default=None,
+        description="corner of the low pass; none; auto: none where the sensors fit each other, or the widest of 100 "
+        "to 35 Hz above twice the motion under which they do, and notches at lines of the spectrum",
+    )
+    notch: list[_Frequency] = Field(
+        default=[], description="frequencies that are taken out", examples=[["50 Hz"]]
+    )
+
+
 class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
     """The fusion of all sensors."""
 
@@ -181,6 +212,9 @@ class AoaStudyFile(Strict):
         description="what a simulation adds to the model",
     )
     timing: TimingTable = Field(default=TimingTable(), title="Timing", description="delays of the sensors")
+    band: BandTable = Field(
+        default=BandTable(), title="Band", description="what of the sensors the fusion takes"
+    )
     estimator: EstimatorTable = Field(default=EstimatorTable(), title="Estimator", description="the fusion")
     methods: Stated[Methods] = Field(default=Methods(), title="Methods", description="the paper's way")
     model: Stated[ModelAttitude] = Field(
@@ -207,6 +241,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         prior=_prior(file.prior),
         sensors=sensors,
         timing=_timing(file.timing),
+        band=Band(file.band.low_pass, tuple(each.value for each in file.band.notch)),
         estimator=_estimator(file.estimator, path),
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),

@@ -44,6 +44,9 @@ _TURNS = 1e3
 OUTPUTS = 5
 """Columns of a row of output before the innovations: theta, its u, rate, its u, acceleration."""
 
+MOTION = 25
+"""Columns of a motion that is carried on from a row (`inercal.aoa.fusion.ahead`)."""
+
 BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, a stated angle and its u, roll and yaw."""
 
@@ -81,6 +84,8 @@ class Kept(NamedTuple):
 
 
 NOT_KEPT = Kept(np.empty((0, 0)), 1, 0)
+
+NO_MOTIONS = np.empty((0, MOTION))
 
 
 class Memory(NamedTuple):
@@ -267,23 +272,48 @@ def write(x: Array, P: Array, constants: Constants, out: Array, k: int) -> None:
     out[k, 3] = root(rate)
 
 
+@kernel
+def moving(x: Array, P: Array, p: float, y: float, model: Model, out: Array) -> None:
+    """Put theta, rate, acceleration and jerk into ``out`` (`MOTION`,), their covariance, cosine of the roll and rate of
+    theta by yaw, the roll, its u and its rate; ``p``, ``y`` are indications of the roll and yaw gyros."""
+    roll = model.places.roll
+    for i in range(4):
+        out[i] = x[i]
+        for j in range(4):
+            out[4 + 4 * i + j] = P[i, j]
+    out[20], out[21], out[22], out[23], out[24] = 1.0, 0.0, math.nan, math.nan, 0.0
+    if roll >= 0:
+        s, c, st, ct = math.sin(x[roll]), math.cos(x[roll]), math.sin(x[0]), math.cos(x[0])
+        p, y = p - x[roll + 1], y - x[roll + 2]
+        out[20], out[21], out[22], out[23] = c, s * y, x[roll], root(P[roll, roll])
+        out[24] = p + (x[1] * s - y * c) * st * ct / (ct * ct + 1e-4)
+
+
 def advance(
-    belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept = NOT_KEPT, memory: Memory = NONE
+    belief: Belief,
+    rows: Rows,
+    model: Model,
+    out: Array,
+    kept: Kept = NOT_KEPT,
+    memory: Memory = NONE,
+    motions: Array = NO_MOTIONS,
 ) -> int:
     """Go on by m rows; the number of rows done.
 
     ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over their standard deviations;
-    ``memory`` is filled if it has room for m rows.
+    ``memory`` is filled if it has room for m rows, and so are ``motions`` (m, `MOTION`), as of `moving`.
 
     Ends before a row in which theta is lost: its variance is too large, it is no angle any more, or a sensor has
     surprised too often.
     """
-    done: int = _advance(belief, rows, model, out, kept, memory)
+    done: int = _advance(belief, rows, model, out, kept, memory, motions)
     return done
 
 
 @kernel
-def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory) -> int:
+def _advance(
+    belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory, motions: Array
+) -> int:
     """The loop of `advance`."""
     x, P, turns = belief
     intervals, z = rows
@@ -340,6 +370,8 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
                     scalars[k, i, of[j]] = entry[j]
                 scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
         write(x, P, constants, out, k)
+        if len(motions) > 0:
+            moving(x, P, p, y, model, motions[k])
         if remember:
             for i in range(d):
                 for j in range(d):
