@@ -157,7 +157,7 @@ WITHIN = {
         "positions rate steps task figures"
     ),
     "aoa": (
-        "limits layout settings angles motion reading fusion paper diagnosis reference result simulate task "
+        "limits band layout settings angles motion reading fusion paper diagnosis reference result simulate task "
         "figures"
     ),
     "selfcal": (
