@@ -19,7 +19,7 @@ from inercal.records.column import Column
 from inercal.records.places import counted, places
 from inercal.records.record import Record, recorded_temperature
 from inercal.selfcal.diagnosis.gross import clipped, implausible, off_the_path
-from inercal.selfcal.filters.gaps import with_held
+from inercal.selfcal.filters.gaps import walked, with_held
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
@@ -59,9 +59,12 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
+    recorded_rate = rate
     rate, held = with_held(t, rate, th, settings.world, all(increment))
     warm = recorded_temperature(record)
-    recording = Recording(t, rate, th, acc, sensor == "gyro", (), record.sources, held, warm)
+    measured = sensor == "gyro"
+    walk = walked(t, recorded_rate, held) if measured and held else None
+    recording = Recording(t, rate, th, acc, measured, (), record.sources, held, warm, walk)
     of_record = [  # without extremes beyond which no motion goes on
         each
         for each in (*worth_saying(record, columns), *findings)

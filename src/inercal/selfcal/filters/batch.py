@@ -158,7 +158,7 @@ def _terms(
         by_earth = -dt[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
         slope[:, :, -3:] += np.swapaxes(to_matrix(propagated), 1, 2) @ by_earth
     residual = boxminus(q[1:], propagated)
-    weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(dt))
+    weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(recording.walking))
     weight[list(loose)] = 1.0 / np.pi
     left = inverse_left_jacobian(residual) * weight[:, None, None]
     miss = boxminus(start.attitude, q[0])
