@@ -61,6 +61,9 @@ class Limits:
     """Standard uncertainties of the first pass of a filter that make the prior of its second one: so far from where it
     is linearised it may go."""
 
+    kept_rows: int = 8192
+    """Rows that a stream keeps to go through them again, linearised anew, each time that they have doubled."""
+
     base_sigma: float = math.radians(2.0 / 60.0)
     """Standard deviation [rad] of beta up to which filters find it from the base as stated: linearising neglects its
     square, 0.07 arcsec, less than what is averaged of the best encoders and accelerometers."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,6 +64,49 @@ def second_pass(
     again = _with_prior(state, about, narrow, problem.prior)
     sound = np.isfinite(again.covariance).all() and (np.diag(again.covariance) > 0.0).all()
     return again if sound else found
+
+
+class Kept(NamedTuple):
+    """Rows that a stream keeps for further passes: of ``rows`` (m, 12) the first ``count``, the first angles and then
+    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked. None of a filter that needs
+    no second pass, or once there are `LIMITS.kept_rows`."""
+
+    rows: Array = np.empty((0, 12))
+    count: int = 0
+
+    @staticmethod
+    def of(kind: FilterKind, problem: FilterProblem, th: Array) -> Kept:
+        """The rows kept from a start with those angles (3,) [rad] on."""
+        if not is_due(kind, problem):
+            return Kept()
+        rows = np.zeros((64, 12))
+        rows[0, 7:10] = th
+        return Kept(rows, 1)
+
+    def after(self, step: Steps, held: bool, walked: float) -> Kept:
+        """The rows with one step more."""
+        if not self.count:
+            return self
+        rows = self.rows
+        rows[self.count] = np.hstack([step.dt, step.rate[0], step.acc[0], step.th[0], held, walked])
+        return Kept(rows, self.count + 1)
+
+    @property
+    def full(self) -> bool:
+        """True where another pass is due."""
+        return 0 < len(self.rows) == self.count
+
+    def passed(self, module: ModuleType, problem: FilterProblem, found: State) -> tuple[State, Kept]:
+        """The state after another pass through all rows kept, and the rows with room for as many more."""
+        first, steps = self.rows[0, 7:10], self.rows[1:]
+        held = np.flatnonzero(steps[:, 10]).tolist()
+        taken = Steps(
+            *(np.ascontiguousarray(steps[:, part]) for part in (0, *map(slice, (1, 4, 7), (4, 7, 10))))
+        )
+        begun = module.initial(problem, first)
+        state = second_pass(module, begun, found, problem, taken, held, steps[:, 11])
+        more = Kept() if self.count >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.count)
+        return state, more
 
 
 def _with_prior(state: State, about: Array, narrow: Array, prior: Array) -> State:
