@@ -11,12 +11,14 @@ from independent.selfcal import BEST, LOW, NOMINAL, THREE, TRUTH, Drive, Faults,
 from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
+from inercal.findings import Status
 from inercal.records.read import read
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.reading import recording_of
+from inercal.selfcal.task import calibrate
 from inercal.studies.load import load_selfcal_study
 
 SILENT = Noise(1e-30, 1e-30, 1e-30)
@@ -91,6 +93,19 @@ def test_without_faults_errors_are_what_u_says(drive, noise, tmp_path):
         found.append(nees(estimate(recording, problem(settings), history=False)))
     low, high = chi2.ppf([0.0005, 0.9995], 18 * len(found)) / (18 * len(found))
     assert low < np.mean(found) / 18 < high
+
+
+@pytest.mark.parametrize("measured", [False, True])
+@pytest.mark.parametrize("ramp", [0.1, 0.3])
+def test_an_ordinary_ramp_is_nothing_to_be_said(ramp, measured, tmp_path):
+    """Rows every 0.2 s."""
+    platform.simulated(np.random.default_rng(1), Drive(THREE, ramp=ramp, measured=measured)).write(
+        tmp_path / "record.csv"
+    )
+    (tmp_path / "study.toml").write_text(platform.study())
+    found = calibrate(read([tmp_path / "record.csv"]), load_selfcal_study(tmp_path / "study.toml")).estimate
+    assert found.status is Status.OK
+    assert [finding.code for finding in found.findings] == ["stated_exact"]
 
 
 def test_faults_do_what_their_words_say():

@@ -61,6 +61,9 @@ class Limits:
     """Standard uncertainties of the first pass of a filter that make the prior of its second one: so far from where it
     is linearised it may go."""
 
+    estimators_apart: float = 0.3
+    """Part of u by which the batch estimator may differ from a filter: what linearising costs it."""
+
     kept_rows: int = 8192
     """Rows that a stream keeps to go through them again, linearised anew, each time that they have doubled."""
 

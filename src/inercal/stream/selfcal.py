@@ -1,10 +1,11 @@
 """A platform calibrated while it turns: rows in, coefficients and their uncertainties out, each at once.
 
-A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file
-(`inercal.selfcal.reading` says how rows are taken). Where a file takes a second pass, a stream goes through all its rows
-again each time that they have doubled, to `LIMITS.kept_rows` (`inercal.selfcal.filters.second_pass`). Rows: the first row with all angles and a rate is the start; where no
-rate is recorded the platform is taken to turn on as before (`inercal.selfcal.filters.gaps`); other missing values are
-not measured. Only time is treated more kindly: a row that is not later than the one before is left out.
+A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file.
+Where a file takes a second pass, a stream goes through all its rows again each time that they have doubled, up to
+`LIMITS.kept_rows` (`inercal.selfcal.filters.second_pass`). Rows are taken as `inercal.selfcal.reading` says: the first
+row with all angles and a rate is the start; where no rate is recorded the platform is taken to turn on as before
+(`inercal.selfcal.filters.gaps`); other missing values are not measured. Only time is treated more kindly: a row that is
+not later than the one before is left out.
 """
 
 from __future__ import annotations
@@ -228,8 +229,8 @@ class Selfcal:
         return state._replace(gaps=state.gaps + 1)
 
     def _rate(self, state: SelfcalState, t: float, rate: Array) -> tuple[SelfcalState, Array, float | None]:
-        """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and where it is held, the time
-        [s] over which its noise gathers."""
+        """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and where it is held, the
+        time [s] over which its noise gathers."""
         whole, gained = bool(np.isfinite(rate).all()), bool(self._gained.all())
         if whole:
             state = state._replace(rate=rate, rated=t if gained else state.t)

@@ -33,6 +33,7 @@ from inercal.selfcal.platform.coefficients import (
     to_product,
 )
 from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.result.comparison import with_stated
 from inercal.selfcal.result.tables import weak_combinations
 from inercal.selfcal.task import compared
 
@@ -97,7 +98,7 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     filters = _all(calibration)
     if len(filters) < 2:
         return []
-    values, u = product_form(calibration.filtered)
+    values, u = with_stated(calibration.filtered, calibration.stated)
     first = calibration.filtered.kind
     apart: dict[str, Array] = {
         kind: (product_form(each)[0] - values) / u for kind, each in filters.items() if kind != first

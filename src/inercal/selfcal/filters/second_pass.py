@@ -68,8 +68,8 @@ def second_pass(
 
 class Kept(NamedTuple):
     """Rows that a stream keeps for further passes: of ``rows`` (m, 12) the first ``count``, the first angles and then
-    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked. None of a filter that needs
-    no second pass, or once there are `LIMITS.kept_rows`."""
+    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked. None of a filter that
+    needs no second pass, or once there are `LIMITS.kept_rows`."""
 
     rows: Array = np.empty((0, 12))
     count: int = 0
