@@ -186,6 +186,22 @@ def test_many_runs_are_judged(folder, capsys):
     assert "simulated many times" in Path("mc.html").read_text()
 
 
+def test_many_runs_go_on_from_a_folder(folder, capsys):
+    """Half of the chunks of a campaign that was killed: the same digits. Another seed is another campaign."""
+    command = ["--runs", "12", "--checkpoint", "kept", "--json", "--quiet"]
+    assert simulated(*command) == 0
+    first = json.loads(capsys.readouterr().out)["result"]
+    chunks = sorted(Path("kept").glob("chunk-*.npz"))
+    times = {each: each.stat().st_mtime_ns for each in chunks[::2]}
+    for each in chunks[1::2]:
+        each.unlink()
+    assert simulated(*command) == 0
+    assert json.loads(capsys.readouterr().out)["result"] == first
+    assert all(each.stat().st_mtime_ns == time for each, time in times.items())
+    assert simulated(*command, "--seed", "2") == 2
+    assert "kept" in capsys.readouterr().err
+
+
 def test_many_runs_with_noise_stated_too_small_fail(folder, capsys):
     """Encoder errors that the study does not state: exit code 1, and the object all the same."""
     harmonics = 'disturbances.harmonics=[{axis="x", order=1, amplitude="30 arcsec", phase="0 deg"}]'
@@ -201,6 +217,7 @@ def test_many_runs_with_noise_stated_too_small_fail(folder, capsys):
         (["--runs", "1"], "--runs: found 1"),
         (["--runs", "5", "--seed", "-1"], "--seed: found -1"),
         (["--runs", "5", "--out", "mc.csv"], "found the suffix '.csv'"),
+        (["--out", "run.csv", "--checkpoint", "kept"], "--checkpoint: found without --runs"),
         (["--out", "run.csv", "--report", "mc.html"], "--report: found without --runs"),
     ],
 )
