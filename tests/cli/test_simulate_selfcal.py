@@ -58,6 +58,7 @@ def test_the_recording_is_that_of_the_seed_in_any_format(suffix, folder):
     assert found.findings == ()
     for name in ("t", "rate", "th", "acc"):
         assert_allclose(getattr(found, name), getattr(expected.recording, name), rtol=1e-13, atol=1e-16)
+    assert_allclose(found.reference, expected.attitude, rtol=1e-13, atol=1e-16)
 
 
 def test_the_object_says_what_was_made(folder, capsys):
@@ -69,7 +70,7 @@ def test_the_object_says_what_was_made(folder, capsys):
     rows = 150 + 50 + 20 + 1
     assert data["result"] == {
         "out": "run.csv", "rows": rows, "seed": 1,
-        "columns": [f"{s}_{i}" for s in ("wc", "th", "acc") for i in "xyz"],
+        "columns": [*(f"{s}_{i}" for s in ("wc", "th", "acc") for i in "xyz"), *(f"q_ref_{k}" for k in range(4))],
     }  # fmt: skip
     assert [source["path"] for source in data["inputs"]] == ["selfcal.toml"]
     head, *lines = Path("run.csv").read_text().splitlines()

@@ -61,7 +61,7 @@ def simulate_selfcal(
     ] = None,
     checkpoint: Annotated[
         Path | None,
-        Parameter(help="Keep finished runs in this folder, and go on from there where it has some."),
+        Parameter(help="Save here what is done, and go on from it where it exists."),
     ] = None,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)

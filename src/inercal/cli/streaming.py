@@ -52,7 +52,7 @@ class StreamOptions:
     """The options of a command that works on a stream."""
 
     checkpoint: Annotated[
-        Path | None, Parameter(help="Save the state to this file, and go on from it where it exists.")
+        Path | None, Parameter(help="Save here what is done, and go on from it where it exists.")
     ] = None
     checkpoint_every: Annotated[
         int, Parameter(converter=whole_number, help="Rows from one save to the next; 1000 if absent.")

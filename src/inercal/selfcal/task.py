@@ -26,10 +26,10 @@ from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.reading import recording_of
-from inercal.selfcal.result.comparison import beside, differing, stated_variance
+from inercal.selfcal.result.comparison import beside, differing, of_attitude, stated_variance
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.result.tables import side_by_side
+from inercal.selfcal.result.tables import of_attitudes, side_by_side
 from inercal.selfcal.settings import SelfcalSettings
 
 
@@ -106,7 +106,9 @@ def calibrate(
         result, message = result | base, message + words
     stated = stated_variance(filtered, estimate.u) if estimate.names else np.zeros(len(of.prior))
     for name, other in compared.items():
-        result["compare"] |= {name: beside(other, verdict(other, recording, settings, faults)[0], stated)}
+        own = verdict(other, recording, settings, faults)[0]
+        result["compare"] |= {name: beside(other, own, stated, recording.reference)}
+    result |= of_attitude(filtered, recording.reference)
     timed = replace(estimate, result=result, message=message, timing={"solve": time.perf_counter() - clock})
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
@@ -138,6 +140,7 @@ def compared(calibration: Calibration) -> list[Table]:
     status = {kind: str(each["status"]) for kind, each in estimate.result.get("compare", {}).items()}
     filters = {first.kind: first} | dict(calibration.compared)
     interval = float(np.median(calibration.recording.dt))
-    return side_by_side(
-        filters, calibration.stated, calibration.truth, interval, status | {first.kind: estimate.status.value}
-    )
+    status |= {first.kind: estimate.status.value}
+    tables = side_by_side(filters, calibration.stated, calibration.truth, interval, status)
+    true = calibration.recording.reference
+    return tables if true is None else [*tables, of_attitudes(filters, true)]

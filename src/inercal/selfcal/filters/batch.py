@@ -87,7 +87,7 @@ def estimate_map(
     for _ in range(ITERATIONS):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # lost numbers are refused below
-                terms = _terms(q, c, recording, problem, measured, first, loose)
+                terms = terms_at(q, c, recording, problem, measured, first, loose)
                 step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
             message = "the iteration diverged: the normal equations are not positive definite"
@@ -137,7 +137,7 @@ class _Terms(NamedTuple):
     prior: Array
 
 
-def _terms(
+def terms_at(
     q: Array,
     c: Array,
     recording: Recording,

@@ -22,6 +22,7 @@ from inercal.selfcal.filters.filter_result import (
     estimate_of,
 )
 from inercal.selfcal.filters.gaps import advance
+from inercal.selfcal.filters.linear import estimate_linear
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.second_pass import is_due, second_pass
 from inercal.selfcal.filters.start import estimate_lm
@@ -33,10 +34,10 @@ _LOADED = set[FilterKind]()
 
 
 def recursive(kind: FilterKind) -> ModuleType | None:
-    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
+    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map``, ``lm`` and ``linear``."""
     return {
         "error-state": error_state, "mukf": multiplicative, "svd-qukf": quaternion, "gimbal-ukf": gimbal,
-        "map": None, "lm": None,
+        "map": None, "lm": None, "linear": None,
     }[kind]  # fmt: skip
 
 
@@ -57,7 +58,7 @@ def estimate(
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
     if module is None:
-        whole = estimate_map if kind == "map" else estimate_lm
+        whole = {"map": estimate_map, "lm": estimate_lm, "linear": estimate_linear}[kind]
         return whole(recording, problem, start, history)
     load_kernels(kind, problem)
     began = time.perf_counter()

@@ -36,6 +36,7 @@ class Recording:
     each step, the step itself if None. ``th`` (n, 3) [rad] gimbal angles, continuous through full
     turns, the first row complete; ``acc`` (n, 3) [m/s^2], the first row not used. ``held``: steps whose rate was not
     recorded (`inercal.selfcal.filters.gaps`). ``temperature``: mean and standard deviation of the recorded one.
+    ``reference`` (n, 4) q_bp by another instrument, or the truth of a simulation.
     """
 
     t: Array
@@ -48,6 +49,7 @@ class Recording:
     held: tuple[int, ...] = ()
     temperature: Quantity | None = None
     walked: Array | None = None
+    reference: Array | None = None
 
     @property
     def dt(self) -> Array:

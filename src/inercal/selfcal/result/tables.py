@@ -16,7 +16,7 @@ from inercal.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import names, shown_units
 from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.result.comparison import with_stated
+from inercal.selfcal.result.comparison import attitude_errors, with_stated
 
 if TYPE_CHECKING:
     from inercal.selfcal.before.bounds import PathBounds
@@ -84,6 +84,24 @@ def side_by_side(
             3,
         ),
     ]
+
+
+def of_attitudes(filters: Mapping[FilterKind, FilterResult], reference: Array) -> Table:
+    """Errors of the attitude of each filter against the true one (n, 4)."""
+    rows = []
+    for kind, each in filters.items():
+        if each.history is not None:
+            q, angle = attitude_errors(each.history.attitude, reference).rms
+            arcsec = short(float(np.degrees(angle)) * 3600.0)
+            rows.append((kind, *(f"{float(part):.3g}" for part in q), arcsec))
+    return Table(
+        "Errors of the attitude",
+        "Root mean square over all rows of the estimated less the true components of the unit quaternion q_bp, and of "
+        "the angle between both. A filter knows the rows up to its own, map and lm all; those of lm hold the wander of "
+        "the gyros.",
+        heads("filter", *(f"q{k}" for k in range(4)), "angle [″]"),
+        tuple(rows),
+    )
 
 
 def _apart(
