@@ -122,6 +122,7 @@ CODES: dict[str, Code] = {
     "low_scatter": Code("the scatter of the residuals is below what the stated noise explains", _NEVER),
     "prior_suspect": Code("a value is far outside what its prior allows", _ALWAYS, rank=11),
     "filter_fails": Code("an estimator fails on a sound recording", _ALWAYS, rank=13),
+    "estimators_differ": Code("two estimators of one model differ by too much of u", _BY_SIZE),
     "perhaps_common": Code("sources that may act alike in two calibrations", _NEVER),
     "failed_case": Code("a case of the validation did not pass", _NEVER),
 }
