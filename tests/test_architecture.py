@@ -157,8 +157,8 @@ WITHIN = {
         "positions rate task figures"
     ),
     "aoa": (
-        "limits layout settings angles motion reading fusion paper diagnosis reference result simulate task "
-        "figures"
+        "limits layout disturbances settings angles motion reading fusion paper diagnosis reference result simulate "
+        "task figures"
     ),
     "selfcal": (
         "estimators limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"

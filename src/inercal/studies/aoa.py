@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from inercal._toml import Strict, check
+from inercal.aoa.disturbances import DELAY
 from inercal.aoa.settings import (
-    DELAY,
     AoaSettings,
     Attitude,
     Estimator,
@@ -198,6 +198,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
     """
     file = check(AoaStudyFile, data, path, StudyError)
     layout, sensors = layout_of(file.sensors), calibrations_of(file.sensors, path)
+    motion = None if file.motion is None else motion_of(file.motion, path)
     return AoaSettings(
         site=site_of(file.site, path),
         layout=layout,
@@ -209,8 +210,8 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
         zero=None if file.zero is None else _zero(file.zero),
-        motion=None if file.motion is None else motion_of(file.motion, path),
-        disturbances=disturbances_of(file.disturbances, layout, sensors, path),
+        motion=motion,
+        disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),
