@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from inercal.aoa import task
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View
 from inercal.face.study import Progress, Study, calibrations, one_run
+from inercal.records.read import source_of
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
@@ -49,6 +51,48 @@ def calibrate(
         return task.measure(given, settings, methods, compare, say)
 
     return _result(calibrations([record], study, progress, run)[0], by_point)
+
+
+def runs(
+    path: str | Path,
+    study: Study,
+    read: Callable[[Path], Record],
+    compare: bool = False,
+    progress: Progress = lambda _: None,
+    methods: Methods | None = None,
+) -> Result:
+    """Measure the runs that a table lists; ``evidence`` is the `inercal.aoa.runs.series.Series`.
+
+    ``read`` gives the record of a file; the other parameters and errors are those of `inercal.runs`.
+    """
+    from inercal.aoa.runs import outcome, series
+    from inercal.aoa.runs.run_table import read_runs_table
+
+    table = read_runs_table(path)
+    with study.at_fault():
+        done = series.measure_runs(
+            table, lambda run: read(run.path), study.settings, methods, compare, progress
+        )
+    estimate = replace(done.estimate, inputs=(*done.estimate.inputs, *map(source_of, study.files)))
+    done = replace(done, estimate=estimate)
+
+    def page() -> str:
+        from inercal.aoa.figures.series import page as of_page
+
+        return of_page(done)
+
+    def picture() -> Picture:
+        from inercal.aoa.figures.series import main
+
+        return main(done)
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in outcome.tables(estimate)]
+
+    view = View(
+        estimate, estimate.message, tables, page, picture, lambda: series.points_of(done, study.settings)
+    )
+    return Result(estimate, view, done)
 
 
 def _result(measurement: task.Measurement, by_point: bool) -> Result:
