@@ -79,6 +79,7 @@ def measured(entry):
     return ic.runs(entry / "runs.csv", entry / "aoa.toml")
 
 
+@pytest.mark.slow
 def test_the_tare_is_interpolated(measured):
     """A bias of 2 mg is 0.11 deg; with the tare the angle is right to the wind-off's u and noise, drift and all."""
     result = measured.estimate.result
@@ -98,6 +99,7 @@ def test_without_wind_offs_the_biases_are_in_the_angle(entry):
     assert alone.measurement.errors[alone.measurement.angles.method].all.rms > 0.02 * DEG
 
 
+@pytest.mark.slow
 def test_points_of_polars_up_and_down(measured):
     points = measured.evidence.at_points
     assert np.degrees([each.theta for each in points]) == pytest.approx([0.0, 5.0, 10.0, 15.0], abs=0.02)
@@ -108,12 +110,14 @@ def test_points_of_polars_up_and_down(measured):
         assert each.u > each.u_apart
 
 
+@pytest.mark.slow
 def test_a_drift_between_wind_offs_is_told(measured):
     (drift,) = (each for each in measured.findings if each.code == "bias_drift" and "off2" in each.message)
     assert "b_2" in drift.message
     assert "interpolated" in drift.message
 
 
+@pytest.mark.slow
 def test_oscillations_by_amplitude_and_frequency(measured):
     (sine,) = measured.evidence.oscillating
     assert (sine.amplitude, sine.frequency, sine.runs) == pytest.approx((5.0 * DEG, 1.0, 1))
@@ -168,6 +172,7 @@ def test_after_the_last_wind_off_the_walk_goes_on():
     assert (values["b_1"], covariances["b_1", "b_1"], words) == (0.0, 1.0, "0")
 
 
+@pytest.mark.slow
 def test_the_command(entry, capsys):
     table, points, page = entry / "runs.csv", entry / "points.csv", entry / "runs.html"
     words = ["aoa", "--runs", str(table), "--study", str(entry / "aoa.toml"), "--json"]
@@ -191,6 +196,7 @@ def test_the_command(entry, capsys):
     assert all(title in text for title in ("By point", "down - up", "By amplitude and frequency"))
 
 
+@pytest.mark.slow
 def test_the_papers_way_takes_the_tare_off_its_readings(entry, capsys):
     words = ["aoa", "--runs", str(entry / "runs.csv"), "--study", str(entry / "aoa.toml"), "--json"]
     assert run([*words, "--static", "improved"]) in (0, 1)
