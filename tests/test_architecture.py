@@ -158,7 +158,7 @@ WITHIN = {
     ),
     "aoa": (
         "limits layout disturbances settings angles motion reading fusion paper diagnosis reference result simulate "
-        "task runs figures"
+        "design task runs figures"
     ),
     "selfcal": (
         "estimators limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from inercal.aoa.disturbances import SIZE, Disturbances
-from inercal.aoa.layout import Layout
+from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
@@ -33,6 +33,7 @@ Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
 Tangential = Literal["none", "differentiated", "dual"]
 Per = Literal["1", "V", "count"]
+AxisName = Literal["+x", "-x", "+z", "-z"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 
 STATES: tuple[States, ...] = (8, 11, 15, 19)
@@ -48,6 +49,7 @@ _OF_PLACES = Bounds(
 )
 _ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
 _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg to 45 deg")
+_WITHIN = within(-5.0, 5.0, "a position within 5 m of the pivot (mm given as m?)")
 _PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
 
 
@@ -291,6 +293,32 @@ class MotionPlan:
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Design:
+    """Places where accelerometers may sit, for `inercal design aoa`."""
+
+    accelerometers: int = option(
+        "how many; as many as there are under [sensors] if 0", 0, example=3, least=0, most=12
+    )
+    rearmost: float = quantity(
+        "position of the rearmost place, negative behind the pivot", "length", "-0.25 m", bounds=_WITHIN
+    )
+    foremost: float = quantity("position of the foremost place", "length", "0.25 m", bounds=_WITHIN)
+    places: int = option("places, evenly from the rearmost to the foremost", 5, least=2, most=41)
+    axes: tuple[AxisName, ...] = option(
+        "axes that they may look along", tuple(AXES), example=["+x", "+z", "-z"]
+    )
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Wanted standard uncertainty, for `inercal design aoa`."""
+
+    theta: float | None = quantity(
+        "of the angle", "angle", example="0.01 deg", bounds=within(1e-9, 1.0, "an angle above 0, below 1 rad")
+    )
+
+
 @short_repr
 @dataclass(frozen=True, eq=False)
 class AoaSettings:
@@ -313,6 +341,8 @@ class AoaSettings:
     zero: Zero | None = None
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
+    design: Design = field(default_factory=Design)
+    goal: Goal = field(default_factory=Goal)
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

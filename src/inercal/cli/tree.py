@@ -132,6 +132,14 @@ COMMANDS = {
         "pictures.",
         "inercal design selfcal selfcal.toml --out plan.toml",
     ),
+    ("design", "aoa"): (
+        "inercal.cli.design:design_aoa",
+        "Find where the accelerometers of a wind-tunnel model tell its angle best, and how good they must be.\n\nThe "
+        "study states the motion, under [design] how many accelerometers and where they may sit, and under [goal] the "
+        "wanted u of theta. Bounds by the fusion and from single samples. --out writes the sensors as tables of a "
+        "study (.toml) or the whole result (.json), --report a page.",
+        "inercal design aoa aoa.toml --out sensors.toml",
+    ),
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",
         "Simulate a test on a turntable, with the errors of the table and the noise of the instrument.\n\nThe study "

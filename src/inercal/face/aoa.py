@@ -12,7 +12,7 @@ import numpy as np
 from inercal.aoa import task
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View
-from inercal.face.study import Progress, Study, calibrations, one_run
+from inercal.face.study import Progress, Study, calibrations, designed_by, one_run
 from inercal.records.read import source_of
 from inercal.records.record import Record
 
@@ -127,6 +127,36 @@ def _result(measurement: task.Measurement, by_point: bool) -> Result:
 
     view = View(displayed(estimate), _answer(estimate.result), tables, page, picture, rows)
     return Result(estimate, view, measurement)
+
+
+def prepare_design(study: Study) -> None:
+    """Load, or compile, the kernels of `design`."""
+    with study.at_fault():
+        task.load_kernels(study.settings)
+
+
+def design(study: Study, progress: Progress = lambda _: None) -> Result:
+    """Find where accelerometers tell the angle best; ``evidence`` is the `inercal.aoa.design.Designed`."""
+    from inercal.aoa.design import REFERENCES
+    from inercal.aoa.design import design as search
+
+    designed, result = designed_by("design aoa", study, lambda: search(study.settings, progress), REFERENCES)
+
+    def page() -> str:
+        from inercal.report.html import render
+
+        return render(result, [picture()], "Sensors of a wind-tunnel model", (), designed.tables())
+
+    def picture() -> Picture:
+        from inercal.aoa.figures.sensors import side_view
+
+        layout = designed.best.layout
+        return side_view(layout.names, layout.angle, layout.r, layout.z, True)
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in designed.tables()]
+
+    return Result(result, View(result, designed.message, tables, page, picture), designed)
 
 
 def _answer(result: dict[str, Any] | Any) -> str:

@@ -189,14 +189,15 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
 
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
-    """Find the positions or tolerances of a turntable, or the path of a platform, that calibrate best.
+    """Find the positions or tolerances of a turntable, the path of a platform, or the places of a model's sensors, that
+    tell most.
 
     Parameters
     ----------
     study : Study or path
     what : str, optional
-        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, as the commands name it; if
-        absent, by the kind, positions.
+        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, ``"aoa"`` of a model, as the
+        commands name it; if absent, by the kind, positions.
 
     Returns
     -------
@@ -217,17 +218,17 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     12
     """
     study = study_of(study)
-    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal"}
+    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal", "aoa": "aoa"}
     if what is not None and kinds.get(what) != study.kind:
         raise InputError(
             "design", f"found {what!r} of a study of kind {study.kind}, expected {_designs(study.kind)}"
         )
     if study.kind not in kinds.values():
         raise InputError(
-            "design", f"found a study of kind {study.kind}, expected one of turntable or selfcal"
+            "design", f"found a study of kind {study.kind}, expected one of turntable, selfcal or aoa"
         )
     system = import_module(f"inercal.face.{study.kind}")
-    if study.kind == "selfcal":
+    if study.kind != "turntable":
         system.prepare_design(study)
     result: Result = system.design_tolerances(study) if what == "tolerances" else system.design(study)
     return result
@@ -235,8 +236,8 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
 
 def _designs(kind: str) -> str:
     """The designs of a kind, in words."""
-    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'"}.get(
-        kind, "a study of kind turntable or selfcal"
+    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'", "aoa": "'aoa'"}.get(
+        kind, "a study of kind turntable, selfcal or aoa"
     )
 
 

@@ -15,8 +15,10 @@ from inercal.aoa.disturbances import DELAY
 from inercal.aoa.settings import (
     AoaSettings,
     Attitude,
+    Design,
     Estimator,
     Flow,
+    Goal,
     Methods,
     ModelAttitude,
     Noise,
@@ -186,6 +188,12 @@ class AoaStudyFile(Strict):
     )
     flow: Stated[Flow] = Field(default=Flow(), title="Flow", description="angularity of the flow")
     zero: ZeroTable | None = Field(default=None, title="Zero", description="a stretch at a known angle")
+    design: Stated[Design] = Field(
+        default=Design(), title="Design", description="where `inercal design aoa` may put accelerometers"
+    )
+    goal: Stated[Goal] = Field(
+        default=Goal(), title="Goal", description="uncertainty that a design is to reach"
+    )
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -212,10 +220,22 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         zero=None if file.zero is None else _zero(file.zero),
         motion=motion,
         disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
+        design=_design(file.design, path),
+        goal=file.goal,
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
+
+
+def _design(design: Design, path: str | Path) -> Design:
+    """The design; refuses places that are one."""
+    if not design.rearmost < design.foremost:
+        raise StudyError(
+            path,
+            f"design.rearmost: found {design.rearmost:g} m with foremost {design.foremost:g} m, expected it behind",
+        )
+    return design
 
 
 def _prior(table: SensorPriorTable) -> Prior:
