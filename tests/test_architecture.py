@@ -157,8 +157,8 @@ WITHIN = {
         "positions rate steps task figures"
     ),
     "aoa": (
-        "limits band layout settings angles motion reading fusion paper diagnosis reference result simulate task "
-        "figures"
+        "limits band layout disturbances settings angles motion reading fusion paper diagnosis reference result "
+        "simulate design task runs figures"
     ),
     "selfcal": (
         "estimators limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"
