@@ -174,7 +174,7 @@ def parse_unit(text: str, where: object = "unit", dimension: str | None = None) 
         The text is no unit known here or to pint.
     """
     if len(text) > _LONGEST:
-        raise QuantityError(where, f"found {shown(text)}, expected {_everyday(dimension)}")
+        raise QuantityError(where, f"found the unit {shown(text)}, expected {_everyday(dimension)}")
     plain = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), text.strip())
     plain = plain.translate(_SIGNS).replace("°", "deg").replace("**", "^").replace("s2", "s^2")
     plain = re.sub(r"√\s*\(?\s*([^\W\d]+)\s*\)?", r"sqrt(\1)", plain)

@@ -42,7 +42,7 @@ def process_age() -> float:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 interrupted: Ctrl-C, SIGTERM, SIGHUP."""
+    """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 asked to end."""
     gc.set_threshold(50_000, 20, 20)  # loading and drawing make many objects that stay: a tenth of the time
     for signum in asking_to_end():
         if signal.getsignal(signum) is not signal.SIG_IGN:

@@ -147,10 +147,10 @@ def _forked(work: Work[Any], size: int, progress: Tell) -> _Ended:
 
 def _spawned(work: Work[Any], size: int, progress: Tell) -> _Ended:
     """Work in a new Python."""
-    job = pickle.dumps((sys.path, work, size))
+    job = pickle.dumps(sys.path) + pickle.dumps((work, size))
     with tempfile.TemporaryDirectory(prefix="inercal-") as folder:
         name = Path(folder, "answer")
-        command = [sys.executable, "-c", "from inercal.records.read.child import _main; _main()", str(name)]
+        command = [sys.executable, "-P", "-m", __name__, str(name)]
         package = str(Path(__file__).parents[3])
         environment = os.environ | {
             "PYTHONPATH": os.pathsep.join([package, os.environ.get("PYTHONPATH", "")])
@@ -190,8 +190,8 @@ def _spawned(work: Work[Any], size: int, progress: Tell) -> _Ended:
 
 def _main() -> None:
     """The new Python: job on standard input, bytes done on standard output, answer in the file that is named."""
-    path, work, size = pickle.load(sys.stdin.buffer)
-    sys.path[:] = path
+    sys.path[:] = pickle.load(sys.stdin.buffer)
+    work, size = pickle.load(sys.stdin.buffer)
     telling = os.dup(1)
     with open(sys.argv[1], "wb", buffering=0) as answer:
         _answer(work, answer, telling, size)
@@ -293,3 +293,7 @@ def _unpacked(answer: memoryview) -> tuple[Any, Exception | None]:
         begin += size
     head, *buffers = parts
     return pickle.loads(head, buffers=buffers)  # type: ignore[no-any-return]
+
+
+if __name__ == "__main__":
+    _main()
