@@ -103,7 +103,12 @@ def calibrate(
         result, message = result | base, message + words
     for name, other in compared.items():
         result["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
-    timed = replace(estimate, result=result, message=message, timing={"solve": time.perf_counter() - clock})
+    steps = {"step": filtered, **{f"step {name}": other for name, other in compared.items()}}
+    timing = {
+        "solve": time.perf_counter() - clock,
+        **{key: 1e-6 * each.step_us for key, each in steps.items()},
+    }
+    timed = replace(estimate, result=result, message=message, timing=timing)
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
@@ -117,7 +122,6 @@ def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
     return {
         "parameters": {name: {"value": value, "u": own} for name, value, own in each},
         "status": status.value,
-        "step_us": other.step_us,
     }
 
 
