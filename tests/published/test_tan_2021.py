@@ -23,7 +23,6 @@ from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.paper import lever, residuals, static
 from inercal.aoa.paper.methods import low_passed, measure
-from inercal.aoa.disturbances import Disturbances
 from inercal.aoa.settings import Methods, MotionPlan, Noise, Timing
 from inercal.aoa.simulate import simulate
 

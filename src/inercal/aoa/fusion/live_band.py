@@ -1,8 +1,8 @@
 """The fusion of sensors that are limited to a band, row by row: the digits of the whole recording.
 
 The first rows are held until their rate is known, for which the filter is made. Then each row has its answer at once:
-the angle that the model carries on from the last row that was fused (`inercal.aoa.fusion.ahead`), none before the fusion
-has started.
+the angle that the model carries on from the last row that was fused (`inercal.aoa.fusion.ahead`), none before the
+fusion has started.
 """
 
 from __future__ import annotations

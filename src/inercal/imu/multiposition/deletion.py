@@ -75,7 +75,7 @@ class LinearFit:
         L = np.linalg.cholesky(V)
         rows = np.column_stack([self.jacobian.reshape(len(V), -1), self.residuals.ravel()])
         white = solve_triangular(L, rows, lower=True)
-        return L, white[:, :-1], white[:, -1]
+        return np.asarray(L), np.asarray(white[:, :-1]), np.asarray(white[:, -1])
 
     def _inverse(self, J: Array) -> Array:
         """(P, P) ``(J^T J + information)^-1``, zero where nothing tells."""
