@@ -40,14 +40,18 @@ class Limits:
     """Probability by chance of the score of a fault below which it is fitted."""
 
     doubtful: float = 0.03
-    """Probability by chance of a fault below which its shift counts in u, though it is not significant."""
+    """Probability by chance of a fault below which it counts in u with the probability that it is there, though it is
+    not significant."""
+
+    fault_odds: float = 0.5
+    """Odds, before a test, that it has one of the faults that are asked for."""
 
     harmful_shift: float = 0.5
     """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
 
-    blind_shift: float = 1.0
-    """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
-    the test would not show it."""
+    blind_shift: float = 4.0
+    """Shift of a value, over u, by a fault that is named in half of the tests, beyond which a finding says that the
+    residuals might not show it; of a larger one so much counts in u."""
 
     drift_sigmas: float = 4.0
     """Standard uncertainties by which drift within the dwells may differ from that between them to be used with it."""
