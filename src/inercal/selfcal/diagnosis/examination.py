@@ -26,8 +26,8 @@ from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import units
 from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import UNIT_OF
 
 _BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
 """Findings of the reading of a recording that end its diagnosis."""
@@ -97,7 +97,7 @@ def _beyond_prior(result: FilterResult, problem: FilterProblem) -> list[Finding]
     far = ~(np.abs(values - problem.mean) <= sigmas(LIMITS.risk, p) * np.sqrt(prior**2 + variance))
     for i in np.flatnonzero(far):
         name = result.names[i]
-        unit, size = shown_unit(*units([name]))
+        unit, size = shown_unit(UNIT_OF[name])
         value, u = rounded(values[i] / size, math.sqrt(variance[i]) / size)
         text = f"{name}: the recording says {value} +- {u} {unit}, its prior is {prior[i] / size:.3g}"
         findings.append(Finding("prior_suspect", f"{text} {unit}: state a wider one", harm=(name,)))
