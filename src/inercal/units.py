@@ -44,9 +44,6 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
         },
     ),
     "acceleration": ("m/s^2", {"m/s^2": 1.0, "cm/s^2": 1e-2, "g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G}),
-    "second-order coefficient": (
-        "1/(m/s^2)", {"1/(m/s^2)": 1.0, "ug/g^2": 1e-6 / _G, "mg/g^2": 1e-3 / _G, "g/g^2": 1.0 / _G, "1/g": 1.0 / _G}
-    ),
     "velocity": ("m/s", {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "ug*s": 1e-6 * _G, "mg*s": 1e-3 * _G}),
     "temperature": ("degC", {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0}),
     "voltage": ("V", {"V": 1.0, "mV": 1e-3, "uV": 1e-6}),

@@ -45,9 +45,7 @@ _ACCELEROMETER = (
 _ON_A_TABLE = (
     *(
         Term(
-            f"r_{i}{j}",
-            f"lever arm: place of accelerometer {i} along {j} beside the crossing of the axes",
-            "m",
+            f"r_{i}{j}", f"lever arm: place of accelerometer {i} along {j} from the crossing of the axes", "m"
         )
         for i in _AXES
         for j in _AXES
@@ -141,41 +139,30 @@ _DRIFT = tuple(
     )
 )
 
-# eta pz, oy, oz: az reads eta_pz fx more and eta_oz fy less, ay reads eta_oy fx less; ds and do likewise for gyros
 _SELF_CALIBRATION = (
     *(Term(f"kg0_{i}", f"gyro {i} bias: rate of the platform at zero command", "rad/s") for i in _AXES),
     Term("eta_pz", "misalignment of accelerometer z: output per specific force along x", "rad"),
     Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
     Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
     *(
-        Term(f"ds_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}", "rad")
-        for i, j in ("xy", "yz", "zx")
+        Term(f"{symbol}_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}{way}", "rad")
+        for symbol, way, pairs in (("ds", "", ("xy", "yz", "zx")), ("do", ", reversed", ("xz", "yx", "zy")))
+        for i, j in pairs
     ),
     *(
-        Term(f"do_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}, reversed", "rad")
-        for i, j in ("xz", "yx", "zy")
+        Term(f"{symbol}_{i}", name.format(i), unit)
+        for symbol, name, unit, ends in (
+            ("ka0", "accelerometer {} bias: reading at zero specific force", "m/s^2", _AXES),
+            ("ka1", "accelerometer {} scale error", "1", _AXES),
+            ("kg1", "gyro {} scale error", "1", _AXES),
+            ("beta", "zero of the encoders: turn of their frame about {} of the base", "rad", _AXES),
+            ("gamma", "turn of the sensors about {} of the platform, against the last gimbal", "rad", _AXES),
+            ("nonorth", "non-orthogonality of the joints {}: turn of the later axis", "rad", ("xy", "yz")),
+            ("zero", "reading of the encoder {} at zero", "rad", "y"),
+        )
+        for i in ends
     ),
-    *(Term(f"ka0_{i}", f"accelerometer {i} bias: reading at zero specific force", "m/s^2") for i in _AXES),
-    *(Term(f"ka1_{i}", f"accelerometer {i} scale error", "1") for i in _AXES),
-    *(Term(f"kg1_{i}", f"gyro {i} scale error", "1") for i in _AXES),
-    *(
-        Term(f"beta_{i}", f"zero of the encoders: turn of their frame about {i} of the base", "rad")
-        for i in _AXES
-    ),
-    *(
-        Term(f"gamma_{i}", f"turn of the sensors about {i} of the platform, against the last gimbal", "rad")
-        for i in _AXES
-    ),
-    Term("nonorth_xy", "non-orthogonality: turn of the inner axis, against the outer", "rad"),
-    Term("nonorth_yz", "non-orthogonality: turn of the platform's axis, against the inner", "rad"),
-    Term("zero_y", "reading of the inner encoder at zero", "rad"),
-    Term("tau_enc", "delay of the encoders against the rates", "s"),
-    Term("tau_a", "delay of the accelerometers against the rates", "s"),
-    *(
-        Term(f"r_{i}{j}", f"place of accelerometer {i} from the centre of the gimbals, along {j}", "m")
-        for i in _AXES
-        for j in _AXES
-    ),
+    Term("tau_enc", "delay of the encoders", "s"),
 )
 
 #: every term, in the order results list them

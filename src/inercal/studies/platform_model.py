@@ -29,7 +29,7 @@ _BELIEVED = {
     "time": (60.0, "a time within 60 s"),
     "length": (100.0, "a length within 100 m"),
     "number": (0.5, "a number within 0.5"),
-    "second-order coefficient": (0.01, "a coefficient within 0.1 g/g^2"),
+    "quadratic": (0.01, "a coefficient within 0.1 g/g^2"),
 }
 
 

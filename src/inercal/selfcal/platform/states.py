@@ -81,7 +81,7 @@ STATES: Final[Mapping[str, State]] = {
         "time by which encoders, accelerometers are late against the rates, measured or commanded", "delay", _DELAY,
     ),
     "k2": State(
-        _by_axis("K2"), "1/(m/s^2)", "second-order coefficient", "20 ug/g^2", "0(20) ug/g^2",
+        _by_axis("K2"), "1/(m/s^2)", "quadratic", "20 ug/g^2", "0(20) ug/g^2",
         "second-order coefficients of accelerometers", "k2", _IEEE_1293,
     ),
     "levers": State(
