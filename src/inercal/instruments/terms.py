@@ -16,10 +16,7 @@ from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
 
 @dataclass(frozen=True)
 class Term:
-    """One coefficient of an instrument.
-
-    ``unit`` is what its value is expressed in, with ``output`` for the unit the instrument's output has.
-    """
+    """One coefficient of an instrument; in its ``unit`` ``output`` stands for that of the instrument's output."""
 
     symbol: str
     name: str
