@@ -48,7 +48,7 @@ from inercal.selfcal.platform.model import (
     specific_force,
 )
 from inercal.selfcal.platform.recording import Steps
-from inercal.selfcal.platform.states import TAU
+from inercal.selfcal.platform.states import LEVER, TAU
 
 
 def initial(
@@ -121,6 +121,22 @@ def undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> fl
 
 
 @kernel
+def shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
+    """Variance [m^2/s^4] of accelerometers away from the centre at a row where the rate changes, within the step of
+    ``dt`` [s] before or after: as large as the angular acceleration makes it at the places that they have."""
+    square = 0.0
+    for k in range(LEVER, LEVER + 9):
+        if place[k] >= 0:
+            square += c[k] * c[k] + P[place[k], place[k]]
+    x, y, z = (
+        read.after[0] - read.before[0],
+        read.after[1] - read.before[1],
+        read.after[2] - read.before[2],
+    )
+    return square * (x * x + y * y + z * z) / (dt * dt)
+
+
+@kernel
 def encoder_update(
     q: Quaternion,
     of_encoders: Quaternion,
@@ -180,7 +196,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
     variance = noise.accelerometer * noise.accelerometer
     history, rig = len(out.u) > 0, len(c) > 24
     late = place[TAU] >= 0 or place[TAU + 1] >= 0
-    unwanted = np.empty(0)
+    levers, unwanted = rig and place[LEVER] >= 0, np.empty(0)
     cosine, sigma, of_acc = 1.0, noise.encoder, variance
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
     for k in range(len(intervals)):
@@ -237,6 +253,8 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 of_acc = variance + undecided(P, c, place, 1, read) * (
                     f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
                 )
+            if levers:
+                of_acc = (of_acc if late else variance) + shaken(P, c, place, read, dt)
             for i in range(3):
                 if history and not math.isnan(acc[k, i]) and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)

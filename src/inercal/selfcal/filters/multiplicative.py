@@ -23,7 +23,7 @@ from inercal.estimate.kalman import empty_row
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize, rotate
 from inercal.selfcal.estimators import FACTOR_OF
-from inercal.selfcal.filters.error_state import corrected, encoder_update, undecided
+from inercal.selfcal.filters.error_state import corrected, encoder_update, shaken, undecided
 from inercal.selfcal.filters.error_state import initial as initial
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
@@ -41,7 +41,7 @@ from inercal.selfcal.platform.model import (
 )
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import TAU
+from inercal.selfcal.platform.states import LEVER, TAU
 
 WIDE = 3.0
 """Length [rad] beyond which a deviation may be more than half a turn, where a logarithm is not what it came from."""
@@ -157,6 +157,7 @@ def _advance(
     row, of_states, unwanted = empty_row(WIDEST), empty_columns(), np.empty(0)
     history = len(out.u) > 0
     late = place[TAU] >= 0 or place[TAU + 1] >= 0
+    levers = place[LEVER] >= 0
     variance = noise.accelerometer * noise.accelerometer
     cosine, sigma, of_acc = 1.0, noise.encoder, variance
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
@@ -221,6 +222,8 @@ def _advance(
             if late:
                 up_square = world.up[0] ** 2 + world.up[1] ** 2 + world.up[2] ** 2
                 of_acc = variance + undecided(P, c, place, 1, read) * up_square
+            if levers:
+                of_acc = (of_acc if late else variance) + shaken(P, c, place, read, dt)
             for i in range(3):
                 r[i] -= of_points.mean[i]
                 of_points.covariance[i, i] += of_acc

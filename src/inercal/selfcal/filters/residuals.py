@@ -34,6 +34,7 @@ from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
 from inercal.selfcal.platform.linearised_rows import LinearisedRows, linearise_rows, linearise_steps
 from inercal.selfcal.platform.recording import Recording, Steps
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.platform.states import LEVER
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
     return Measurements(
         np.where(used[:, :3], acc, 0.0),
-        used[:, :3] / problem.noise.accelerometer,
+        used[:, :3] / _accelerometer_noise(recording, problem),
         attitude,
         root,
         np.linalg.inv(root) * used[:, 3:, None],
@@ -82,6 +83,18 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
         angles,
         recording.steps,
     )
+
+
+def _accelerometer_noise(recording: Recording, problem: FilterProblem) -> Array | float:
+    """Standard deviation [m/s^2] of the accelerometers, (m, 1) where they may be away from the centre of the gimbals:
+    with what a change of rate at a row makes there."""
+    noise = problem.noise.accelerometer
+    if not problem.states.has("levers"):
+        return noise
+    reach = float(np.linalg.norm(problem.prior[problem.states.layout.place[LEVER : LEVER + 9] - 3]))
+    steps = recording.steps
+    change = np.linalg.norm(steps.later - steps.rate, axis=1) / steps.dt
+    return np.asarray(np.hypot(noise, reach * change)[:, None])
 
 
 def gimbals(th: Array, world: World) -> tuple[Array, Array]:
