@@ -30,10 +30,11 @@ from spoiled import strict, whole
 from spoiled.spoil import spoiled
 
 from inercal.errors import InercalError, RecordError
-from inercal.records.read import arrays, bags, child
+from inercal.records.read import arrays, bags, child, limits
 
 SEED = 20261122
 child._PATIENCE = 100  # times the processor time: a campaign runs beside others
+limits.seconds = lambda size: 3  # more would only wait longer for what never ends
 
 A_CHILD = 40
 """Cases that one process reads."""

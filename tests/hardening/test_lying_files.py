@@ -400,3 +400,16 @@ def test_eight_bytes_less_in_a_mat_file(tmp_path):
         path = put(tmp_path, "cut.mat", data[:begin] + data[begin + 8 :])
         with suppress(InputError):
             read(path, mapped)
+
+
+def test_the_page_of_the_contract_has_the_limits():
+    page = (Path(__file__).parents[2] / "docs/reference/reading.md").read_text("utf-8")
+    mib = 1 << 20
+    assert (limits.unpacked(0), limits.unpacked(7)) == (256 * mib, 256 * mib + 700)
+    assert limits.memory(0) == 512 * mib + 4 * limits.unpacked(0)
+    assert (limits.seconds(0), limits.seconds(mib)) == (8, 12)
+    assert (2 * mib, 65_536, 200) == (limits.LINE, limits.HEADER, limits.TITLE)
+    assert (limits.NESTING, limits.FIELDS, child._PATIENCE) == (16, 10_000, 10)
+    for words in ("256 MiB + 100 size", "512 MiB + four times", "8 s + 4 s for each MiB; ten times", "65 536", "2 MiB",
+                  "200 characters", "| 16;", "| 10 000 |", "900 characters", "1 MiB, 50 levels"):  # fmt: skip
+        assert words in page
