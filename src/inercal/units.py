@@ -74,6 +74,7 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
         {"m/s^2/sqrt(s)": 1.0, "m/s^2/sqrt(h)": 1 / 60, "ug/sqrt(s)": 1e-6 * _G, "ug/sqrt(h)": 1e-6 * _G / 60,
          "mg/sqrt(h)": 1e-3 * _G / 60},
     ),
+    "quadratic": ("s^2/m", {"s^2/m": 1.0, "ug/g^2": 1e-6 / _G, "mg/g^2": 1e-3 / _G}),
     "acceleration ramp": (
         "m/s^3",
         {"m/s^3": 1.0, "ug/s": 1e-6 * _G, "ug/h": 1e-6 * _G / 3600, "mg/h": 1e-3 * _G / 3600},

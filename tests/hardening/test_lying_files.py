@@ -203,6 +203,7 @@ NUMBERS = "".join(f"{k / 100:.2f};{'0,5' if k else '0,25'};7\n" for k in range(4
             "line 10",
         ),
         ("t [s];acc_x [g];acc_y [g]\n" + NUMBERS + "4,00;1.000;7\n4,01;0,5;7\n", "bad_row", "line 402"),
+        ("t [s];acc_x [g];acc_y [g]\n" + NUMBERS + "4,00;\u0661;7\n4,01;0,5;7\n", "bad_row", "line 402"),
         ("t [s];acc_x [g];acc_y [g]\n" + NUMBERS + "4,00;1.000,5;7\n4,01;0,5;7\n", "bad_row", "line 402"),
     ],
 )

@@ -189,7 +189,7 @@ def test_the_attitude_against_the_encoders_turns_from_these_to_the_estimate(monk
     """An estimate that is turned by 5 arcsec about X_p from the encoders' attitude is drawn so, with its sign."""
     told = {}
     monkeypatch.setattr(
-        drawn_by, "attitude_correction", lambda t, rotation, u: told.update(rotation=rotation)
+        drawn_by, "attitude_correction", lambda t, rotation, u, changes: told.update(rotation=rotation)
     )
     none = Estimate.without(Basis("selfcal"), Status.NOT_CONVERGED, "")  # spares the other pictures
     found = evidence(filtered("map", innovations=np.zeros((0, 6))), estimate=none)
@@ -291,7 +291,7 @@ def test_filters_side_by_side_with_the_truth():
     found, truth = filtered(), TRUTH.copy()
     truth[0] = 0.0
     estimates, errors, costs = side_by_side(
-        {"error-state": found}, truth, 0.2, {"error-state": "not_converged"}
+        {"error-state": found}, np.zeros(18), truth, 0.2, {"error-state": "not_converged"}
     )
     value = to_product(found.coefficients)
     for k, row in enumerate(errors.rows):
@@ -309,7 +309,9 @@ def test_filters_side_by_side_with_the_truth():
 def test_filters_side_by_side_without_a_truth():
     """Differences from the first, over its uncertainty; a filter that failed says so."""
     first, other = filtered(), filtered("mukf", seed=6)
-    _, apart, costs = side_by_side({"error-state": first, "mukf": other, "lm": diverged()}, None, 0.2, {})
+    _, apart, costs = side_by_side(
+        {"error-state": first, "mukf": other, "lm": diverged()}, np.zeros(18), None, 0.2, {}
+    )
     u = np.sqrt(np.diag(first.covariance))
     linear = (other.coefficients - first.coefficients) / u
     for k in (0, 8, 14, 17):  # those that are alike in both forms

@@ -150,6 +150,7 @@ def run(
     write: Callable[[str], None],
     saving: Saving | None = None,
     say: Callable[[str], None] = lambda _: None,
+    after: float = -math.inf,
 ) -> int:
     """Run an estimator to the end of a stream.
 
@@ -163,6 +164,8 @@ def run(
         The state is loaded from there if the file exists, and saved there.
     say : callable
         Told where a saved state is gone on from, and how many rows are passed over.
+    after : float
+        Time [s] of the last line that a reader has: those up to it, titles too, are not given again.
 
     Returns
     -------
@@ -178,7 +181,7 @@ def run(
         On an interrupt, SIGTERM or SIGHUP, once the row in work is done and the state is saved.
     """
     with nullcontext() if saving is None else alone(saving.path):
-        return _run(estimator, lines, write, saving, say)
+        return _run(estimator, lines, write, saving, say, after)
 
 
 def _run(
@@ -187,6 +190,7 @@ def _run(
     write: Callable[[str], None],
     saving: Saving | None,
     say: Callable[[str], None],
+    after: float,
 ) -> int:
     """As `run`, with the checkpoint to itself."""
     mark = fingerprint({"estimator": estimator.settings, "stream": lines.settings})
@@ -203,7 +207,7 @@ def _run(
             saved = position.rows
 
     def give(outputs: Sequence[Output]) -> None:
-        for output in outputs:
+        for output in (each for each in outputs if not _given(each, after)):
             write(",".join(each if isinstance(each, str) else number(each) for each in output))
 
     give([estimator.columns])
@@ -224,6 +228,11 @@ def _run(
         keep()
         give(estimator.finish(state))
     return position.rows
+
+
+def _given(output: Output, after: float) -> bool:
+    """True for a line that a reader has: titles, and what is not later than ``after`` [s]."""
+    return math.isfinite(after) and (isinstance(output[0], str) or output[0] <= after)
 
 
 def _new_samples(

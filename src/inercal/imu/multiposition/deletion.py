@@ -75,7 +75,7 @@ class LinearFit:
         L = np.linalg.cholesky(V)
         rows = np.column_stack([self.jacobian.reshape(len(V), -1), self.residuals.ravel()])
         white = solve_triangular(L, rows, lower=True)
-        return L, white[:, :-1], white[:, -1]
+        return np.asarray(L), np.asarray(white[:, :-1]), np.asarray(white[:, -1])
 
     def _inverse(self, J: Array) -> Array:
         """(P, P) ``(J^T J + information)^-1``, zero where nothing tells."""
@@ -118,8 +118,8 @@ class LinearFit:
         return math.exp(float(brentq(surplus, math.log(least), math.log(most), xtol=1e-4)))
 
 
-def outlying(fit: LinearFit) -> list[int]:
-    """Items that do not belong to the others, at a risk of `LIMITS.outlier_risk` that any is named falsely."""
+def outlying(fit: LinearFit, risk: float) -> list[int]:
+    """Items that do not belong to the others, at that ``risk`` that any is named falsely."""
     from scipy.special import fdtrc
 
     d = fit.residuals.shape[1]
@@ -139,7 +139,7 @@ def outlying(fit: LinearFit) -> list[int]:
         p = fdtrc(d, left, (gain / d) / np.maximum((total - gain) / left, 1e-300))
         worst = int(np.argmin(p))
         removed.append(int(np.flatnonzero(alive)[worst]))
-        if p[worst] * len(part) < LIMITS.outlier_risk:
+        if p[worst] * len(part) < risk:
             named = step
         alive[removed[-1]] = False
     return sorted(removed[:named])
