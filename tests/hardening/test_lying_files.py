@@ -360,13 +360,14 @@ def test_memory_of_a_child(tmp_path, monkeypatch):
         in_child(swell, put(tmp_path, "a.mat", "x"))
 
 
-def test_beside_other_threads_nothing_is_forked():
-    """A lock that another thread holds would never be free in a fork."""
+@pytest.mark.parametrize("daemon", [False, True])
+def test_beside_other_threads_nothing_is_forked(daemon):
+    """A lock that another thread holds would never be free in a fork; a progress bar holds none that is asked for."""
     wait = threading.Event()
-    other = threading.Thread(target=wait.wait)
+    other = threading.Thread(target=wait.wait, daemon=daemon)
     other.start()
     try:
-        assert not child._may_fork()
+        assert child._may_fork() == daemon
     finally:
         wait.set()
         other.join()
