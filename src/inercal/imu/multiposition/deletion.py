@@ -74,13 +74,8 @@ class LinearFit:
         V = self.known + np.diag(np.repeat(variance * self.growth, self.residuals.shape[1]))
         L = np.asarray(np.linalg.cholesky(V), dtype=np.float64)
         rows = np.column_stack([self.jacobian.reshape(len(V), -1), self.residuals.ravel()])
-<<<<<<< HEAD
-        white = solve_triangular(L, rows, lower=True)
-        return np.asarray(L), np.asarray(white[:, :-1]), np.asarray(white[:, -1])
-=======
         white = np.asarray(solve_triangular(L, rows, lower=True), dtype=np.float64)
         return L, white[:, :-1], white[:, -1]
->>>>>>> wB
 
     def _inverse(self, J: Array) -> Array:
         """(P, P) ``(J^T J + information)^-1``, zero where nothing tells."""
