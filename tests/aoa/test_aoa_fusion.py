@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, G, scenario, study
 
+from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.fusion import smoother
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.loop import OUTPUTS
@@ -20,7 +21,7 @@ from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Attitude, Disturbances, Estimator, MotionPlan, Oscillation, Timing
+from inercal.aoa.settings import Attitude, Estimator, MotionPlan, Timing
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit
 

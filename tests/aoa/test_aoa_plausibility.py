@@ -8,11 +8,12 @@ from sting_study import BASE, DEG, SCENARIOS, G, clipped, scenario, study
 
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.diagnosis.gross import gross_faults
+from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.filter_result import of_fusion as of_filter
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.result.verdict import of_fusion
-from inercal.aoa.settings import Disturbances, MotionPlan, Oscillation, Timing
+from inercal.aoa.settings import MotionPlan, Timing
 from inercal.aoa.simulate import simulate
 from inercal.findings import Status
 

@@ -156,6 +156,12 @@ class Limits:
     zero_sigmas: float = 3.0
     """Standard deviations by which the angle may change in that stretch."""
 
+    shaken_gyro: float = 2.0
+    """Standard deviation of the gyro, over its stated noise, from which a model shakes in that stretch."""
+
+    zero_buffet: float = math.radians(0.05)
+    """Root mean square [rad] of a buffet in that stretch up to which it is averaged, and not refused."""
+
     lost_variance: float = 0.09
     """Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
 

@@ -102,12 +102,15 @@ def measure(
     methods: Methods | None = None,
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
+    known: tuple[Mapping[str, float], Mapping[tuple[str, str], float]] | None = None,
 ) -> Measurement:
     """Measure the angle of attack of a model from a record of ``t``, ``a1`` .. and ``gyro``.
 
     ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger`` and ``theta_ref`` are used where the record has them.
     ``methods`` are those of the paper, None for the fusion; with ``compare`` the angles are also found by the fusion of
     8 and 19 states, causal and smoothed, and by the paper's methods. ``progress`` is called with each step, in words.
+    ``known`` coefficients, values by name and covariances by pairs of names, take the place of those of an earlier
+    result.
 
     The status of the estimate says whether the angles can be used: nothing is raised for poor ones. `InputError` is
     raised where the record has not the channels of a model, the study does not fit it, or an earlier result cannot be
@@ -124,7 +127,7 @@ def measure(
     stated, settings = settings, decided(recording, settings)
     findings = [*implausible(*fused_case(recording, settings)), *of_vibration(stated, settings)]
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
-    of = problem(settings, recording.spatial, posterior)
+    of = problem(settings, recording.spatial, posterior if known is None else known)
     delay = relative_delay(recording, settings.layout)
     filtered: FilterResult | None = None
     if methods is None:

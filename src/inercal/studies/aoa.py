@@ -12,12 +12,14 @@ from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, mod
 
 from inercal._toml import Strict, check
 from inercal.aoa.band import Band
+from inercal.aoa.disturbances import DELAY
 from inercal.aoa.settings import (
-    DELAY,
     AoaSettings,
     Attitude,
+    Design,
     Estimator,
     Flow,
+    Goal,
     Methods,
     ModelAttitude,
     Noise,
@@ -222,6 +224,12 @@ class AoaStudyFile(Strict):
     )
     flow: Stated[Flow] = Field(default=Flow(), title="Flow", description="angularity of the flow")
     zero: ZeroTable | None = Field(default=None, title="Zero", description="a stretch at a known angle")
+    design: Stated[Design] = Field(
+        default=Design(), title="Design", description="where `inercal design aoa` may put accelerometers"
+    )
+    goal: Stated[Goal] = Field(
+        default=Goal(), title="Goal", description="uncertainty that a design is to reach"
+    )
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -234,6 +242,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
     """
     file = check(AoaStudyFile, data, path, StudyError)
     layout, sensors = layout_of(file.sensors), calibrations_of(file.sensors, path)
+    motion = None if file.motion is None else motion_of(file.motion, path)
     return AoaSettings(
         site=site_of(file.site, path),
         layout=layout,
@@ -246,12 +255,24 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
         zero=None if file.zero is None else _zero(file.zero),
-        motion=None if file.motion is None else motion_of(file.motion, path),
-        disturbances=disturbances_of(file.disturbances, layout, sensors, path),
+        motion=motion,
+        disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
+        design=_design(file.design, path),
+        goal=file.goal,
         traceability=file.traceability.model_dump(),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
+
+
+def _design(design: Design, path: str | Path) -> Design:
+    """The design; refuses places that are one."""
+    if not design.rearmost < design.foremost:
+        raise StudyError(
+            path,
+            f"design.rearmost: found {design.rearmost:g} m with foremost {design.foremost:g} m, expected it behind",
+        )
+    return design
 
 
 def _prior(table: SensorPriorTable) -> Prior:
