@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.diagnosis.choice import decided, of_vibration
+from inercal.aoa.diagnosis.choice import decided, of_delay, of_vibration
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
@@ -136,6 +136,7 @@ def measure(
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
+        findings += of_delay(delay, of, filtered)
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)

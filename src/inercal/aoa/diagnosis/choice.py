@@ -21,15 +21,16 @@ from inercal.aoa.band import Band
 from inercal.aoa.diagnosis.noise_check import misstated
 from inercal.aoa.diagnosis.spectrum import highest_motion, lines, white_noise
 from inercal.aoa.fusion import band as limiting
+from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.paper.delay import relative_delay
+from inercal.aoa.paper.delay import Delay, relative_delay
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Prior, Resonance
-from inercal.findings import Finding
+from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
 DENSITIES = (1e9, 1e10, 1e11, 1e12)
@@ -102,6 +103,27 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
         )
         findings.append(Finding("wide_flexure", text))
     return findings
+
+
+def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:
+    """``command_shift``: a delay of the gyro by the spectra that is not that of the fusion, and costs more than u.
+
+    In a band whose rows are few the fusion alone may not learn it.
+    """
+    k = problem.places.delay
+    if delay is None or k < 0:
+        return []
+    off = delay.value - float(filtered.state.x[k])
+    known = np.isfinite(filtered.u) & np.isfinite(filtered.rate)
+    cost = abs(off) * float(np.sqrt(np.mean(np.square(filtered.rate[known])))) if known.any() else 0.0
+    if abs(off) <= LIMITS.delay_sigmas * delay.u or not cost > float(np.median(filtered.u[known])):
+        return []
+    side = "later" if delay.value > 0.0 else "earlier"
+    text = (
+        f"gyro comes {1e3 * abs(delay.value):.2g} ms {side} than the accelerometers by the spectra, which the fusion "
+        f'does not learn: write gyro_delay = "{1e3 * delay.value:.3g} ms" under [timing]'
+    )
+    return [Finding("command_shift", text, harm=EVERYTHING)]
 
 
 def _fair(part: Recording, settings: AoaSettings) -> AoaSettings:
