@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import replace
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,10 @@ from inercal.selfcal.filters.filter_result import (
     State,
     Trace,
     attitude_of,
+    empty_estimates,
     estimate_of,
 )
-from inercal.selfcal.filters.gaps import advance
+from inercal.selfcal.filters.gaps import advance, joined
 from inercal.selfcal.filters.linear import estimate_linear
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.second_pass import is_due, second_pass
@@ -47,13 +49,14 @@ def estimate(
     kind: FilterKind | None = None,
     start: Start | None = None,
     history: bool = True,
-    twice: bool = True,
+    brief: bool = False,
 ) -> FilterResult:
     """Estimate the coefficients from a recording, by the estimator of the problem or another ``kind``.
 
     ``start`` of the attitude is the first encoder reading if absent; with ``history`` the estimates after each row are
-    kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`), if ``twice``; history
-    but its last row, innovations and NIS are those of the first pass.
+    kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`); history but its last
+    row, innovations and NIS are those of the first pass. A ``brief`` one, for a judge of the innovations, takes one
+    pass, and of a long recording its history has no coefficients.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
@@ -65,23 +68,28 @@ def estimate(
     state: State = module.initial(problem, recording.th[0], start)
     first = estimate_of(state, problem)
     motion = recording.steps, recording.held
-    state, trace = advance(module, state, problem, *motion, history, recording.walked)
+    if brief and len(recording.dt) > _CHUNK:
+        state, trace = _by_chunks(module, state, problem, recording, history)
+    else:
+        state, trace = advance(module, state, problem, *motion, history, recording.walked)
     last = None
-    if twice and is_due(kind, problem):
+    if not brief and is_due(kind, problem):
         begun = module.initial(problem, recording.th[0], start)
         state = second_pass(module, begun, state, problem, *motion, recording.walked)
         last = estimate_of(state, problem)
     seconds = time.perf_counter() - began
+    of_steps = trace.estimates._asdict()
+    trace = trace._replace(estimates=empty_estimates(0, 0, False))
     size = len(problem.prior)
     result = FilterResult(
         kind=kind,
         coefficients=state.coefficients,
         covariance=state.covariance[-size:, -size:],
         attitude=attitude_of(state, problem),
-        nis=trace.estimates.nis,
-        dims=trace.estimates.dims,
-        innovations=trace.estimates.innovations,
-        history=_history(first, trace, last) if history else None,
+        nis=of_steps["nis"],
+        dims=of_steps["dims"],
+        innovations=of_steps["innovations"],
+        history=_history(first, of_steps, last) if history else None,
         seconds=seconds,
         lowest_eigenvalue=trace.lowest_eigenvalue,
         fallbacks=trace.fallbacks,
@@ -93,6 +101,31 @@ def estimate(
     return replace(result, converged=False, message=message) if message else result
 
 
+_CHUNK = 1 << 16
+"""Steps of which all is kept at once, where little is kept in the end."""
+
+
+def _by_chunks(
+    module: ModuleType, state: State, problem: FilterProblem, recording: Recording, history: bool
+) -> tuple[State, Trace]:
+    """Take a filter through a long recording, and forget the coefficients of each row."""
+    steps, m, none = recording.steps, len(recording.dt), np.empty((0, len(problem.prior)))
+    seen = np.all(np.isfinite(steps.th), axis=1)
+    parts, restarts, first = list[Trace](), list[int](), 0
+    while first < m:
+        last = min(first + _CHUNK, m)
+        while last < m and not seen[last - 1]:  # what is in doubt stays together
+            last += 1
+        held = [k - first for k in recording.held if first <= k < last]
+        walked = None if recording.walked is None else recording.walked[first:last]
+        part = steps.part(slice(first, last))
+        state, trace = advance(module, state, problem, part, held, history, walked)
+        parts.append(trace._replace(estimates=trace.estimates._replace(coefficients=none, u=none)))
+        restarts += [first + k for k in trace.restarts]
+        first = last
+    return state, joined(parts)._replace(restarts=tuple(restarts))
+
+
 def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
     """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
     module = recursive(kind)
@@ -102,10 +135,9 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
         _LOADED.add(kind)
 
 
-def _history(first: History, trace: Trace, last: History | None) -> History:
-    """The estimates of the start and of all steps; with another one of the last."""
-    of_steps = trace.estimates._asdict()
-    whole = {name: np.concatenate([row, of_steps[name]]) for name, row in vars(first).items()}
+def _history(first: History, of_steps: dict[str, Any], last: History | None) -> History:
+    """The estimates of the start and of all steps; with another one of the last. Those of the trace are used up."""
+    whole = {name: np.concatenate([row, of_steps.pop(name)]) for name, row in vars(first).items()}
     if last is not None:
         for name, row in vars(last).items():
             whole[name][-1:] = row
