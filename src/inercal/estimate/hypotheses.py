@@ -287,7 +287,7 @@ def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquar
     ``z`` (...) and ``Z`` (..., m) may hold NaN; combinations without effect stay as they are.
     """
     m = Z.shape[-1]
-    Z, z = Z.reshape(-1, m), z.reshape(-1)
+    Z, z = Z.reshape(z.size, m), z.reshape(-1)
     normal, right, square, count = np.zeros((m, m)), np.zeros(m), 0.0, 0
     for first in range(0, len(z), _BLOCK):
         some, own = Z[first : first + _BLOCK], z[first : first + _BLOCK]

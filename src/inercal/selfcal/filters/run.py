@@ -108,10 +108,13 @@ _CHUNK = 1 << 16
 def _by_chunks(
     module: ModuleType, state: State, problem: FilterProblem, recording: Recording, history: bool
 ) -> tuple[State, Trace]:
-    """Take a filter through a long recording, and forget the coefficients of each row."""
-    steps, m, none = recording.steps, len(recording.dt), np.empty((0, len(problem.prior)))
+    """Take a filter through a long recording; of the rows attitudes, innovations and NIS are kept."""
+    steps, m, p = recording.steps, len(recording.dt), len(problem.prior)
     seen = np.all(np.isfinite(steps.th), axis=1)
-    parts, restarts, first = list[Trace](), list[int](), 0
+    out = empty_estimates(0, p, history)._replace(nis=np.empty(m), dims=np.empty(m, dtype=np.int64))
+    if history:
+        out = out._replace(attitude=np.empty((m, 4)), innovations=np.empty((m, 6)))
+    health, restarts, first = list[Trace](), list[int](), 0
     while first < m:
         last = min(first + _CHUNK, m)
         while last < m and not seen[last - 1]:  # what is in doubt stays together
@@ -120,10 +123,12 @@ def _by_chunks(
         walked = None if recording.walked is None else recording.walked[first:last]
         part = steps.part(slice(first, last))
         state, trace = advance(module, state, problem, part, held, history, walked)
-        parts.append(trace._replace(estimates=trace.estimates._replace(coefficients=none, u=none)))
+        for name in ("attitude", "innovations", "nis", "dims"):
+            getattr(out, name)[first:last] = getattr(trace.estimates, name)
+        health.append(trace._replace(estimates=empty_estimates(0, p, history)))
         restarts += [first + k for k in trace.restarts]
         first = last
-    return state, joined(parts)._replace(restarts=tuple(restarts))
+    return state, joined(health)._replace(estimates=out, restarts=tuple(restarts))
 
 
 def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
