@@ -17,9 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
 import numpy as np
 from sting_study import BASE, DEG, study
 
+from inercal.aoa.disturbances import Disturbances
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.settings import Disturbances
 from inercal.aoa.simulate import simulate
 
 

@@ -1,8 +1,9 @@
 """inercal: calibrate inertial instruments, and say how sure one can be of every number.
 
 This page defines the words. Nothing here computes. In Python, ``import inercal as ic`` brings one verb for each task:
-``ic.read``, ``ic.record``, ``ic.study``, ``ic.calibrate``, ``ic.simulate``, ``ic.design``, ``ic.sensitivity``,
-``ic.allan``, ``ic.temperature``, ``ic.compare``, ``ic.apply``, ``ic.load``; each has an example in its ``help``.
+``ic.read``, ``ic.record``, ``ic.study``, ``ic.calibrate``, ``ic.runs``, ``ic.simulate``, ``ic.design``,
+``ic.sensitivity``, ``ic.allan``, ``ic.temperature``, ``ic.compare``, ``ic.apply``, ``ic.load``; each has an example in
+its ``help``.
 
 Frames, signs, units
     SI and radians inside. Another unit is written into a name (``bias_deg_per_h``) or beside a number at the
@@ -92,6 +93,7 @@ if TYPE_CHECKING:
     from inercal.face.study import study as study
     from inercal.face.verbs import calibrate as calibrate
     from inercal.face.verbs import design as design
+    from inercal.face.verbs import runs as runs
     from inercal.face.verbs import sensitivity as sensitivity
     from inercal.face.verbs import simulate as simulate
     from inercal.face.verbs import temperature as temperature
@@ -110,7 +112,7 @@ _WHERE = {
         "face.recordings": ("read", "record"),
         "face.result": ("Result",),
         "face.study": ("Study", "study"),
-        "face.verbs": ("calibrate", "design", "sensitivity", "simulate", "temperature"),
+        "face.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
         "records.record": ("Record",),
     }.items()
     for name in names

@@ -19,7 +19,8 @@ from inercal.aoa.fusion import loop
 from inercal.aoa.fusion import smoother
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.settings import Disturbances, Oscillation, Timing
+from inercal.aoa.disturbances import Disturbances, Oscillation
+from inercal.aoa.settings import Timing
 from inercal.aoa.simulate import simulate
 
 found = {}

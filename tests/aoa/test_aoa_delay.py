@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, scenario, study
 
+from inercal.aoa.disturbances import Disturbances
 from inercal.aoa.layout import Layout
 from inercal.aoa.paper.delay import aligned, relative_delay
 from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Disturbances
 from inercal.aoa.simulate import simulate
 
 LATE = Disturbances(gyro_delay=2e-3)

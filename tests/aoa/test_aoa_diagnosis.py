@@ -10,7 +10,8 @@ from sting_study import BASE, DEG, G, scenario, study
 
 from inercal.aoa.diagnosis.examination import diagnose
 from inercal.aoa.diagnosis.noise_check import scatter
-from inercal.aoa.settings import Disturbances, Estimator, MotionPlan, Oscillation
+from inercal.aoa.disturbances import Disturbances, Oscillation
+from inercal.aoa.settings import Estimator, MotionPlan
 from inercal.aoa.simulate import simulate
 from inercal.findings import EVERYTHING
 from inercal.units import Quantity, parse_unit

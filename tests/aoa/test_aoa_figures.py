@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario
 
+from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.figures import page as page_of
 from inercal.aoa.figures import pictures, sensors
 from inercal.aoa.figures.learned import consistency
-from inercal.aoa.settings import Attitude, Disturbances, Methods, Oscillation
+from inercal.aoa.settings import Attitude, Methods
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
 from inercal.report.over_time import Marks, Panel, gaps, measured, over_time, stretches, thinned

@@ -10,11 +10,11 @@ import pytest
 from new_studies import FILL
 from sting_study import BASE, layout, scenario, study
 
+from inercal.aoa.disturbances import Disturbances
 from inercal.aoa.paper.delay import relative_delay
 from inercal.aoa.paper.frequency import oscillation_frequency
 from inercal.aoa.paper.lever import zero_phase
 from inercal.aoa.reading.clock import shortened, usual_step
-from inercal.aoa.settings import Disturbances
 from inercal.aoa.simulate import simulate, to_record
 from inercal.cli import run
 from inercal.records.write import write_record

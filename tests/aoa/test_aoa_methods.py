@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, SCENARIOS, clipped, scenario, study
 
+from inercal.aoa.disturbances import Disturbances
 from inercal.aoa.paper.methods import MEASURED, label, low_passed, measure
 from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Attitude, Disturbances, Methods, Prior, Timing
+from inercal.aoa.settings import Attitude, Methods, Prior, Timing
 from inercal.aoa.simulate import drawn_biases, simulate
 from inercal.errors import RecordError, StudyError
 from inercal.units import parse_quantity
@@ -173,7 +174,7 @@ def test_the_gyro_is_aligned_first(timing):
     truth = made(settings)
     aligned, not_aligned = (
         sizes(errors(measure(truth.recording, replace(settings, timing=each), PAPER), truth))[1]
-        for each in (timing, Timing())
+        for each in (timing, Timing(0.0))
     )
     assert not_aligned > 0.05
     assert aligned < 0.02

@@ -12,9 +12,10 @@ from inercal.aoa.angles import Angles, stated_roll, theta_by_roll
 from inercal.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.motion import Sines, buffet
+from inercal.aoa.reading.means import COSINES, mean_u
 from inercal.aoa.reading.pauses import at_rest, pauses
 from inercal.aoa.reading.recording import plain
-from inercal.aoa.result.points import COSINES, mean_u, points
+from inercal.aoa.result.points import points
 from inercal.aoa.settings import Attitude, MotionPlan
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit

@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sting_study import DEG, SCENARIOS, G, scenario
 
+from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.motion import course, duration
 from inercal.aoa.reading.from_record import recording_of
-from inercal.aoa.settings import Calibration, Disturbances, MotionPlan, Oscillation
+from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import simulate, to_record
 from inercal.errors import StudyError
 from inercal.records.read import read

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, study
 
+from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.fusion import filter_result
 from inercal.aoa.fusion.filter_result import estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.result.points import points
 from inercal.aoa.result.systematic import by_fusion
-from inercal.aoa.settings import Attitude, Disturbances, Oscillation
+from inercal.aoa.settings import Attitude
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit
 

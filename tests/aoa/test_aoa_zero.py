@@ -173,6 +173,23 @@ def test_an_oscillation_about_the_angle_is_no_rest():
         with_zero(simulate(settings, np.random.default_rng(85)).recording, settings)
 
 
+def test_a_slight_buffet_is_averaged():
+    """0.03 deg rms about the known angle: over 30 draws the angle is off by its u or less, and it is told."""
+    squares, expected = [], None
+    for seed in range(30):
+        settings, simulated = at_20_deg(
+            seed, replace(ZERO, end=4.0), duration=5.0, sample_rate=250.0, rms=0.03 * DEG, low=5.0, high=15.0
+        )
+        zeroed = with_zero(simulated.recording, settings)
+        (told,) = (each for each in zeroed.findings if each.code == "not_at_rest")
+        assert "averaged" in told.message
+        theta, u, _ = last(zeroed, settings)
+        squares.append(((theta - simulated.theta[-1]) / u) ** 2)
+        expected = u
+    assert expected < 0.02 * DEG  # without the zero 0.05 deg and more
+    assert 0.1 < np.mean(squares) < 1.0 + 4.0 * math.sqrt(2.0 / 30.0)
+
+
 def test_a_model_at_rest_is_hardly_ever_refused():
     # the limits lie at six standard deviations of a part's mean and three of the gyro's walk
     for seed in range(40):

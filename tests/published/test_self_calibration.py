@@ -442,8 +442,29 @@ def test_heading_matters_by_earth_rate_alone():
         assert off(world=world)[0] == pytest.approx(shift, rel=0.05)
 
 
+@pytest.mark.parametrize("latitude", [40.0, 45.0])
+def test_the_printed_earth_rate_holds_at_45_degrees_alone(latitude):
+    """(0, cos L, sin L) with gravity along the second axis, north along the third: a colatitude would make it right."""
+    changes = {"site": replace(study().site, latitude=latitude * DEG), "base": Base(heading=-90.0 * DEG)}
+    world = study(**changes).world
+    run, given = made(0, **changes)
+    np.testing.assert_allclose(
+        world.earth / np.linalg.norm(world.earth),
+        [0.0, np.sin(latitude * DEG), np.cos(latitude * DEG)],
+        atol=1e-12,
+    )
+    printed = world._replace(earth=world.earth[[0, 2, 1]])
+    found = estimate(run.recording, given, history=False)
+    shifted = estimate(run.recording, replace(given, world=printed), history=False)
+    if latitude == 45.0:
+        assert in_sigma(shifted, found) < 1e-6
+    else:
+        assert in_sigma(shifted, found) > 800.0
+        assert 400.0 < shifted.nis_mean < 600.0
+
+
 def test_earth_rate_in_other_axes_than_gravity():
-    """Printed as east-north-up beside a gravity in north-up-east: it cannot have been computed so."""
+    """Printed as east-north-up, taken beside a gravity in north-up-east."""
     world = study().world
     printed = np.array([0.0, world.earth[0], world.earth[1]])
     found, nis = off(world=world._replace(earth=printed))

@@ -159,6 +159,20 @@ def test_four_to_five_times_is_two(mean):
     assert_allclose(az[K["dphi_y1"]] / az[columns(INNER)], 2.0, rtol=1e-4)
 
 
+def test_no_average_gives_three_to_five_times(indices):
+    """Two indices add up to the leading one at every position, so the larger of the two is at least its half in any
+    average; of first order in the tolerances, which are 6e-4."""
+    for output, pair, leading in (
+        ("ax", ("dphi_y1", "dalpha_x1"), "dalpha_y2"),
+        ("ay", ("dphi_y1", "dalpha_x1"), "dalpha_x2"),
+        ("az", ("dalpha_x2", "dalpha_y2"), "dphi_y1"),
+    ):
+        first = indices.first[AT[output]]
+        both = first[:, columns(pair)].sum(axis=1)
+        assert_allclose(both, first[:, K[leading]], atol=1e-6)
+        assert first[:, K[leading]].min() > 0.0
+
+
 def test_accelerations_and_rates_share_their_full_circle_means():
     """What is left is the grid's error, 1e-4 at 10 deg and falling with the square of the step."""
     fine = averages.mean(exact.analyse(CHAIN, OUTPUTS, grid((144, 144)).angles)).first

@@ -459,7 +459,8 @@ def test_statistics_are_in_words():
     """Nothing of a self-calibration is a residual of |f|; what a row cost is there with its share of the interval."""
     statistics = {"residual_rms": 1.001, "chi2": 16220.0, "nis_mean": 6.008, "steps": 2700.0}
     calibration = evidence()
-    own = replace(calibration.estimate, statistics=statistics, result={"step_us": 4.0, "sample_share": 2e-5})
+    cost = {"result": {"sample_interval": 0.2}, "timing": {"step": 4e-6}}
+    own = replace(calibration.estimate, statistics=statistics, **cost)
     page = drawn_by.page(replace(calibration, estimate=own))
     for words in (
         "<dt>root-mean-square normalised innovation, expected 1</dt><dd>1.001</dd>",

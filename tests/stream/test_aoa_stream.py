@@ -9,13 +9,14 @@ import pytest
 from sting_study import BASE, DEG, G, study
 from streams_that_break import lines_out
 
+from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.result.columns import angles_record
 from inercal.aoa.result.systematic import by_fusion
-from inercal.aoa.settings import Attitude, Calibration, Disturbances, Oscillation, Zero
+from inercal.aoa.settings import Attitude, Calibration, Zero
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
 from inercal.errors import InputError, RecordError, StudyError

@@ -5,16 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from inercal.aoa.disturbances import Disturbances, Shaking
 from inercal.aoa.layout import Layout
-from inercal.aoa.settings import (
-    AoaSettings,
-    Calibration,
-    Disturbances,
-    Estimator,
-    MotionPlan,
-    Noise,
-    Shaking,
-)
+from inercal.aoa.settings import AoaSettings, Calibration, Estimator, MotionPlan, Noise
 from inercal.geometry.site import Site
 
 G = 9.80665

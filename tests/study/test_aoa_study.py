@@ -10,17 +10,8 @@ from jsonschema import Draft202012Validator
 from sting_study import DEG, SCENARIOS, G, scenario
 from sting_text import CONTRACT, WRITTEN, calibrated, same, study
 
-from inercal.aoa.settings import (
-    AoaSettings,
-    Calibration,
-    Disturbances,
-    Estimator,
-    Methods,
-    MotionPlan,
-    Oscillation,
-    Prior,
-    Zero,
-)
+from inercal.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Oscillation, Plunge, Shaking
+from inercal.aoa.settings import AoaSettings, Calibration, Estimator, Methods, MotionPlan, Prior, Zero
 from inercal.errors import StudyError
 from inercal.studies.load import (
     files_of,
@@ -99,7 +90,16 @@ def test_all_that_settings_hold_is_reached():
             "roll": {"amplitude": "1 deg", "frequency": "8 Hz"}, "yaw": {"amplitude": "2 deg", "frequency": "3 Hz"},
             "gyro_scale": "0.1 %", "gyro_delay": "2 ms", "common_delay": "-1 ms", "bandwidth": "100 Hz",
             "spikes": "0.01 %", "spike": "1 g", "dropouts": "1 %", "clip": True,
+            "lines": [
+                {"frequency": "112 Hz", "level": "0.3 g"}, {"frequency": "47 Hz", "level": "1 mg", "axial": "2 mg"}
+            ],
+            "local_vibration": {"rms": "0.5 g", "low": "120 Hz", "high": "240 Hz"}, "mains": {"level": "50 mg"},
+            "buffet": {"rms": "0.1 deg", "low": "5 Hz", "high": "60 Hz"},
+            "plunge": {"level": "0.02 g", "frequency": "2 Hz"}, "axis_errors": ["0 deg", "0.3 deg", "-1 mrad"],
+            "rectification": "500 ug/g^2", "bias_drift": ["0 mg", "1 mg", "0 mg"], "stamp_jitter": "0.1 ms",
+            "sample_rates": {"gyro": "250 Hz", "a2": "500 Hz"},
         },
+        motion={"kind": "static", "first": "0 deg", "last": "0 deg", "sample_rate": "1 kHz"},
         traceability={"instrument": "model 7"},
         conditions={"temperature": "23 degC"},
     )  # fmt: skip
@@ -120,6 +120,10 @@ def test_all_that_settings_hold_is_reached():
     expected = Disturbances(
         roll=Oscillation(DEG, 8.0), yaw=Oscillation(2 * DEG, 3.0), gyro_scale=1e-3, gyro_delay=2e-3,
         common_delay=-1e-3, bandwidth=100.0, spikes=1e-4, spike=G, dropouts=0.01, clip=True,
+        lines=(Line(112.0, 0.3 * G), Line(47.0, 1e-3 * G, 2e-3 * G)), local_vibration=Shaking(0.5 * G, 120.0, 240.0),
+        mains=Mains(0.05 * G), buffet=AngleShaking(0.1 * DEG, 5.0, 60.0), plunge=Plunge(0.02 * G, 2.0),
+        axis_errors=(0.0, 0.3 * DEG, -1e-3), rectification=500e-6 / G, bias_drift=(0.0, 1e-3 * G, 0.0),
+        stamp_jitter=1e-4, sample_rates={"gyro": 250.0, "a2": 500.0},
     )  # fmt: skip
     same(found.disturbances, expected)
     assert found.traceability["instrument"] == "model 7"
@@ -203,7 +207,7 @@ REFUSED = {
     "timing.common_delay=2": "timing.common_delay: found '2' without a unit",
     "timing.common_delay=2 min": "timing.common_delay: .*from -1 s to 1 s",
     "estimator.states=12": "estimator.states: found 12, expected 8, 11, 15 or 19",
-    "estimator.snap=1e7": "estimator.snap: found 10000000.0, expected a spectral density",
+    "estimator.snap=1e7": 'estimator.snap: found 10000000.0, expected "auto" or a spectral density',
     "estimator.snap=0 rad^2/s^7": "estimator.snap: found '0 rad.2/s.7', expected",
     "estimator.gate=0.5": "estimator.gate: found 0.5",
     "estimator.gate=wide": "estimator.gate: found 'wide'",
@@ -215,6 +219,12 @@ REFUSED = {
     'zero={start = "5 s", end = "5 s", angle = "0.0(1) deg"}': "zero: start: found '5 s', expected it before end",
     'disturbances.heights=["1 mm"]': "disturbances.heights: found 1, expected one for each of a1, a2, a3",
     'disturbances.heave={rms = "1 g", low = "9 Hz", high = "9 Hz"}': "disturbances.heave.low: found 9 Hz",
+    'disturbances.axis_errors=["1 mrad"]': "disturbances.axis_errors: found 1, expected one for each of a1, a2, a3",
+    'disturbances.lines=[{frequency = "9 Hz"}]': "disturbances.lines.0.level: missing",
+    "disturbances.rectification=500 ug": "disturbances.rectification: found '500 ug', which is of acceleration",
+    'disturbances.sample_rates={gyro = "300 Hz"}': "found '300 Hz', expected motion.sample_rate, 1000",
+    'disturbances.sample_rates={gyro = "2 kHz"}': "sample_rates.gyro: found '2 kHz', expected motion.sample_rate",
+    'disturbances.sample_rates={a4 = "100 Hz"}': "sample_rates.a4: found no such sensor, expected one of a1",
     "disturbances.spikes=1": "disturbances.spikes: .*below 1",
     "disturbances.pivot=3 m": "disturbances.pivot: .*mm given as m",
     "site.gravity=9 m/s^2": "site.gravity: .*check the unit",

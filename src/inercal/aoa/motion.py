@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
-from inercal.aoa.settings import MotionPlan, Oscillation, Shaking
+from inercal.aoa.disturbances import Oscillation, Shaking
+from inercal.aoa.settings import MotionPlan
 from inercal.arrays import Array
 from inercal.errors import InputError, StudyError
 
@@ -48,9 +49,15 @@ def buffet(rms: float, low: float, high: float, rng: np.random.Generator, count:
     return Sines(np.full(count, rms * math.sqrt(2.0 / count)), omega, rng.uniform(0.0, 2.0 * math.pi, count))
 
 
-def shaking(of: Shaking | None, rng: np.random.Generator) -> Sines:
-    """A vibration as sines; no sine without one."""
-    return _sines() if of is None else buffet(of.rms, of.low, of.high, rng, _SHAKING)
+def shaking(of: Shaking | None, rng: np.random.Generator, count: int = _SHAKING) -> Sines:
+    """A vibration as ``count`` sines; no sine without one."""
+    return _sines() if of is None else buffet(of.rms, of.low, of.high, rng, count)
+
+
+def tones(levels: Sequence[float], frequencies: Sequence[float], rng: np.random.Generator) -> Sines:
+    """Sines of given amplitudes and frequencies [Hz], and random phases."""
+    omega = 2.0 * math.pi * np.array(frequencies, dtype=float)
+    return Sines(np.array(levels, dtype=float), omega, rng.uniform(0.0, 2.0 * math.pi, len(omega)))
 
 
 def oscillation(of: Oscillation | None) -> Sines:

@@ -10,7 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from inercal.aoa.layout import Layout
+from inercal.aoa.band import Band
+from inercal.aoa.disturbances import SIZE, Disturbances
+from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
@@ -18,12 +20,10 @@ from inercal.geometry.site import Site
 from inercal.keys import (
     DEVIATION,
     FREQUENCY,
-    PART,
     REQUIRED,
     TIME,
     Bounds,
     option,
-    quantities,
     quantity,
     within,
 )
@@ -34,6 +34,7 @@ Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
 Tangential = Literal["none", "differentiated", "dual"]
 Per = Literal["1", "V", "count"]
+AxisName = Literal["+x", "-x", "+z", "-z"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 
 STATES: tuple[States, ...] = (8, 11, 15, 19)
@@ -49,11 +50,8 @@ _OF_PLACES = Bounds(
 )
 _ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
 _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg to 45 deg")
+_WITHIN = within(-5.0, 5.0, "a position within 5 m of the pivot (mm given as m?)")
 _PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
-_SIZE = within(0.0, math.pi, "an angle from 0 to 180 deg")
-_FORCE = within(0.0, math.inf, "an acceleration of 0 or more")
-_SHIFT = within(-1.0, 1.0, "a length within 1 m (mm given as m?)")
-DELAY = within(-1.0, 1.0, "a delay from -1 s to 1 s")
 
 
 @dataclass(frozen=True)
@@ -140,20 +138,22 @@ class Calibration:
 class Timing:
     """Delays [s], positive where outputs come late.
 
-    ``gyro_delay`` of the gyro against the accelerometers, None where it is to be estimated; ``common_delay`` of all
+    ``gyro_delay`` of the gyro against the accelerometers, None where it is estimated ``gyro_delay_about`` some value,
+    that of the spectra; ``common_delay`` of all
     sensors against the stamps, with its standard uncertainty ``common_delay_u``: no sensor sees it.
     """
 
-    gyro_delay: float | None = 0.0
+    gyro_delay: float | None = None
     common_delay: float = 0.0
     common_delay_u: float = 0.0
+    gyro_delay_about: float = 0.0
 
 
 @dataclass(frozen=True)
 class Estimator:
     """The fusion of all sensors.
 
-    ``snap`` [rad^2/s^7], None where it is not stated (`density`).
+    ``snap`` [rad^2/s^7], None where the recording decides (`inercal.aoa.diagnosis.choice`); until then `density`.
     """
 
     states: States = option("of three accelerometers: 19 all errors, 15, 11, 8 biases alone", 19)
@@ -181,7 +181,9 @@ class Methods:
 
     static: Static = option("the static mechanisation", "improved")
     centrifugal: Centrifugal = option("compensation of r w^2", "mechanical")
-    tangential: Tangential = option("compensation of r times angular acceleration", "dual")
+    tangential: Tangential = option(
+        "compensation of r times angular acceleration; differentiated: the gyro's first difference", "dual"
+    )
 
 
 @dataclass(frozen=True)
@@ -259,10 +261,10 @@ class MotionPlan:
     mean: float = quantity(
         "of sine, two-tone, chirp and buffet", "angle", "0 deg", example="30 deg", bounds=_PITCH
     )
-    amplitude: float = quantity("of sine, two-tone and chirp", "angle", 0.0, example="10 deg", bounds=_SIZE)
+    amplitude: float = quantity("of sine, two-tone and chirp", "angle", 0.0, example="10 deg", bounds=SIZE)
     frequency: float = quantity("of sine and two-tone", "frequency", 1.0, example="1 Hz", bounds=FREQUENCY)
     second_amplitude: float = quantity(
-        "of the second sine of two-tone", "angle", 0.0, example="2 deg", bounds=_SIZE
+        "of the second sine of two-tone", "angle", 0.0, example="2 deg", bounds=SIZE
     )
     second_frequency: float = quantity(
         "of the second sine of two-tone", "frequency", 1.0, example="3 Hz", bounds=FREQUENCY
@@ -277,7 +279,7 @@ class MotionPlan:
         "angle",
         0.0,
         example="0.2 deg",
-        bounds=_SIZE,
+        bounds=SIZE,
     )
     first: float = quantity(
         "angle at the start of static and pitch-pause", "angle", 0.0, example="-10 deg", bounds=_PITCH
@@ -295,68 +297,29 @@ class MotionPlan:
 
 
 @dataclass(frozen=True)
-class Shaking:
-    """A random vibration, 40 equal sines."""
+class Design:
+    """Places where accelerometers may sit, for `inercal design aoa`."""
 
-    rms: float = quantity("in all", "acceleration", REQUIRED, example="0.03 g", bounds=_FORCE)
-    low: float = quantity("lowest frequency", "frequency", REQUIRED, example="8 Hz", bounds=FREQUENCY)
-    high: float = quantity("highest frequency", "frequency", REQUIRED, example="10 Hz", bounds=FREQUENCY)
+    accelerometers: int = option(
+        "how many; as many as there are under [sensors] if 0", 0, example=3, least=0, most=12
+    )
+    rearmost: float = quantity(
+        "position of the rearmost place, negative behind the pivot", "length", "-0.25 m", bounds=_WITHIN
+    )
+    foremost: float = quantity("position of the foremost place", "length", "0.25 m", bounds=_WITHIN)
+    places: int = option("places, evenly from the rearmost to the foremost", 5, least=2, most=41)
+    axes: tuple[AxisName, ...] = option(
+        "axes that they may look along", tuple(AXES), example=["+x", "+z", "-z"]
+    )
 
 
 @dataclass(frozen=True)
-class AngleShaking(Shaking):
-    """A random vibration of an angle, 40 equal sines."""
+class Goal:
+    """Wanted standard uncertainty, for `inercal design aoa`."""
 
-    rms: float = quantity("in all", "angle", REQUIRED, example="0.1 deg", bounds=_SIZE)
-
-
-@dataclass(frozen=True)
-class Oscillation:
-    """A rigid oscillation: a sine."""
-
-    amplitude: float = quantity("of the angle", "angle", REQUIRED, example="1 deg", bounds=_SIZE)
-    frequency: float = quantity("of the sine", "frequency", REQUIRED, example="8 Hz", bounds=FREQUENCY)
-
-
-@dataclass(frozen=True)
-class Disturbances:
-    """Disturbances that a simulation adds to the rigid, well-known model; none if absent.
-
-    Flexure of the sting: ``pitch`` [rad], ``heave`` and ``axial`` [m/s^2]. ``roll`` and ``yaw`` [rad] coupled in.
-    ``heights`` [m] added to each z. A gyro's spikes are ``spike`` over 9.80665 in rad/s.
-    """
-
-    pitch: AngleShaking | None = None
-    heave: Shaking | None = None
-    axial: Shaking | None = None
-    roll: Oscillation | None = None
-    yaw: Oscillation | None = None
-    pivot: float = quantity("added to all positions r", "length", "0 m", example="3 mm", bounds=_SHIFT)
-    heights: tuple[float, ...] = quantities(
-        "added to the heights z, one for each accelerometer; 0 if absent", "length",
-        example=["5 mm", "-3 mm", "5 mm"], bounds=_SHIFT, at_least=0,
-    )  # fmt: skip
-    gyro_scale: float = quantity(
-        "scale error of the gyro", "number", "0", example="0.1 %", bounds=within(-0.5, 0.5, "within 50 %")
+    theta: float | None = quantity(
+        "of the angle", "angle", example="0.01 deg", bounds=within(1e-9, 1.0, "an angle above 0, below 1 rad")
     )
-    gyro_delay: float = quantity(
-        "by which the gyro comes later than the accelerometers", "time", "0 s", example="2 ms", bounds=DELAY
-    )
-    common_delay: float = quantity(
-        "by which all sensors come later than their stamps", "time", "0 s", example="0.5 ms", bounds=DELAY
-    )
-    bandwidth: float = quantity(
-        "of all sensors, first order; without limit if absent", "frequency", math.inf, example="100 Hz",
-        bounds=FREQUENCY,
-    )  # fmt: skip
-    spikes: float = quantity(
-        "part of the samples of each sensor that are spikes", "number", "0", example="0.01 %", bounds=PART
-    )
-    spike: float = quantity(
-        "size of a spike, of a gyro 1 rad/s for each g", "acceleration", "0.5 g", bounds=_FORCE
-    )
-    clip: bool = option("limit sensors to their ranges", False)
-    dropouts: float = quantity("part of the rows that are empty", "number", "0", example="1 %", bounds=PART)
 
 
 @short_repr
@@ -375,12 +338,15 @@ class AoaSettings:
     prior: Prior = field(default_factory=Prior)
     sensors: Mapping[str, Calibration] = field(default_factory=dict)
     timing: Timing = field(default_factory=Timing)
+    band: Band = field(default_factory=Band)
     estimator: Estimator = field(default_factory=Estimator)
     methods: Methods = field(default_factory=Methods)
     attitude: Attitude = field(default_factory=Attitude)
     zero: Zero | None = None
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
+    design: Design = field(default_factory=Design)
+    goal: Goal = field(default_factory=Goal)
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inercal.aoa.motion import course, duration, oscillation, point_numbers, shaking
+from inercal.aoa.disturbances import Disturbances
+from inercal.aoa.motion import SINES, Sines, course, duration, oscillation, point_numbers, shaking, tones
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.settings import GYROS, AoaSettings, Disturbances, Noise
+from inercal.aoa.settings import GYROS, AoaSettings, Noise
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.records.record import Record, record_of
@@ -57,25 +58,34 @@ def simulate(
         truth[f"dr_{k + 1}"] = truth.get(f"dr_{k + 1}", 0.0) + other.pivot
         height = other.heights[k] if k < len(other.heights) else 0.0
         truth[f"zo_{k + 1}"] = truth.get(f"zo_{k + 1}", 0.0) + height
+        axis = other.axis_errors[k] if k < len(other.axis_errors) else 0.0
+        truth[f"dlambda_{k + 1}"] = truth.get(f"dlambda_{k + 1}", 0.0) + axis
     truth["k_g"] = truth.get("k_g", 0.0) + other.gyro_scale
     truth["tau_g"] = truth.get("tau_g", 0.0) + other.gyro_delay
     pitch = course(plan, rng)
     flexure = [shaking(each, rng) for each in (other.pitch, other.heave, other.axial)]
+    tunnel = _tunnel(settings, rng)
     step = 1.0 / plan.sample_rate
     t = step * np.arange(round(duration(plan) / step), dtype=float)
     before = round(_MARGIN / step) if math.isfinite(other.bandwidth) else 0
     longer = step * np.arange(-before, len(t), dtype=float)
 
     def moved(at: Array) -> tuple[Array, Array, Array]:
-        parts = (pitch(at), flexure[0](at))
-        theta, rate, acceleration = (a + b for a, b in zip(*parts, strict=True))
+        parts = (pitch(at), flexure[0](at), tunnel.buffet(at))
+        theta, rate, acceleration = (a + b + c for a, b, c in zip(*parts, strict=True))
         return theta, rate, acceleration
 
     body = _Body(settings, truth)
     late = longer - other.common_delay
-    read = body.accelerometers(late, *moved(late), flexure[1](late)[0], flexure[2](late)[0])
+    if other.stamp_jitter > 0.0:
+        late = late + other.stamp_jitter * rng.standard_normal(len(late))
+    up, along = tunnel.up(late)[0] + flexure[1](late)[0], tunnel.along(late)[0] + flexure[2](late)[0]
+    force = body.specific_force(late, *moved(late), up, along, tunnel.plunge(late)[0])
+    force += np.column_stack([each(late)[0] for each in tunnel.local])
+    read = body.accelerometers(force, late / t[-1] if len(t) > 1 else late)
     later = late - truth["tau_g"]
     values = np.column_stack([read, *body.gyros(later, *moved(later))])
+    values += np.column_stack([each(late)[0] for each in tunnel.mains])
     values = _limited(values, other, step)[before:]
     noise = np.array([settings.noise.accelerometer] * n + [settings.noise.gyro] * 3)
     values += noise * rng.standard_normal(values.shape)
@@ -93,6 +103,37 @@ def simulate(
         reference=theta,
     )
     return Simulated(recording, theta, rate, acceleration, truth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tunnel:
+    """Random parts of a tunnel: ``buffet`` [rad], accelerations of the model ``up`` along z, ``along`` x and ``plunge``
+    along the vertical, ``local`` ones of each accelerometer, and ``mains`` in each channel [m/s^2, rad/s]."""
+
+    buffet: Sines
+    plunge: Sines
+    up: Sines
+    along: Sines
+    local: tuple[Sines, ...]
+    mains: tuple[Sines, ...]
+
+
+def _tunnel(settings: AoaSettings, rng: np.random.Generator) -> _Tunnel:
+    """The tunnel of a study's disturbances; nothing is drawn for what is absent."""
+    other, n = settings.disturbances, len(settings.layout.names)
+    frequencies = [line.frequency for line in other.lines]
+    plunge, mains = other.plunge, other.mains
+    levels = () if mains is None else (mains.level,) * n + (mains.rate,) * len(GYROS)
+    return _Tunnel(
+        buffet=shaking(other.buffet, rng, SINES),
+        plunge=tones([], [], rng) if plunge is None else tones([plunge.level], [plunge.frequency], rng),
+        up=tones([line.level for line in other.lines], frequencies, rng),
+        along=tones([line.axial for line in other.lines], frequencies, rng),
+        local=tuple(shaking(other.local_vibration, rng) for _ in range(n)),
+        mains=tuple(tones([level], [mains.frequency], rng) for level in levels)
+        if mains is not None
+        else (tones([], [], rng),) * (n + len(GYROS)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,19 +161,37 @@ class _Body:
         al = acceleration * cp - rate * sp * phi1 - psi2 * c * sp + psi1 * (s * rate * sp - c * cp * phi1)
         return phi, p, w, y, al
 
-    def accelerometers(
-        self, t: Array, theta: Array, rate: Array, acceleration: Array, heave: Array, axial: Array
+    def specific_force(
+        self,
+        t: Array,
+        theta: Array,
+        rate: Array,
+        acceleration: Array,
+        heave: Array,
+        axial: Array,
+        plunge: Array,
     ) -> Array:
-        """(n, N) m/s^2, without noise."""
-        g, layout, errors = self.settings.site.gravity, self.settings.layout, self.errors
+        """(n, N) m/s^2 along the axes; ``heave`` and ``axial`` in the body's, ``plunge`` (n,) in the vertical."""
+        layout, errors = self.settings.layout, self.errors
         phi, p, w, y, al = self.turning(t, theta, rate, acceleration)
-        readings = np.empty((len(t), len(layout.names)))
+        along = np.empty((len(t), len(layout.names)))
+        g = self.settings.site.gravity + plunge
         for k, angle in enumerate(layout.angle):
             r, z = layout.r[k] + errors[f"dr_{k + 1}"], layout.z[k] + errors[f"zo_{k + 1}"]
             fx = g * np.sin(theta) - r * (w**2 + y**2) - z * (al - p * y) + axial
             fz = g * np.cos(theta) * np.cos(phi) + r * (al + p * y) - z * (w**2 + p**2) + heave
-            readings[:, k] = fx * math.cos(angle) - fz * math.sin(angle) + errors.get(f"b_{k + 1}", 0.0)
-        return readings
+            turned = angle + errors[f"dlambda_{k + 1}"]
+            along[:, k] = fx * math.cos(turned) - fz * math.sin(turned)
+        return along
+
+    def accelerometers(self, force: Array, part: Array) -> Array:
+        """(n, N) m/s^2, without noise, of specific ``force`` (n, N); ``part`` (n,) of the record goes from 0 to 1."""
+        other, count = self.settings.disturbances, force.shape[1]
+        bias = np.array([self.errors.get(f"b_{k + 1}", 0.0) for k in range(count)])
+        readings = force + other.rectification * force**2 + bias
+        if other.bias_drift:
+            readings += np.outer(part, other.bias_drift)
+        return np.asarray(readings)
 
     def gyros(self, t: Array, theta: Array, rate: Array, acceleration: Array) -> tuple[Array, Array, Array]:
         """Nose-up, roll and yaw gyro, (n,) rad/s each, without noise."""
@@ -176,10 +235,22 @@ def to_record(recording: Recording, settings: AoaSettings) -> Record:
     ``t``; ``a1``.. [g], ``gyro`` [deg/s], and ``gyro_roll``, ``gyro_yaw`` [deg/s] where the recording has them, in
     volts or counts for sensors that the study calibrates from these. ``point`` and ``trigger`` where they are known,
     ``theta_ref`` [deg] where there is a reference; ``temperature`` [degC], that of the study, where a sensor depends
-    on it.
+    on it. Sensors with a sample rate of their own under the study's disturbances have every so many-th row of it, on a
+    clock of their own.
     """
     columns = ((name, unit, values / unit.factor) for name, unit, values in _columns(recording, settings))
-    return record_of(columns, recording.t)
+    record = record_of(columns, recording.t)
+    if settings.motion is None:
+        return record
+    clocks: dict[int, Array] = {1: recording.t}
+    slower = dict(record.columns)
+    for name, rate in settings.disturbances.sample_rates.items():
+        if name in slower:
+            every = round(settings.motion.sample_rate / rate)
+            clock = clocks.setdefault(every, np.ascontiguousarray(recording.t[::every]))
+            values = np.ascontiguousarray(slower[name].values[::every])
+            slower[name] = replace(slower[name], t=clock, values=values)
+    return replace(record, columns=slower)
 
 
 def _columns(recording: Recording, settings: AoaSettings) -> Iterator[tuple[str, Unit, Array]]:

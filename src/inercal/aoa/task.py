@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
+from inercal.aoa.diagnosis.choice import decided, of_band
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live, smoother
+from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.paper.delay import Delay, relative_delay
@@ -39,9 +41,10 @@ from inercal.records.record import Record
 class Measurement:
     """An ``estimate``, and the data behind it for files and pictures.
 
-    ``settings`` are those of the study, corrected by an earlier result; ``angles`` of the chosen method; ``filtered``
-    of the fusion, None for the paper's methods; ``points`` at rest; ``delay`` of the gyro by the spectra; ``errors`` by
-    method and ``verified`` sensors where there is a reference angle; ``compared`` angles of other methods, by name.
+    ``settings`` are those of the study, corrected by an earlier result, with what the recording decides;
+    ``angles`` of the chosen method; ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest;
+    ``delay`` of the gyro by the spectra; ``errors`` by method and ``verified`` sensors where there is a reference
+    angle; ``compared`` angles of other methods, by name.
     """
 
     estimate: Estimate
@@ -99,12 +102,15 @@ def measure(
     methods: Methods | None = None,
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
+    known: tuple[Mapping[str, float], Mapping[tuple[str, str], float]] | None = None,
 ) -> Measurement:
     """Measure the angle of attack of a model from a record of ``t``, ``a1`` .. and ``gyro``.
 
     ``gyro_roll``, ``gyro_yaw``, ``point``, ``trigger`` and ``theta_ref`` are used where the record has them.
     ``methods`` are those of the paper, None for the fusion; with ``compare`` the angles are also found by the fusion of
     8 and 19 states, causal and smoothed, and by the paper's methods. ``progress`` is called with each step, in words.
+    ``known`` coefficients, values by name and covariances by pairs of names, take the place of those of an earlier
+    result.
 
     The status of the estimate says whether the angles can be used: nothing is raised for poor ones. `InputError` is
     raised where the record has not the channels of a model, the study does not fit it, or an earlier result cannot be
@@ -118,9 +124,10 @@ def measure(
     recording = recording_of(record, settings)
     if not recording.spatial:
         settings.attitude.check_pitch_shows()
-    findings = implausible(recording, settings)
+    stated, settings = settings, decided(recording, settings)
+    findings = [*implausible(*fused_case(recording, settings)), *of_band(stated, settings)]
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
-    of = problem(settings, recording.spatial, posterior)
+    of = problem(settings, recording.spatial, posterior if known is None else known)
     delay = relative_delay(recording, settings.layout)
     filtered: FilterResult | None = None
     if methods is None:
@@ -128,7 +135,7 @@ def measure(
         filtered = filter_result.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
-        findings = [*findings, *diagnose(zeroed, settings, findings)]
+        findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)

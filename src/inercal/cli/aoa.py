@@ -17,6 +17,7 @@ from inercal.errors import InputError, StudyError
 if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
     from inercal.cli.streaming import Estimators
+    from inercal.records.record import Record
 
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
@@ -95,6 +96,12 @@ def aoa(
     *,
     study: StudyFile,
     how: MethodOptions = MethodOptions(),
+    runs: Annotated[
+        Path | None,
+        Parameter(
+            help="Table of runs (CSV: file, role, ...) in the place of FILES: wind-offs, polars, sines."
+        ),
+    ] = None,
     stream: Annotated[
         bool, Parameter(help="Lines in, from standard input or one FILE, and angles out, live.")
     ] = False,
@@ -108,6 +115,8 @@ def aoa(
     """Measure the angle of attack of a wind-tunnel model."""
     keys = [*(overrides or ()), *how.keys]
     how.check(stream)
+    if runs is not None:
+        return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
         stream_study("aoa", _live, files, study, keys, every, map_file, span, streaming, output)
         return 0
@@ -131,6 +140,49 @@ def aoa(
     with working(output) as progress:
         result = system.calibrate([record], the_study, how.compare, progress, methods, how.points)
     return give(result, output, read_s, "angles")
+
+
+def _runs(
+    table: Path,
+    files: list[Path] | None,
+    study: Path,
+    keys: list[str],
+    how: MethodOptions,
+    stream: bool,
+    map_file: Path | None,
+    span: Span,
+    output: ReportOutput,
+) -> int:
+    """Measure the runs of a table."""
+    from inercal._jit import compiling
+    from inercal.face import aoa as system
+    from inercal.face.study import read_study
+    from inercal.records.maps import read_map
+    from inercal.records.read import read
+    from inercal.records.write import SUFFIXES
+
+    for option, given in (("FILES", bool(files)), ("--stream", stream)):
+        if given:
+            raise InputError(
+                "--runs", f"found with {option}, expected the table alone, which names the files"
+            )
+    output.check((*WHOLE, *SUFFIXES), (table, map_file, study))
+    the_study = read_study("aoa", study, keys)
+    output.spare(the_study.files)
+    span.check()
+    record_map = None if map_file is None else read_map(map_file)
+    methods = how.methods(the_study.settings)
+    smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
+    with compiling(f"aoa{smoothed}", output.say):
+        system.prepare(the_study, how.compare, None)
+
+    def record(path: Path) -> Record:
+        output.spare([path])
+        return span.of(read(path, record_map))
+
+    with working(output) as progress:
+        result = system.runs(table, the_study, record, how.compare, progress, methods)
+    return give(result, output, 0.0, "runs")
 
 
 def _live(settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:

@@ -86,6 +86,32 @@ def design_selfcal(
     return give(designed, output, read_s, "plan", plan, whole=(".json",))
 
 
+def design_aoa(
+    study: Study,
+    /,
+    *,
+    overrides: Overrides = None,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Find where the accelerometers of a model tell its angle best."""
+    from inercal._files import write_text
+    from inercal._jit import compiling
+    from inercal.aoa.design import study_tables
+    from inercal.face import aoa as system
+
+    output.check((".json", ".toml"), (study,))
+    the_study, read_s = study_in("aoa", study, overrides, output)
+    with compiling("aoa", output.say_now):
+        system.prepare_design(the_study)
+    with working(output) as progress:
+        designed = system.design(the_study, progress)
+
+    def sensors(path: Path) -> None:
+        write_text(path, study_tables(designed.evidence.best.layout))
+
+    return give(designed, output, read_s, "sensors", sensors, whole=(".json",))
+
+
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:
     """Positions as a CSV table."""
     head = ",".join(f"{joint} [deg]" for joint in settings.chain.joints)

@@ -43,7 +43,7 @@ def simulate_imu(
     overrides: Overrides = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
-    """Simulate an IMU that is held by hand in many poses."""
+    """Simulate an IMU by hand in many poses, in six positions and three turns, or on a table."""
     _simulated("imu", study, seed, overrides, output)
 
 

@@ -89,7 +89,9 @@ COMMANDS = {
         "fuses all sensors gives the pitch angle with its uncertainty, causal or, with --smooth, from the whole "
         "recording; any of --static, --centrifugal and --tangential asks for the classical way. --out saves the result "
         "(.json or .toml, the prior of a next run) or the samples (.csv, .npz, .h5, .parquet or .nc), with --points "
-        "the angle of each pause. --report writes a page to hand over. With --stream CSV lines come in, from FILE or "
+        "the angle of each pause. --report writes a page to hand over. --runs RUNS.csv measures all runs of an entry, "
+        "a row each with file and role (wind-off, up, down, run), with the tare of the wind-offs interpolated, and "
+        "sums them up by point and by oscillation. With --stream CSV lines come in, from FILE or "
         "standard input, and the lines of the samples go out, live; with --checkpoint the same command goes on where "
         "it was stopped. Exit code 1: done, but the verdict is not ok.",
         "inercal aoa model.csv --study aoa.toml --report aoa.html",
@@ -129,6 +131,14 @@ COMMANDS = {
         "writes the path as the table [plan] of a study (.toml) or the whole result (.json), --report a page with "
         "pictures.",
         "inercal design selfcal selfcal.toml --out plan.toml",
+    ),
+    ("design", "aoa"): (
+        "inercal.cli.design:design_aoa",
+        "Find where the accelerometers of a wind-tunnel model tell its angle best, and how good they must be.\n\nThe "
+        "study states the motion, under [design] how many accelerometers and where they may sit, and under [goal] the "
+        "wanted u of theta. Bounds by the fusion and from single samples. --out writes the sensors as tables of a "
+        "study (.toml) or the whole result (.json), --report a page.",
+        "inercal design aoa aoa.toml --out sensors.toml",
     ),
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from inercal.aoa import task
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View
-from inercal.face.study import Progress, Study, calibrations, one_run
+from inercal.face.study import Progress, Study, calibrations, designed_by, one_run
+from inercal.records.read import source_of
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
@@ -51,6 +53,48 @@ def calibrate(
     return _result(calibrations([record], study, progress, run)[0], by_point)
 
 
+def runs(
+    path: str | Path,
+    study: Study,
+    read: Callable[[Path], Record],
+    compare: bool = False,
+    progress: Progress = lambda _: None,
+    methods: Methods | None = None,
+) -> Result:
+    """Measure the runs that a table lists; ``evidence`` is the `inercal.aoa.runs.series.Series`.
+
+    ``read`` gives the record of a file; the other parameters and errors are those of `inercal.runs`.
+    """
+    from inercal.aoa.runs import outcome, series
+    from inercal.aoa.runs.run_table import read_runs_table
+
+    table = read_runs_table(path)
+    with study.at_fault():
+        done = series.measure_runs(
+            table, lambda run: read(run.path), study.settings, methods, compare, progress
+        )
+    estimate = replace(done.estimate, inputs=(*done.estimate.inputs, *map(source_of, study.files)))
+    done = replace(done, estimate=estimate)
+
+    def page() -> str:
+        from inercal.aoa.figures.series import page as of_page
+
+        return of_page(done)
+
+    def picture() -> Picture:
+        from inercal.aoa.figures.series import main
+
+        return main(done)
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in outcome.tables(estimate)]
+
+    view = View(
+        estimate, estimate.message, tables, page, picture, lambda: series.points_of(done, study.settings)
+    )
+    return Result(estimate, view, done)
+
+
 def _result(measurement: task.Measurement, by_point: bool) -> Result:
     """A measurement as a result."""
     from inercal.aoa.result.columns import angles_record, points_record
@@ -83,6 +127,36 @@ def _result(measurement: task.Measurement, by_point: bool) -> Result:
 
     view = View(displayed(estimate), _answer(estimate.result), tables, page, picture, rows)
     return Result(estimate, view, measurement)
+
+
+def prepare_design(study: Study) -> None:
+    """Load, or compile, the kernels of `design`."""
+    with study.at_fault():
+        task.load_kernels(study.settings)
+
+
+def design(study: Study, progress: Progress = lambda _: None) -> Result:
+    """Find where accelerometers tell the angle best; ``evidence`` is the `inercal.aoa.design.Designed`."""
+    from inercal.aoa.design import REFERENCES
+    from inercal.aoa.design import design as search
+
+    designed, result = designed_by("design aoa", study, lambda: search(study.settings, progress), REFERENCES)
+
+    def page() -> str:
+        from inercal.report.html import render
+
+        return render(result, [picture()], "Sensors of a wind-tunnel model", (), designed.tables())
+
+    def picture() -> Picture:
+        from inercal.aoa.figures.sensors import side_view
+
+        layout = designed.best.layout
+        return side_view(layout.names, layout.angle, layout.r, layout.z, True)
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in designed.tables()]
+
+    return Result(result, View(result, designed.message, tables, page, picture), designed)
 
 
 def _answer(result: dict[str, Any] | Any) -> str:

@@ -92,6 +92,59 @@ def calibrate(
     return result
 
 
+def runs(
+    table: str | Path,
+    study: Study | str | Path,
+    *,
+    map: str | Path | None = None,
+    compare: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Result:
+    """Measure the angle of attack in all runs of a tunnel entry: wind-offs, polars up and down, oscillations.
+
+    Parameters
+    ----------
+    table : str or Path
+        A CSV ``file,role,angle,begin,amplitude,frequency``, a row a run, files beside it. Roles are ``wind-off`` (at
+        rest at a known ``angle``, from which biases are interpolated to the runs between), ``up``, ``down``, ``run``.
+    study : Study or path
+        Of an angle of attack.
+    map : str or Path, optional
+        Column map of all files.
+    compare : bool
+        Also the other methods.
+    progress : callable
+        Takes the progress in words.
+
+    Returns
+    -------
+    Result
+        By run, by point, by amplitude and frequency; its status is the worst of all runs.
+
+    Raises
+    ------
+    InputError
+        The table cannot be read, or a run cannot be measured; the sentence names the row or file.
+
+    Examples
+    --------
+    >>> import inercal as ic, pathlib, tempfile
+    >>> from inercal.examples import FOLDER
+    >>> table = pathlib.Path(tempfile.mkdtemp()) / "runs.csv"
+    >>> _ = table.write_text(f"file,role\\n{FOLDER / 'sting.csv.gz'},up\\n")
+    >>> len(ic.runs(table, FOLDER / "sting.toml").estimate.result["runs"])
+    1
+    """
+    from inercal.face import aoa as system
+    from inercal.face.recordings import read
+
+    given = study_of(study)
+    if given.kind != "aoa":
+        raise StudyError(str(given.path or "study"), f"is of kind {given.kind}, expected one of kind aoa")
+    system.prepare(given, compare)
+    return system.runs(table, given, lambda path: read(path, map), compare, progress)
+
+
 def _imu_study(record: Record, given: dict[str, str]) -> Study:
     """The study of an IMU without one: as `inercal new imu` begins it, at the site that is given."""
     if not given.keys() & {"latitude", "gravity"}:
@@ -136,14 +189,15 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
 
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
-    """Find the positions or tolerances of a turntable, or the path of a platform, that calibrate best.
+    """Find the positions or tolerances of a turntable, the path of a platform, or the places of a model's sensors, that
+    tell most.
 
     Parameters
     ----------
     study : Study or path
     what : str, optional
-        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, as the commands name it; if
-        absent, by the kind, positions.
+        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, ``"aoa"`` of a model, as the
+        commands name it; if absent, by the kind, positions.
 
     Returns
     -------
@@ -164,17 +218,17 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     12
     """
     study = study_of(study)
-    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal"}
+    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal", "aoa": "aoa"}
     if what is not None and kinds.get(what) != study.kind:
         raise InputError(
             "design", f"found {what!r} of a study of kind {study.kind}, expected {_designs(study.kind)}"
         )
     if study.kind not in kinds.values():
         raise InputError(
-            "design", f"found a study of kind {study.kind}, expected one of turntable or selfcal"
+            "design", f"found a study of kind {study.kind}, expected one of turntable, selfcal or aoa"
         )
     system = import_module(f"inercal.face.{study.kind}")
-    if study.kind == "selfcal":
+    if study.kind != "turntable":
         system.prepare_design(study)
     result: Result = system.design_tolerances(study) if what == "tolerances" else system.design(study)
     return result
@@ -182,8 +236,8 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
 
 def _designs(kind: str) -> str:
     """The designs of a kind, in words."""
-    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'"}.get(
-        kind, "a study of kind turntable or selfcal"
+    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'", "aoa": "'aoa'"}.get(
+        kind, "a study of kind turntable, selfcal or aoa"
     )
 
 

@@ -26,12 +26,12 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     (r"u_y_[xy]", ("rate", "number", *RAW), None),
     (r"temperature", ("temperature", "count", "voltage"), None),
     (r"trigger", ("number", "count", "voltage"), None),
-    (r"position|point|label", ("number", "count"), None),
+    (r"position|point|label|joint", ("number", "count"), None),
 )
 
 _EXAMPLES = (
     *(f"{sensor}_{axis}" for sensor in ("acc", "gyro", "wc", "th") for axis in "xyz"),
-    *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "y_x", "y_y"),
+    *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "joint", "y_x", "y_y"),
     *("a1", "a2", "a3", "a4", "gyro", "gyro_roll", "gyro_yaw", "point", "trigger", "theta_ref", "q_ref_0"),
 )
 

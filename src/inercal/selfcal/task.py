@@ -109,7 +109,12 @@ def calibrate(
         own = verdict(other, recording, settings, faults)[0]
         result["compare"] |= {name: beside(other, own, stated, recording.reference)}
     result |= of_attitude(filtered, recording.reference)
-    timed = replace(estimate, result=result, message=message, timing={"solve": time.perf_counter() - clock})
+    steps = {"step": filtered, **{f"step {name}": other for name, other in compared.items()}}
+    timing = {
+        "solve": time.perf_counter() - clock,
+        **{key: 1e-6 * each.step_us for key, each in steps.items()},
+    }
+    timed = replace(estimate, result=result, message=message, timing=timing)
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)

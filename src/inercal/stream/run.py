@@ -23,7 +23,7 @@ import signal
 import threading
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
@@ -178,7 +178,7 @@ def run(
         A checkpoint that is not of this estimator, in use by another run, or that cannot be written; a stream that
         begins as the saved one and then differs.
     KeyboardInterrupt
-        On an interrupt or SIGTERM, once the row in work is done and the state is saved.
+        On an interrupt, SIGTERM or SIGHUP, once the row in work is done and the state is saved.
     """
     with nullcontext() if saving is None else alone(saving.path):
         return _run(estimator, lines, write, saving, say, after)
@@ -211,7 +211,7 @@ def _run(
             write(",".join(each if isinstance(each, str) else number(each) for each in output))
 
     give([estimator.columns])
-    with _interrupts() as interrupts:
+    with closing(lines), _interrupts() as interrupts:
         try:
             for line, sample in _new_samples(lines, position, interrupts, say):
                 if not line.whole:
@@ -225,9 +225,8 @@ def _run(
             if interrupts.waiting:
                 keep()
             raise
-    keep()
-    give(estimator.finish(state))
-    lines.close()
+        keep()
+        give(estimator.finish(state))
     return position.rows
 
 
@@ -307,7 +306,7 @@ class _Interrupts:
         self._asked = False
 
     def handle(self, signum: int, frame: FrameType | None) -> None:
-        """Handle SIGINT and SIGTERM."""
+        """Handle SIGINT, SIGTERM and SIGHUP."""
         if self.waiting or self._asked:
             raise KeyboardInterrupt
         self._asked = True
@@ -329,8 +328,9 @@ def _interrupts() -> Iterator[_Interrupts]:
     if threading.current_thread() is not threading.main_thread():
         yield interrupts
         return
-    asking = (signal.SIGINT, signal.SIGTERM)
-    before = {signum: signal.signal(signum, interrupts.handle) for signum in asking}
+    asking = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    ignored = [signum for signum in asking if signal.getsignal(signum) is signal.SIG_IGN]  # as by nohup
+    before = {signum: signal.signal(signum, interrupts.handle) for signum in asking if signum not in ignored}
     try:
         yield interrupts
     finally:

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from inercal.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Oscillation, Plunge, Shaking
 from inercal.aoa.layout import Layout
 from inercal.aoa.motion import duration, moves
-from inercal.aoa.settings import AngleShaking, Calibration, Disturbances, MotionPlan, Oscillation, Shaking
+from inercal.aoa.settings import GYROS, Calibration, MotionPlan
 from inercal.errors import StudyError
-from inercal.studies.fields import refusal
+from inercal.keys import FREQUENCY
+from inercal.studies.fields import ExactText, refusal
 from inercal.studies.tables import Stated, settings_of, table_of
-from inercal.units import shown
+from inercal.units import Quantity, shown
 
 MOST_ROWS = 20_000_000
 """Samples that a simulation may have."""
@@ -88,6 +91,12 @@ def motion_of(table: MotionTable, where: str | Path) -> MotionPlan:
     return plan
 
 
+_SampleRate = Annotated[Quantity, ExactText("frequency", "250 Hz", FREQUENCY.accept, FREQUENCY.words)]
+
+_PARTS = ("pitch", "heave", "axial", "roll", "yaw", "buffet", "plunge", "local_vibration", "mains")
+"""Disturbances that are tables of their own."""
+
+
 class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
     """Disturbances that a simulation adds to the rigid, well-known model; none if absent."""
 
@@ -121,32 +130,95 @@ class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
         description="yaw coupled in; adds gyro_roll and gyro_yaw",
         examples=[{"amplitude": "1 deg", "frequency": "8 Hz"}],
     )
+    buffet: Stated[AngleShaking] | None = Field(
+        default=None,
+        title="Buffet",
+        description="random pitching by the stream, 150 sines, beside the motion",
+        examples=[{"rms": "0.1 deg", "low": "5 Hz", "high": "40 Hz"}],
+    )
+    plunge: Stated[Plunge] | None = Field(
+        default=None,
+        title="Plunge",
+        description="the whole model goes up and down",
+        examples=[{"level": "0.02 g", "frequency": "2 Hz"}],
+    )
+    lines: list[Stated[Line]] = Field(
+        default=[],
+        description="lines of the tunnel's vibration, which shake the whole model",
+        examples=[[{"frequency": "112 Hz", "level": "0.3 g"}]],
+    )
+    local_vibration: Stated[Shaking] | None = Field(
+        default=None,
+        title="Local vibration",
+        description="of each accelerometer by itself, as of the structure that it sits on",
+        examples=[{"rms": "0.5 g", "low": "120 Hz", "high": "240 Hz"}],
+    )
+    mains: Stated[Mains] | None = Field(
+        default=None,
+        title="Mains",
+        description="pick-up in each channel by itself",
+        examples=[{"level": "50 mg", "frequency": "50 Hz"}],
+    )
+    sample_rates: dict[str, _SampleRate] = Field(
+        default={},
+        description="of sensors that are slower than motion.sample_rate, which is a whole number of times theirs; the "
+        "recording then goes to .h5 or .nc",
+        examples=[{"gyro": "250 Hz"}],
+    )
 
 
 def disturbances_of(
-    table: AoaDisturbancesTable, layout: Layout, sensors: dict[str, Calibration], where: object
+    table: AoaDisturbancesTable,
+    layout: Layout,
+    sensors: dict[str, Calibration],
+    motion: MotionPlan | None,
+    where: object,
 ) -> Disturbances:
     """Disturbances of a simulation, in SI.
 
-    Raises `StudyError` for frequencies out of order, heights for another number of accelerometers, clipping without a
-    range.
+    Raises `StudyError` for frequencies out of order, lists for another number of accelerometers, rates of sensors that
+    do not divide that of the motion, clipping without a range.
     """
-    shaking = {key: getattr(table, key) for key in ("pitch", "heave", "axial", "roll", "yaw")}
-    disturbances = settings_of(Disturbances, table, **shaking)
-    for key, each in shaking.items():
+    parts: dict[str, Any] = {key: getattr(table, key) for key in _PARTS}
+    parts["lines"] = tuple(table.lines)
+    parts["sample_rates"] = _sample_rates(table.sample_rates, layout, motion, where)
+    disturbances = settings_of(Disturbances, table, **parts)
+    for key, each in parts.items():
         if isinstance(each, Shaking):
             _ordered(each.low, each.high, f"disturbances.{key}", where)
-    if table.heights is not None and len(disturbances.heights) != len(layout.names):
-        raise StudyError(
-            where,
-            f"disturbances.heights: found {len(disturbances.heights)}, expected one for each of "
-            f"{', '.join(layout.names)}",
-        )
+    for key in ("heights", "axis_errors", "bias_drift"):
+        found = len(getattr(disturbances, key))
+        if getattr(table, key) is not None and found != len(layout.names):
+            raise StudyError(
+                where,
+                f"disturbances.{key}: found {found}, expected one for each of {', '.join(layout.names)}",
+            )
     if table.clip and all(each.range is None for each in sensors.values()):
         raise StudyError(
             where, "disturbances.clip: found true, but no range of a sensor, expected one under [sensors]"
         )
     return disturbances
+
+
+def _sample_rates(
+    stated: dict[str, Quantity], layout: Layout, motion: MotionPlan | None, where: object
+) -> dict[str, float]:
+    """Rates [Hz] of sensors by name, each that of the motion over a whole number."""
+    names = (*layout.names, *GYROS)
+    for name, rate in stated.items():
+        key = f"disturbances.sample_rates.{name}"
+        if name not in names:
+            raise StudyError(where, f"{key}: found no such sensor, expected one of {', '.join(names)}")
+        if motion is None:
+            raise StudyError(where, f"{key}: found without a [motion], expected one with its sample_rate")
+        ratio = motion.sample_rate / rate.value
+        if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+            raise StudyError(
+                where,
+                f"{key}: found {shown(rate.text)}, expected motion.sample_rate, {motion.sample_rate:g} Hz, over a "
+                "whole number",
+            )
+    return {name: rate.value for name, rate in stated.items()}
 
 
 def _ordered(low: float, high: float, key: str, where: object) -> None:

@@ -8,18 +8,11 @@ from functools import cache
 import numpy as np
 
 from inercal.aoa.angles import alpha_beta
+from inercal.aoa.disturbances import Disturbances
 from inercal.aoa.layout import Layout
 from inercal.aoa.paper import lever, residuals, static
 from inercal.aoa.paper.methods import measure as measure_by
-from inercal.aoa.settings import (
-    AoaSettings,
-    Attitude,
-    Disturbances,
-    Methods,
-    MotionPlan,
-    Noise,
-    Static,
-)
+from inercal.aoa.settings import AoaSettings, Attitude, Methods, MotionPlan, Noise, Static
 from inercal.aoa.simulate import simulate
 from inercal.aoa.task import Measurement, measure
 from inercal.arrays import Array

@@ -2,8 +2,9 @@
 
 The fusion takes the angle as measured in every row of the stretch, each so uncertain that all of them together have the
 stated uncertainty: the error of the angle is the same in all rows, while noise and flexure average out. Through it the
-filter learns the biases at that angle. The paper's methods learn nothing: the biases seen in the stretch are subtracted
-from their readings.
+filter learns the biases at that angle. A slight buffet about it is averaged: the known angle is that of the mean, each
+row is more uncertain by the root mean square of the buffet, and the mean by what cut periods leave. The paper's methods
+learn nothing: the biases seen in the stretch are subtracted from their readings.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ from numpy.typing import NDArray
 from inercal.aoa.layout import axes
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.means import mean_u
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Zero
 from inercal.arrays import Array
 from inercal.errors import RecordError
+from inercal.findings import Finding
 
 Indices = NDArray[np.int64]
 
@@ -35,16 +38,25 @@ def with_zero(recording: Recording, settings: AoaSettings) -> Recording:
     """
     if settings.zero is None:
         return recording
-    rows = _stretch(recording, settings, settings.zero)
+    rows, buffet, of_mean = _stretch(recording, settings, settings.zero)
+    zero = replace(settings.zero, u=math.hypot(settings.zero.u, of_mean))
     taken = later(recording.t)
     before = np.full(len(recording.t), -np.inf)
     before[taken[1:]] = recording.t[taken[:-1]]
     zero_angle = recording.zero_angle.copy()
     zero_angle[rows] = [
-        angle_at(settings.zero, t, last)
+        angle_at(zero, t, last)
         for t, last in zip(recording.t[rows].tolist(), before[rows].tolist(), strict=True)
     ]
-    return replace(recording, zero_angle=zero_angle)
+    zero_angle[rows, 1] = np.hypot(zero_angle[rows, 1], buffet)
+    findings = recording.findings
+    if buffet:
+        text = (
+            f"the model shakes by {math.degrees(buffet):.2g} deg rms in the stretch of the zero, which is averaged: u "
+            f"of its angle is {math.degrees(zero.u):.2g} deg in the place of {math.degrees(settings.zero.u):.2g} deg"
+        )
+        findings = (*findings, Finding("not_at_rest", text, harm=()))
+    return replace(recording, zero_angle=zero_angle, findings=findings)
 
 
 def angle_at(zero: Zero, t: float, before: float) -> tuple[float, float]:
@@ -62,7 +74,7 @@ def tare(recording: Recording, settings: AoaSettings) -> Recording:
     """The recording less the biases of its sensors at the study's zero; refused and unchanged as by `with_zero`."""
     if settings.zero is None:
         return recording
-    rows = _stretch(recording, settings, settings.zero)
+    rows, *_ = _stretch(recording, settings, settings.zero)
     return replace(
         recording,
         acc=recording.acc - (_means(recording.acc[rows]) - at_rest(settings, settings.zero.angle)),
@@ -77,8 +89,9 @@ def at_rest(settings: AoaSettings, theta: float) -> Array:
     return np.asarray(settings.site.gravity * (axes(settings.layout, settings.attitude.level) @ direction))
 
 
-def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices:
-    """Rows of the stretch with all accelerometers; refuses one in which the model moves."""
+def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> tuple[Indices, float, float]:
+    """Rows of the stretch with all accelerometers, the rms of a slight buffet in it and what that leaves in its mean
+    [rad]; refuses one in which the model moves."""
     where = f"zero.start = {zero.start:g} s, zero.end = {zero.end:g} s"
     taken = later(recording.t)
     t = recording.t[taken]
@@ -97,7 +110,7 @@ def _stretch(recording: Recording, settings: AoaSettings, zero: Zero) -> Indices
             f"the angle changes by {math.degrees(moved):.2g} deg in the stretch, expected a model at rest within "
             f"{math.degrees(allowed):.2g} deg",
         )
-    return rows
+    return rows, *_shaken(recording, settings, rows)
 
 
 def _moved(recording: Recording, settings: AoaSettings, rows: Indices, u: float) -> tuple[float, float]:
@@ -111,19 +124,39 @@ def _moved(recording: Recording, settings: AoaSettings, rows: Indices, u: float)
     # forward and upward specific force, the latter as of a level model
     forward, up = np.linalg.lstsq(axes(settings.layout), means.T, rcond=None)[0]
     angles = np.unwrap(np.arctan2(forward, up / (level if abs(level) > LIMITS.level_cosine else 1.0)))
-    noise = max(float((recording.acc[each].std(axis=0) / math.sqrt(len(each))).max()) for each in parts)
+    noise = max(mean_u(column) for each in parts for column in recording.acc[each].T)
     g = settings.site.gravity * min(1.0, max(abs(level), LIMITS.level_cosine))
     looks = [(float(np.ptp(angles)), LIMITS.zero_sigmas * (u + 2.0 * noise / g))]
+    swing, walk = _swing(recording, rows)
+    if len(swing):
+        allowed = max(LIMITS.zero_sigmas * math.hypot(u, walk), LIMITS.zero_buffet)
+        looks.append((float(swing.std()), allowed))
+    return max(looks, key=lambda look: look[0] / look[1] if look[1] > 0.0 else math.inf)
+
+
+def _swing(recording: Recording, rows: Indices) -> tuple[Array, float]:
+    """The gyro's angle [rad] about its line over some rows, and the standard deviation of that by its noise; nothing
+    where the gyro is silent."""
     gyro, t = recording.gyro[rows], recording.t[rows]
     seen = np.isfinite(gyro)
-    if seen.sum() >= LIMITS.zero_rows:
-        gyro, dt = gyro[seen], np.diff(t[seen], prepend=t[seen][0])
-        swing = np.cumsum((gyro - gyro.mean()) * dt)
-        # a random walk tied at its ends has the mean variance n/6 of its steps
-        noise = float(np.diff(gyro).std()) / math.sqrt(2.0)
-        walk = noise * math.sqrt(float(dt @ dt) / 6.0)
-        looks.append((float(swing.std()), LIMITS.zero_sigmas * math.hypot(u, walk)))
-    return max(looks, key=lambda look: look[0] / look[1] if look[1] > 0.0 else math.inf)
+    if seen.sum() < LIMITS.zero_rows:
+        return np.empty(0), 0.0
+    gyro, dt = gyro[seen], np.diff(t[seen], prepend=t[seen][0])
+    # a random walk tied at its ends has the mean variance n/6 of its steps
+    noise = float(np.diff(gyro).std()) / math.sqrt(2.0)
+    return np.cumsum((gyro - gyro.mean()) * dt), noise * math.sqrt(float(dt @ dt) / 6.0)
+
+
+def _shaken(recording: Recording, settings: AoaSettings, rows: Indices) -> tuple[float, float]:
+    """Rms of the buffet in some rows, and the standard uncertainty of their mean by it [rad]; 0 where the gyro reads
+    little more than its stated noise."""
+    swing, _ = _swing(recording, rows)
+    gyro, t = recording.gyro[rows], recording.t[rows]
+    if not len(swing) or not np.nanstd(gyro) > LIMITS.shaken_gyro * settings.noise.gyro:
+        return 0.0, 0.0
+    dt = np.diff(t)
+    walk = settings.noise.gyro * math.sqrt(float(dt @ dt) / 6.0)
+    return math.sqrt(max(float(swing.var()) - walk**2, 0.0)), mean_u(swing)
 
 
 def _means(x: Array) -> Array:

@@ -59,9 +59,22 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
         raise StudyError(WHERE, f"{path} holds coefficients without numbers, expected all of them")
     if not is_covariance(P):
         raise StudyError(WHERE, f"{path} holds a covariance with negative variances, expected none")
-    values = dict(zip(names, x.tolist(), strict=True))
+    return _by_name(names, x, P)
+
+
+def posterior_of(
+    earlier: Estimate, settings: AoaSettings
+) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
+    """Coefficients of a result of the fusion of the same study, as `load` gives those of a file."""
+    return _by_name(earlier.names, earlier.values, _own(earlier, settings))
+
+
+def _by_name(
+    names: tuple[str, ...], x: Array, P: Array
+) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
+    """Values by name, and covariances by pairs of names."""
     covariances = {(a, b): float(P[i, j]) for i, a in enumerate(names) for j, b in enumerate(names)}
-    return values, covariances
+    return dict(zip(names, x.tolist(), strict=True)), covariances
 
 
 def _own(earlier: Estimate, settings: AoaSettings) -> Array:

@@ -2,14 +2,7 @@
 
 Errors of biases, positions and axes are the same in all rows of a pause: the mean of n rows is no better known than one
 of them, and its standard uncertainty is the mean of theirs. Noise and buffet add to it by the mean of rows that are
-correlated, often negatively. This part is found from the spectrum near zero: with the lowest K cosines of the pause,
-
-    L_k = sqrt(2/n) sum_i x_i cos(pi k (i + 1/2) / n),   var(mean) = (1/n) (1/K) sum_k L_k^2,
-
-K = 8 degrees of freedom. For white noise that is s^2/n, for noise of correlation time c well below the pause's length
-T (c < T / pi K) s^2 2c/T, and for an oscillation, whose mean is all but zero over whole periods, twice the variance
-that its cut periods leave. A drift of the angle counts as scatter. Source: Lazarus, Lewis, Stock and Watson 2018, "HAR
-inference: recommendations for practice", J. Business and Economic Statistics 36(4) (equally weighted cosines).
+correlated (`inercal.aoa.reading.means`). A drift of the angle counts as scatter.
 """
 
 from __future__ import annotations
@@ -22,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles, alpha_beta
+from inercal.aoa.reading.means import mean_u
 from inercal.aoa.reading.pauses import pauses
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 
 Indices = NDArray[np.int64]
-
-COSINES = 8
 
 
 @dataclass(frozen=True)
@@ -137,15 +129,3 @@ def _point(
         beta=float(flow.beta[0]),
         u_beta=float(flow.u_beta[0]),
     )
-
-
-def mean_u(x: Array) -> float:
-    """Standard uncertainty of the mean of ``x`` (n,), evenly sampled, by noise and oscillations; 0 for one value."""
-    n = len(x)
-    count = min(COSINES, n - 1)
-    if count < 1:
-        return 0.0
-    k = np.arange(1, count + 1)
-    cosines = np.cos(math.pi / n * k[:, None] * (np.arange(n) + 0.5))
-    coefficients = math.sqrt(2.0 / n) * (cosines @ (x - x.mean()))
-    return math.sqrt(float(coefficients @ coefficients) / (count * n))

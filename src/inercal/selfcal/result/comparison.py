@@ -39,7 +39,6 @@ def beside(
     return {
         "parameters": {name: {"value": value, "u": own} for name, value, own in each},
         "status": status.value,
-        "step_us": other.step_us,
         **of_attitude(other, reference),
     }
 
