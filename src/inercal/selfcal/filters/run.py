@@ -6,7 +6,6 @@ import math
 import time
 from dataclasses import replace
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -56,7 +55,7 @@ def estimate(
     ``start`` of the attitude is the first encoder reading if absent; with ``history`` the estimates after each row are
     kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`); history but its last
     row, innovations and NIS are those of the first pass. A ``brief`` one, for a judge of the innovations, takes one
-    pass, and of a long recording its history has no coefficients.
+    pass, and its history has attitudes alone.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
@@ -66,30 +65,23 @@ def estimate(
     load_kernels(kind, problem)
     began = time.perf_counter()
     state: State = module.initial(problem, recording.th[0], start)
-    first = estimate_of(state, problem)
-    motion = recording.steps, recording.held
-    if brief and len(recording.dt) > _CHUNK:
-        state, trace = _by_chunks(module, state, problem, recording, history)
-    else:
-        state, trace = advance(module, state, problem, *motion, history, recording.walked)
-    last = None
+    state, trace, rows = _passed(module, state, problem, recording, history, brief)
     if not brief and is_due(kind, problem):
         begun = module.initial(problem, recording.th[0], start)
-        state = second_pass(module, begun, state, problem, *motion, recording.walked)
-        last = estimate_of(state, problem)
+        state = second_pass(module, begun, state, problem, recording.steps, recording.held, recording.walked)
+        for name, row in vars(estimate_of(state, problem)).items() if rows is not None else ():
+            getattr(rows, name)[-1:] = row
     seconds = time.perf_counter() - began
-    of_steps = trace.estimates._asdict()
-    trace = trace._replace(estimates=empty_estimates(0, 0, False))
     size = len(problem.prior)
     result = FilterResult(
         kind=kind,
         coefficients=state.coefficients,
         covariance=state.covariance[-size:, -size:],
         attitude=attitude_of(state, problem),
-        nis=of_steps["nis"],
-        dims=of_steps["dims"],
-        innovations=of_steps["innovations"],
-        history=_history(first, of_steps, last) if history else None,
+        nis=trace.estimates.nis,
+        dims=trace.estimates.dims,
+        innovations=trace.estimates.innovations,
+        history=rows,
         seconds=seconds,
         lowest_eigenvalue=trace.lowest_eigenvalue,
         fallbacks=trace.fallbacks,
@@ -102,20 +94,29 @@ def estimate(
 
 
 _CHUNK = 1 << 16
-"""Steps of which all is kept at once, where little is kept in the end."""
+"""Steps whose estimates a filter hands over at once: of a long recording there is room for little more than one copy."""
 
 
-def _by_chunks(
-    module: ModuleType, state: State, problem: FilterProblem, recording: Recording, history: bool
-) -> tuple[State, Trace]:
-    """Take a filter through a long recording; of the rows attitudes, innovations and NIS are kept."""
+def _passed(
+    module: ModuleType,
+    state: State,
+    problem: FilterProblem,
+    recording: Recording,
+    history: bool,
+    brief: bool,
+) -> tuple[State, Trace, History | None]:
+    """The state after all steps, innovations and health, and estimates of the rows, of a ``brief`` one attitudes."""
     steps, m, p = recording.steps, len(recording.dt), len(problem.prior)
     seen = np.all(np.isfinite(steps.th), axis=1)
     out = empty_estimates(0, p, history)._replace(nis=np.empty(m), dims=np.empty(m, dtype=np.int64))
+    rows = vars(estimate_of(state, problem)) if history else {}
+    kept = [name for name in rows if name == "attitude" or not brief]
     if history:
-        out = out._replace(attitude=np.empty((m, 4)), innovations=np.empty((m, 6)))
+        out = out._replace(innovations=np.empty((m, 6)))
+        more = {name: np.empty((m, rows[name].shape[1])) for name in kept}
+        rows |= {name: np.concatenate([rows[name], each]) for name, each in more.items()}
     health, restarts, first = list[Trace](), list[int](), 0
-    while first < m:
+    while first < m or not health:
         last = min(first + _CHUNK, m)
         while last < m and not seen[last - 1]:  # what is in doubt stays together
             last += 1
@@ -123,12 +124,15 @@ def _by_chunks(
         walked = None if recording.walked is None else recording.walked[first:last]
         part = steps.part(slice(first, last))
         state, trace = advance(module, state, problem, part, held, history, walked)
-        for name in ("attitude", "innovations", "nis", "dims"):
+        for name in ("nis", "dims", *(["innovations"] if history else [])):
             getattr(out, name)[first:last] = getattr(trace.estimates, name)
+        for name in kept:
+            rows[name][first + 1 : last + 1] = getattr(trace.estimates, name)
         health.append(trace._replace(estimates=empty_estimates(0, p, history)))
         restarts += [first + k for k in trace.restarts]
         first = last
-    return state, joined(health)._replace(estimates=out, restarts=tuple(restarts))
+    trace = joined(health)._replace(estimates=out, restarts=tuple(restarts))
+    return state, trace, History(**rows) if history else None
 
 
 def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
@@ -138,15 +142,6 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
         none = np.empty((0, 3))
         module.advance(module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none))
         _LOADED.add(kind)
-
-
-def _history(first: History, of_steps: dict[str, Any], last: History | None) -> History:
-    """The estimates of the start and of all steps; with another one of the last. Those of the trace are used up."""
-    whole = {name: np.concatenate([row, of_steps.pop(name)]) for name, row in vars(first).items()}
-    if last is not None:
-        for name, row in vars(last).items():
-            whole[name][-1:] = row
-    return History(**whole)
 
 
 def _fault(result: FilterResult) -> str:
