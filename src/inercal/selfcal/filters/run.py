@@ -94,7 +94,7 @@ def estimate(
 
 
 _CHUNK = 1 << 16
-"""Steps whose estimates a filter hands over at once: of a long recording there is room for little more than one copy."""
+"""Steps whose estimates a filter hands over at once: of a long recording there is room for one copy."""
 
 
 def _passed(
