@@ -99,8 +99,9 @@ def test_means_of_the_balance_at_each_point(polar):
     # 0.2 N over some 60 rows, whose u is known to a factor of 2; 20 ms of the moves' ends at most
     assert np.abs(force - expected).max() < 0.3
     assert 0.005 < np.nanmin(u) < 0.1
-    assert joined.finding.code == "other_clock"
-    assert "+7.3" in joined.finding.message
+    (clock,) = joined.findings
+    assert clock.code == "other_clock"
+    assert "+7.3" in clock.message
 
 
 def test_by_the_number_of_the_point(polar):
@@ -108,7 +109,8 @@ def test_by_the_number_of_the_point(polar):
     found = points(told.recording, angles(told.theta), study())
     joined = join(read_balance(folder / "numbers.csv"), found, told.recording, angles(told.theta))
     np.testing.assert_array_equal(joined.columns["moment [N*m]"], [0.5, 1.5, np.nan, 3.5])
-    assert "1 of 4 points have no row" in joined.finding.message
+    (gap,) = joined.findings
+    assert "1 of 4 points have no row" in gap.message
 
 
 def test_the_command_writes_them_beside_the_points(polar, capsys):

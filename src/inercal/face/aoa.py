@@ -62,7 +62,7 @@ def calibrate(
     result = {**estimate.result, "joined": {name: each.tolist() for name, each in joined.columns.items()}}
     estimate = replace(
         estimate,
-        findings=(*estimate.findings, joined.finding),
+        findings=(*estimate.findings, *joined.findings),
         inputs=(*estimate.inputs, other.source),
         result=result,
     )

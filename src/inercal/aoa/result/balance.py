@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles, continuous
 from inercal.aoa.limits import LIMITS
@@ -45,10 +46,10 @@ class Balance:
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Means of the table by title, (k,) for k points, and in words how they were joined."""
+    """Means of the table by title, (k,) for k points, and findings: the offset of the clocks, points without a row."""
 
     columns: dict[str, Array]
-    finding: Finding
+    findings: tuple[Finding, ...]
 
 
 def read_balance(path: str | Path) -> Balance:
@@ -97,7 +98,7 @@ def join(balance: Balance, points: Sequence[Point], recording: Recording, angles
         if name in balance.numbers and (name == "point" or recording.trigger is not None):
             number = balance.numbers[name]
             rows = [np.flatnonzero(number == (p.number if name == "point" else p.trigger)) for p in points]
-            return _joined(balance, rows, Finding("not_held", f"{where}: joined by the numbers of {name}"))
+            return _joined(balance, rows, None)
     if balance.t is None:
         raise RecordError(
             where, "found no column t and no numbers that the recording has, expected one to join by"
@@ -174,7 +175,7 @@ def _lag(x: Array, y: Array) -> tuple[float, float]:
     return k - (len(x) - 1) + float(shift), float(rho[k])
 
 
-def _joined(balance: Balance, rows: Sequence[np.ndarray], finding: Finding) -> Joined:
+def _joined(balance: Balance, rows: Sequence[NDArray[np.intp]], clock: Finding | None) -> Joined:
     """Means of the rows of each point."""
     if not any(len(each) for each in rows):
         raise RecordError(balance.source.path, "found no row of any point, expected rows of the same run")
@@ -185,5 +186,7 @@ def _joined(balance: Balance, rows: Sequence[np.ndarray], finding: Finding) -> J
         if any(len(x) > 1 for x in parts):
             columns[f"u_{title}"] = np.array([mean_u(x) if len(x) > 1 else math.nan for x in parts])
     empty = sum(not len(each) for each in rows)
-    text = finding.message + (f"; {empty} of {len(rows)} points have no row" if empty else "")
-    return Joined(columns, Finding(finding.code, text))
+    found = [] if clock is None else [clock]
+    if empty:
+        found.append(Finding("gap", f"{balance.source.path}: {empty} of {len(rows)} points have no row"))
+    return Joined(columns, tuple(found))
