@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
 from measure import Row, alone, in_turn, row, spread
 from sting_bands import FIGURES, FILTERS, PAPER, UPPER, errors_of, judged
 
+from inercal.estimate.runs import Threads
 from inercal.examples import FOLDER
 from inercal.selfcal.monte_carlo import campaign
 from inercal.studies.load import load_selfcal_study
@@ -28,7 +29,7 @@ def self_calibration(runs: int, rounds: int) -> list[Row]:
     settings, found = load_selfcal_study(FOLDER / "selfcal.toml"), []
 
     def work() -> None:
-        found.append(campaign(settings, runs, SEED, "error-state", workers=os.cpu_count() or 1))
+        found.append(campaign(settings, runs, SEED, "error-state", executor=Threads(os.cpu_count() or 1)))
 
     seconds = [s / runs for s in in_turn({"campaign": work}, rounds)["campaign"]]
     made, size = found[-1], f"{runs} runs, 18 coefficients"

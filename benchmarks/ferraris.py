@@ -24,7 +24,7 @@ from inercal.imu.ferraris.readings import read_sections
 from inercal.imu.settings import ImuSettings
 from inercal.records.maps import read_map
 from inercal.records.read import read
-from inercal.studies.imu import FerrarisTable, ferraris_settings
+from inercal.studies.ferraris import FerrarisTable, ferraris_settings
 
 NAME, RATE, GRAVITY = "ferraris-si", 102.4, 9.81
 

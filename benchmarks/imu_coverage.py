@@ -14,18 +14,27 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from campaigns import aided, ferraris
+from campaigns import aided, ferraris, rows
 from campaigns import imu as by_hand
 
 from inercal.estimate.coverage import coverage
 from inercal.estimate.runs import Processes, run
-from inercal.imu.aided.coefficients import names_of
+from inercal.imu.aided.coefficients import circumstances_of, names_of
 from inercal.imu.ferraris.method import NAMES
+from inercal.imu.multiposition.accelerometer import SQUARES
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 
 SEED = 20261121
+METHODS = ("multiposition", "ferraris", "aided", "means", "known_rates", "known_turns")
+TRIADS = ("acc", "gyro")
 BY_HAND = ACCELEROMETER_TRIAD + GYRO_TRIAD
+OF_RATES = (*GYRO_TRIAD[:6], "T_xy", "T_xz", "T_yz")
 CAMPAIGNS = {
+    "means": (rows.one_of_means, ACCELEROMETER_TRIAD),
+    "known_rates": (rows.one_of_known_rates, OF_RATES),
+    "known_turns": (rows.one_of_known_turns, GYRO_TRIAD),
+    "multiposition, K2 drawn": (rows.one_with_k2, BY_HAND),
+    "multiposition, K2 fitted": (rows.one_with_k2_fitted, (*ACCELEROMETER_TRIAD, *SQUARES, *GYRO_TRIAD)),
     "multiposition": (by_hand.one_calibration, BY_HAND),
     "multiposition, g-sensitivity": (
         by_hand.one_calibration_with_g_sensitivity,
@@ -33,7 +42,7 @@ CAMPAIGNS = {
     ),
     "ferraris": (ferraris.one_calibration, NAMES),
     "ferraris, by scatter": (ferraris.one_calibration_by_scatter, NAMES),
-    "aided": (aided.one_calibration, names_of(("acc", "gyro"), False)),
+    "aided": (aided.one_calibration, (*names_of(TRIADS, False), *circumstances_of(TRIADS))),
 }
 
 
@@ -41,7 +50,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", type=int, default=2000)
     parser.add_argument("--folder", type=Path, help="keep finished chunks here")
-    parser.add_argument("--method", choices=("multiposition", "ferraris", "aided"), default="multiposition")
+    parser.add_argument("--method", choices=METHODS, default="multiposition")
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(
         "--g-sensitivity",
@@ -57,7 +66,14 @@ def main() -> None:
         const=", by scatter",
         help="ferraris: leave the alignment to the scatter of the positions",
     )
+    kind.add_argument(
+        "--k2",
+        choices=("drawn", "fitted"),
+        help="multiposition: draw second-order coefficients, or draw and fit them",
+    )
     options = parser.parse_args()
+    if options.k2:
+        options.kind = f", K2 {options.k2}"
     chosen = options.method + (options.kind or "")
     if chosen not in CAMPAIGNS:
         parser.error(f"found {chosen}, expected one of: {'; '.join(CAMPAIGNS)}")

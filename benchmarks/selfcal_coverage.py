@@ -14,6 +14,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from inercal.estimate.runs import Threads
 from inercal.examples import FOLDER
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.monte_carlo import campaign
@@ -38,7 +39,7 @@ def main() -> None:
         options.runs,
         SEED,
         options.filter,
-        workers=os.cpu_count() or 1,
+        executor=Threads(os.cpu_count() or 1),
         folder=options.folder,
         progress=lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr, flush=True),
     )

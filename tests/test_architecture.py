@@ -149,16 +149,16 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "imu": (
-        "limits identified rest recording rows turns settings simulate multiposition means known_rates known_turns "
-        "ferraris aided temperature task figures"
+        "limits identified rest recording rows turns settings second_order simulate multiposition means known_rates "
+        "known_turns ferraris aided temperature task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
-        "positions rate task figures"
+        "positions rate steps task figures"
     ),
     "aoa": (
-        "limits layout disturbances settings angles motion reading fusion paper diagnosis reference result simulate "
-        "design task runs figures"
+        "limits band layout disturbances settings angles motion reading fusion paper diagnosis reference result "
+        "simulate design task runs figures"
     ),
     "selfcal": (
         "estimators limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"

@@ -9,7 +9,12 @@ def order(*files):
     return quick.selected(list(files))
 
 
-@pytest.mark.slow
+@pytest.fixture(scope="module", autouse=True)
+def _every_import_read():
+    """Seconds that no single test is to pay."""
+    order("src/inercal/units.py")
+
+
 def test_the_nearest_tests_come_first_and_the_house_before_them():
     found = order("src/inercal/aoa/paper/static.py")
     assert found[:3] == ["tests/test_architecture.py", "tests/laws", "tests/aoa/test_aoa_static.py"]

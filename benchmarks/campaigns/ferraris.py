@@ -11,9 +11,9 @@ from inercal.arrays import Array
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput, Site
 from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.simulate import Session, draw_full_truth, simulate_session, true_values
+from inercal.imu.ferraris.simulate import Session, simulate_session, true_values
 from inercal.imu.settings import FerrarisSettings, ImuSettings
-from inercal.imu.simulate import ImuTruth, Noise
+from inercal.imu.simulate import ImuTruth, Noise, draw_full_truth
 
 ALIGNMENT = math.radians(0.5)
 """Standard deviation of each direction of a position and of the axis of a turn, in either direction across it [rad]."""
@@ -66,7 +66,9 @@ def _one(rng: np.random.Generator, stated: float | None) -> dict[str, Array]:
     record, truth = simulate_session(truth, session, rng)
     site = Site(GRAVITY, (GravityInput("gravity", GRAVITY_U, "m/s^2", 1.0),), LATITUDE)
     options = FerrarisSettings(turn_u=TURN_U, alignment=stated)
-    estimate = calibrate_ferraris(record, ImuSettings(site, time_base_u=TIME_BASE_U), options).estimate
+    estimate = calibrate_ferraris(
+        record, ImuSettings(site, time_base_u=TIME_BASE_U, k2_u=0.0), options
+    ).estimate
     return {
         "error": estimate.values - true_values(truth),
         "u": estimate.u,

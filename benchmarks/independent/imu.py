@@ -94,7 +94,9 @@ class Faults:
 
     ``tremor`` [s] the unit is held in the hand at the start, by ``tremor_force`` [m/s^2] and ``tremor_rate`` [rad/s]
     rms; ``turn`` a rotation [rad] that the gyro misses in turn ``turn_at``; ``pose`` a constant acceleration [m/s^2]
-    along the vertical in pose ``pose_at``; ``clip`` [rad/s] the gyro's range, not stated; ``clock`` relative error.
+    along the vertical in pose ``pose_at``; ``clip`` [rad/s] the gyro's range, not stated; ``clock`` relative error;
+    ``arm`` [m] by which the accelerometers lie beside the point that is turned about, in each direction; ``delay`` [s]
+    by which the gyro comes late.
     """
 
     tremor: float = 0.0
@@ -106,6 +108,8 @@ class Faults:
     pose_at: int = 9
     clip: float = 0.0
     clock: float = 0.0
+    arm: float = 0.0
+    delay: float = 0.0
 
 
 def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.5):
@@ -141,10 +145,16 @@ def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.
         shake[:m] += np.sin(2 * np.pi * frequency * np.arange(m)[:, None] * dt + phase) / np.sqrt(3)
     earth = EARTH * np.array([np.cos(LATITUDE), 0, np.sin(LATITUDE)])
     seen = w + np.einsum("nji,j->ni", attitudes, earth) + lost + shake[:, ::-1] * faults.tremor_rate
+    if faults.delay:
+        t = np.arange(len(w)) * dt
+        seen = np.stack([np.interp(t - faults.delay, t, column) for column in seen.T], 1)
     if faults.clip:
         seen = np.clip(seen, -faults.clip, faults.clip)
     seen = seen + rng.normal(0, made.gyro_noise * np.sqrt(rate), seen.shape)
     f = attitudes[:, 2, :] * G + kick + shake * faults.tremor_force
+    if faults.arm:
+        arm = np.full(3, faults.arm)
+        f = f + np.cross(np.gradient(w, dt, axis=0), arm) + np.cross(w, np.cross(w, arm))
     f = f + rng.normal(0, made.acc_noise * np.sqrt(rate), f.shape)
     along = f @ (made.A / np.diag(made.A)[:, None]).T
     acc = np.diag(made.A) * (along + made.k2 * along**2) + made.a0

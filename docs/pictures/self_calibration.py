@@ -9,7 +9,7 @@ from inercal.geometry.earth import gravity
 from inercal.geometry.site import Site
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.figures import relative_errors
-from inercal.selfcal.figures.filters import attitude_errors
+from inercal.selfcal.figures.filters import attitude_errors, changes_of_turn
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import path
@@ -35,8 +35,9 @@ for name, figure in (("paper", 2), ("paper two turns", 4)):
         estimate(made.recording, problem(study), kind).history for kind in ("svd-qukf", "gimbal-ukf")
     )
     t = made.recording.t
+    changes = changes_of_turn(t, made.recording.th)
     models = {"quaternion model": quaternion.attitude, "gimbal-angle model": gimbal.attitude}
-    drawn = {f"self-calibration-figure-{figure}.svg": attitude_errors(t, made.attitude, models)}
+    drawn = {f"self-calibration-figure-{figure}.svg": attitude_errors(t, made.attitude, models, changes)}
     if figure == 2:
         drawn["self-calibration-figure-3.svg"] = relative_errors(t, quaternion, TRUTH)
     for file, picture in drawn.items():

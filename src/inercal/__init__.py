@@ -40,7 +40,7 @@ Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.fusion.model`
 Records: labelled columns (`inercal.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
     turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's; rate in a rate test
-    selfcal        t, wc_x.. or gyro_x.., th_x.., acc_x..
+    selfcal        t, wc_x.. or gyro_x.., th_x.., acc_x..; q_ref_0.. the true attitude
     aoa            t, a1 .. an, gyro, gyro_roll, gyro_yaw, point, trigger, theta_ref
 
 Uncertainty

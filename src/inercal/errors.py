@@ -73,8 +73,12 @@ class MissingExtraError(InercalError):
     """An optional package is missing; the message holds the ``pip install`` line."""
 
     def __init__(self, feature: str, extra: str) -> None:
-        self.extra = extra
+        self.feature, self.extra = feature, extra
         super().__init__(f"{feature} needs the extra '{extra}': pip install 'inercal[{extra}]'")
+
+    def __reduce__(self) -> tuple[type[MissingExtraError], tuple[str, str]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.feature, self.extra)
 
 
 class CalibrationError(InercalError):

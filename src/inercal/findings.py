@@ -62,10 +62,13 @@ CODES: dict[str, Code] = {
     "between_runs": Code("a coefficient changes from run to run by more than its uncertainty", _NEVER),
     "several_instruments": Code("repeat runs look like runs of different instruments", _ALWAYS),
     "rate_suspect": Code("a stated rate of a table does not fit the others", _BY_SIZE),
-    "rate_without_u": Code("a sample rate was typed without an uncertainty", _BY_SIZE),
+    "rate_without_u": Code(
+        "a sample rate was typed without an uncertainty, or time stamps are taken as exact", _BY_SIZE
+    ),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
-    "hysteresis": Code("values on rising and on falling temperature differ", _NEVER),
+    "hysteresis": Code("values on rising and on falling temperature or input differ", _NEVER),
+    "dead_zone": Code("an output does not follow small changes of its input", _NEVER),
     "outside_range": Code("a value is stated outside the range it was measured over", _ALWAYS),
     "excess_scatter": Code(
         "the scatter of the residuals exceeds what the sensor noise explains", _BY_SIZE, rank=12
@@ -80,7 +83,7 @@ CODES: dict[str, Code] = {
     "outlying_pose": Code("a static pose lies off what all others say", _BY_SIZE),
     "outlying_turn": Code("a turn lies off what all others say", _BY_SIZE),
     "unmodelled_k2": Code(
-        "second-order coefficients of the accelerometers are not fitted, and would matter", _BY_SIZE
+        "second-order coefficients of the accelerometers are not fitted, and show or rule u", _BY_SIZE
     ),
     "skipped_turn": Code("a turn was left out of the fit", _NEVER),
     "stated_earth_rate": Code("earth rate is subtracted and its terms are not fitted", _NEVER),
@@ -113,11 +116,13 @@ CODES: dict[str, Code] = {
     "same_recording": Code("two calibrations rest on the same recording", _NEVER),
     "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),
     "flexure": Code("the support of the model shakes its sensors", _ALWAYS),
+    "band_limited": Code("vibration is taken out of the sensors, motion above the band with it", _NEVER),
     "unmodelled": Code("the recording shows errors that the model leaves out", _BY_SIZE, rank=9),
     "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE, rank=10),
     "low_scatter": Code("the scatter of the residuals is below what the stated noise explains", _NEVER),
     "prior_suspect": Code("a value is far outside what its prior allows", _ALWAYS, rank=11),
     "filter_fails": Code("an estimator fails on a sound recording", _ALWAYS, rank=13),
+    "estimators_differ": Code("two estimators of one model differ by too much of u", _BY_SIZE),
     "perhaps_common": Code("sources that may act alike in two calibrations", _NEVER),
     "failed_case": Code("a case of the validation did not pass", _NEVER),
 }

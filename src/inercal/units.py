@@ -174,6 +174,8 @@ def parse_unit(text: str, where: object = "unit", dimension: str | None = None) 
     QuantityError
         The text is no unit known here or to pint.
     """
+    if len(text) > _LONGEST:
+        raise QuantityError(where, f"found the unit {shown(text)}, expected {_everyday(dimension)}")
     plain = _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), text.strip())
     plain = plain.translate(_SIGNS).replace("°", "deg").replace("**", "^").replace("s2", "s^2")
     plain = re.sub(r"√\s*\(?\s*([^\W\d]+)\s*\)?", r"sqrt(\1)", plain)
@@ -228,6 +230,9 @@ _QUANTITY = re.compile(
 )
 
 
+#: characters of a quantity or a unit
+_LONGEST = 200
+
 #: a quantity that is larger, or smaller than its inverse, is a slip, and its square might be lost in rounding
 _LARGEST = 1e60
 
@@ -258,7 +263,7 @@ def parse_quantity(text: object, dimension: str, where: object, example: str = "
     expected = f"{kind}, such as {_example(dimension, example)}"
     if isinstance(text, int | float) and not isinstance(text, bool) and abs(text) < _LARGEST:
         text = repr(text)
-    match = _QUANTITY.match(text) if isinstance(text, str) else None
+    match = _QUANTITY.match(text) if isinstance(text, str) and len(text) <= _LONGEST else None
     if match is None or (match["digits"] and match["plusminus"]):
         if isinstance(text, str) and re.search("[0-9],[0-9]", text):
             expected += ", with a decimal point"

@@ -126,10 +126,18 @@ def _off(x, k):
 
 
 def believed_of(twin, x, P):
-    """(n,) how much of a derivative by each state is kept: of positions and the gyro's scale as much as moves."""
+    """(n,) how much of a derivative by each state is kept: of positions, gyro scale and delay as much as moves."""
     rate, acceleration = (max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0 for j in (1, 2))
-    by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate}
+    by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate, "tau": acceleration}
     return np.array([by.get(name.partition("_")[0], 1.0) for name in twin.names])
+
+
+def beyond(twin, P, believed):
+    """Variance of tau al and of tau^2 j / 2 about 0: for a Gaussian tau the mean of tau^4 is 3 var(tau)^2."""
+    if "tau_g" not in twin.place or not believed[twin.place["tau_g"]] > 0.0:
+        return 0.0
+    k = twin.place["tau_g"]
+    return P[k, k] * P[2, 2] + 3.0 * P[k, k] ** 2 * P[3, 3] / 4.0
 
 
 def run(twin, start, t, rows):
@@ -157,6 +165,7 @@ def run(twin, start, t, rows):
                 continue
             told, h, variance = twin.reading(ahead, i, np.concatenate([row[: n + 3], turns]))
             h = h * believed
+            variance += beyond(twin, P, believed) if i == n else 0.0
             v, S = row[i] - told - h @ (x - ahead), h @ P @ h + variance
             if i <= n:
                 innovations[k, i] = v / math.sqrt(S)

@@ -174,7 +174,7 @@ def test_the_gyro_is_aligned_first(timing):
     truth = made(settings)
     aligned, not_aligned = (
         sizes(errors(measure(truth.recording, replace(settings, timing=each), PAPER), truth))[1]
-        for each in (timing, Timing())
+        for each in (timing, Timing(0.0))
     )
     assert not_aligned > 0.05
     assert aligned < 0.02

@@ -162,8 +162,9 @@ def test_a_gross_fault_is_no_good_verdict(name):
 
 
 def test_a_late_gyro_is_no_good_verdict():
-    """2 ms cost the fusion 0.2 deg rms, which flexure takes up: NIS alone stays below its limit."""
-    settings = study(motion=replace(BASE, duration=12.0), disturbances=Disturbances(gyro_delay=2e-3))
+    """2 ms that are stated as none cost 0.2 deg rms, which flexure takes up: NIS alone stays below its limit."""
+    late = Disturbances(gyro_delay=2e-3)
+    settings = study(motion=replace(BASE, duration=12.0), disturbances=late, timing=Timing(0.0))
     recording = recorded(settings, 0)
     found = estimate(recording, problem(settings))
     status, message = of_fusion(recording, found, of_filter(found, 19), implausible(recording, settings))
@@ -196,13 +197,22 @@ def test_two_faults_at_once():
 
 @pytest.mark.parametrize("delay", [2e-3, -4e-3, 20e-3])
 def test_a_gyro_that_is_late(delay):
-    settings = study(motion=replace(BASE, duration=12.0), disturbances=Disturbances(gyro_delay=delay))
+    late = Disturbances(gyro_delay=delay)
+    settings = study(motion=replace(BASE, duration=12.0), disturbances=late, timing=Timing(0.0))
     recording = recorded(settings, 0)
     ((code, message),) = said(recording, settings)
     assert code == "command_shift"
     assert f'write gyro_delay = "{1e3 * delay:.2g} ms"' in message
-    stated = replace(settings, timing=Timing(gyro_delay=delay))
-    assert said(recording, stated) == []
+    for known in (delay, None):  # stated, or estimated as by default
+        assert said(recording, replace(settings, timing=Timing(known))) == []
+
+
+def test_a_gyro_that_is_later_than_is_estimated():
+    """40 ms, eight of the prior's standard deviations: named, with the number to write."""
+    settings = study(motion=replace(BASE, duration=12.0), disturbances=Disturbances(gyro_delay=40e-3))
+    ((code, message),) = said(recorded(settings, 0), settings)
+    assert code == "command_shift"
+    assert 'write gyro_delay = "40 ms" under [timing]' in message
 
 
 def test_a_gyro_of_another_axis():

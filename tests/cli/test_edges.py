@@ -277,3 +277,39 @@ def test_no_encoding_is_too_poor(folder):
 def test_matplotlib_is_told_to_be_quiet(capsys):
     run(["examples"])
     assert not logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)
+
+
+@for_each("name", ["inspect", "apply", "convert", "compare"])
+def test_control_characters_of_files_stay_in_their_files(name, folder, capsys):
+    """A name in a foreign file must not clear the screen, set the title of the terminal, or turn its text."""
+    evil = "\x1b[2J\x1b]0;pwned\x07\u202egnp\u009b31m"
+    Path("evil.csv").write_text(CSV.replace("acc_x", f"a{evil}") + "0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n", "utf-8")
+    whole = json.loads(Path("cal.json").read_text("utf-8"))
+    whole["status"]["message"] = whole["parameters"][0]["name"] = evil
+    whole["parameters"][1]["unit"] = whole["command"] = evil
+    whole["covariance"] = {"names": [each["name"] for each in whole["parameters"]], "matrix": []}
+    Path("evil.json").write_text(json.dumps(whole), "utf-8")
+    Path("map.toml").write_text('[columns]\nacc_x = { from = "none", unit = "g" }\n[time]\nrate = "1 Hz"\n')
+    words = {
+        "inspect": "inspect evil.csv --map map.toml",
+        "apply": "apply evil.json log.csv --out out.csv",
+        "convert": "convert evil.json --to kalibr --out out.yaml",
+        "compare": "compare evil.json cal.json",
+    }
+    capsys.readouterr()
+    run(words[name].split())
+    out, err = capsys.readouterr()
+    assert not set("\x1b\x07\u202e\u009b") & set(out + err)
+    assert out + err
+
+
+def test_an_error_line_has_an_end(folder, capsys):
+    """Lines of 4.7 kB came of long names."""
+    Path("long.csv").write_text(
+        ",".join(f"{'x' * 150}{k}" for k in range(40)) + "\n" + ",".join("1" * 40) + "\n"
+    )
+    Path("map.toml").write_text('[columns]\nacc_x = { from = "none", unit = "g" }\n[time]\nrate = "1 Hz"\n')
+    assert run(["inspect", "long.csv", "--map", "map.toml"]) == 2
+    err = capsys.readouterr().err
+    assert len(err) < 1000
+    assert err.endswith("expected it there\n")

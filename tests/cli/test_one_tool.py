@@ -347,7 +347,15 @@ def test_bash_completes_verbs_kinds_options_and_choices(tmp_path, scripts):
         "inercal cal": {"calibrate"},
         "inercal simulate ''": {"imu", "turntable", "selfcal", "aoa"},
         "inercal aoa --sta": {"--static", "--states"},
-        "inercal selfcal --filter ''": {"error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"},
+        "inercal selfcal --filter ''": {
+            "error-state",
+            "mukf",
+            "svd-qukf",
+            "gimbal-ukf",
+            "map",
+            "lm",
+            "linear",
+        },
         "inercal aoa log.csv --states ''": {"8", "11", "15", "19"},
         "inercal calibrate imu --study ''": {""},
     }

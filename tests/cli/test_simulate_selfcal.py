@@ -58,6 +58,7 @@ def test_the_recording_is_that_of_the_seed_in_any_format(suffix, folder):
     assert found.findings == ()
     for name in ("t", "rate", "th", "acc"):
         assert_allclose(getattr(found, name), getattr(expected.recording, name), rtol=1e-13, atol=1e-16)
+    assert_allclose(found.reference, expected.attitude, rtol=1e-13, atol=1e-16)
 
 
 def test_the_object_says_what_was_made(folder, capsys):
@@ -69,7 +70,7 @@ def test_the_object_says_what_was_made(folder, capsys):
     rows = 150 + 50 + 20 + 1
     assert data["result"] == {
         "out": "run.csv", "rows": rows, "seed": 1,
-        "columns": [f"{s}_{i}" for s in ("wc", "th", "acc") for i in "xyz"],
+        "columns": [*(f"{s}_{i}" for s in ("wc", "th", "acc") for i in "xyz"), *(f"q_ref_{k}" for k in range(4))],
     }  # fmt: skip
     assert [source["path"] for source in data["inputs"]] == ["selfcal.toml"]
     head, *lines = Path("run.csv").read_text().splitlines()
@@ -186,6 +187,22 @@ def test_many_runs_are_judged(folder, capsys):
     assert "simulated many times" in Path("mc.html").read_text()
 
 
+def test_many_runs_go_on_from_a_folder(folder, capsys):
+    """Half of the chunks of a campaign that was killed: the same digits. Another seed is another campaign."""
+    command = ["--runs", "12", "--checkpoint", "kept", "--json", "--quiet"]
+    assert simulated(*command) == 0
+    first = json.loads(capsys.readouterr().out)["result"]
+    chunks = sorted(Path("kept").glob("chunk-*.npz"))
+    times = {each: each.stat().st_mtime_ns for each in chunks[::2]}
+    for each in chunks[1::2]:
+        each.unlink()
+    assert simulated(*command) == 0
+    assert json.loads(capsys.readouterr().out)["result"] == first
+    assert all(each.stat().st_mtime_ns == time for each, time in times.items())
+    assert simulated(*command, "--seed", "2") == 2
+    assert "kept" in capsys.readouterr().err
+
+
 def test_many_runs_with_noise_stated_too_small_fail(folder, capsys):
     """Encoder errors that the study does not state: exit code 1, and the object all the same."""
     harmonics = 'disturbances.harmonics=[{axis="x", order=1, amplitude="30 arcsec", phase="0 deg"}]'
@@ -201,6 +218,7 @@ def test_many_runs_with_noise_stated_too_small_fail(folder, capsys):
         (["--runs", "1"], "--runs: found 1"),
         (["--runs", "5", "--seed", "-1"], "--seed: found -1"),
         (["--runs", "5", "--out", "mc.csv"], "found the suffix '.csv'"),
+        (["--out", "run.csv", "--checkpoint", "kept"], "--checkpoint: found without --runs"),
         (["--out", "run.csv", "--report", "mc.html"], "--report: found without --runs"),
     ],
 )

@@ -106,6 +106,15 @@ def refused(result, *words):
         assert word in lines[0]
 
 
+def test_no_line_up_to_the_last_one_received(here, tmp_path):
+    """A resumed run gives those since the last save once more; told the stamp of the last line, none twice."""
+    _, whole, _ = here("apply", "cal.json", "--stream", "--quiet")
+    _, rest, _ = here("apply", "cal.json", "--stream", "--quiet", "--after", "9.98 s")
+    lines = whole.splitlines()
+    k = next(k for k, line in enumerate(lines) if line.startswith("9.98,"))
+    assert rest.splitlines() == lines[k + 1 :]
+
+
 # Applying a calibration.
 
 
@@ -306,6 +315,8 @@ def test_the_monitor_says_what_it_sees(folder):
         (["apply", "cal.json", "log.csv", "european.csv", "--stream"], ["--stream", "2 files"]),
         (["apply", "none.json", "--stream"], ["none.json"]),
         (["apply", "cal.json", "none.csv", "--stream"], ["none.csv", "cannot be read"]),
+        (["monitor", "--after", "soon"], ["--after", "soon"]),
+        (["apply", "cal.json", "log.csv", "--out", "x.csv", "--after", "1 s"], ["--after", "--stream"]),
         (["monitor", "--checkpoint", "none/state"], ["none/state", "cannot be written"]),
         (["monitor", "--checkpoint", "log.csv/state"], ["log.csv/state", "cannot be written"]),
         (["monitor", "log.csv", "--checkpoint", "log.csv"], ["is an input"]),

@@ -266,6 +266,19 @@ def test_u_of_an_accelerometer_is_that_of_drawn_coefficients():
 # A rate test.
 
 
+def test_what_lies_beyond_the_calibration_is_said(wheel):
+    """Outputs beyond its readings, and a specific force beyond gravity; what lies within says nothing."""
+    p, q, a, w = attitudes(np.random.default_rng(5), 20)
+    model = model_of(wheel)
+    assert not apply_to(wheel_record(a, w, f=-GRAVITY * a), model).findings
+    thrice = apply_to(wheel_record(3.0 * a, w, f=-3.0 * GRAVITY * a), model).findings
+    assert {each.code for each in thrice} == {"outside_range"}
+    assert {each.message.split()[0] for each in thrice} == {"y_x", "y_y", "acc_x", "acc_y", "acc_z"}
+    fast = apply_to(wheel_record(a, w + 1e-3, phi1=p, phi2=q), model).findings
+    assert [each.message.split()[0] for each in fast] == ["y_x", "y_y"]
+    assert "the calibration holds from" in fast[0].message
+
+
 def test_a_gyro_of_a_rate_test_reads_the_rate_with_its_asymmetry_undone():
     truth = {"S_z": 1.0002, "D_F_z": 0.5 * DEG_H, "S_asym_z": 400e-6, "S2_z": 2e-4, "S3_z": -1e-4}
     rates = np.radians([-100.0, -75, -50, -25, -10, 10, 25, 50, 75, 100])

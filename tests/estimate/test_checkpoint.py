@@ -1,6 +1,7 @@
 """The state of an estimator on disk: bit for bit, whole or not at all, and never one of something else."""
 
 import hashlib
+import os
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -167,3 +168,24 @@ def test_the_lock_of_a_run_that_ends_just_then_is_not_taken(another, tmp_path, m
     with pytest.raises(InputError, match="c: is in use by another run"), alone(tmp_path / "c"):
         pass
     assert lock.exists() == another
+
+
+def test_the_lock_spares_what_is_somebodys(tmp_path):
+    """A link of the lock's name had its target emptied, silently."""
+    pytest.importorskip("fcntl", reason="locks as on POSIX")
+    mine = tmp_path / "mine.txt"
+    mine.write_text("mine")
+    lock = tmp_path / "c.lock"
+    for make in (lambda: lock.symlink_to(mine), lambda: lock.hardlink_to(mine), lambda: lock.write_text("mine"),
+                 lambda: lock.symlink_to(tmp_path / "none"), lambda: os.mkfifo(lock), lock.mkdir):  # fmt: skip
+        make()
+        with pytest.raises(InputError, match=r"c(\.lock)?: (is|cannot)"), alone(tmp_path / "c"):
+            pass
+        assert lock.is_symlink() or lock.exists()
+        lock.rmdir() if lock.is_dir() and not lock.is_symlink() else lock.unlink()
+    assert mine.read_text() == "mine"
+    assert not (tmp_path / "none").exists()
+    lock.touch()  # as a killed run leaves it
+    with alone(tmp_path / "c"):
+        assert lock.exists()
+    assert not lock.exists()

@@ -190,6 +190,19 @@ def test_the_budget_adds_up():
     ]  # fmt: skip
 
 
+def test_a_source_of_one_run_alone_is_in_the_budget():
+    """Gravity in both, a tilt that the first run excludes and the second does not."""
+    gravity = BudgetItem("gravity", "B", 0.3, "m/s^2", {"K0_x": 0.09 / 1.09})
+    tilt = BudgetItem("a tilt of the base, not excluded", "B", 1.0, "1", {"K0_x": 0.36 / 1.45})
+    runs = [
+        run_of([0.0], [1.0], [[0.09]], budget=(gravity,)),
+        run_of([1.0], [1.0], [[0.45]], budget=(replace(gravity, share={"K0_x": 0.09 / 1.45}), tilt)),
+    ]
+    found = combine_runs(runs)
+    assert sum(part.share.get("K0_x", 0.0) for part in found.budget) == pytest.approx(1.0)
+    assert [part.source for part in found.budget][2:] == ["gravity", tilt.source]
+
+
 def test_the_part_from_elsewhere_survives_the_file():
     found = combine_runs([run_of([1.0], [1.0], [[0.25]]), run_of([2.0], [1.0], [[0.25]])])
     again = from_json(to_json(found))

@@ -294,9 +294,9 @@ def test_a_copy_that_was_broken_off_is_made_whole(tmp_path, monkeypatch, capsys)
     assert Path("thermal/thermal-map.toml").read_text() == "mine"
 
 
-@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_asked_to_end_in_the_middle_of_a_write(signum, tmp_path):
-    """As by Ctrl-C, so by `kill` and a computer that shuts down: the old file, nothing beside it, and exit code 130."""
+    """As by Ctrl-C, so by `kill`, a shutdown and a closed terminal: the old file, nothing beside it, exit code 130."""
     target = tmp_path / "schema.json"
     target.write_bytes(OLD)
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from inercal.examples import FOLDER
 from inercal.geometry.site import GravityInput, Site
-from inercal.imu.ferraris.simulate import Session, draw_full_truth, quiet, simulate_session
+from inercal.imu.ferraris.simulate import Session, quiet, simulate_session
 from inercal.imu.settings import ImuSettings
+from inercal.imu.simulate import draw_full_truth
 from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.record import Record
-from inercal.studies.imu import FerrarisTable, ferraris_settings
+from inercal.studies.ferraris import FerrarisTable, ferraris_settings
 from inercal.units import parse_unit
 
 SETTINGS = ImuSettings(Site(9.81))

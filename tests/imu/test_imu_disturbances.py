@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from inercal.errors import StudyError
+from inercal.findings import Status
 from inercal.geometry.rotations import conjugate, exp, multiply
+from inercal.imu.ferraris.names import NAMES as SECTIONS
 from inercal.imu.settings import Disturbances
 from inercal.imu.simulate import draw_truth, hand_poses, simulate, with_values
+from inercal.imu.task import calibrate
 from inercal.imu.task import simulate as simulate_study
 from inercal.studies.load import load_imu_study
 
@@ -99,7 +102,7 @@ def test_a_study_states_course_truth_and_disturbances(tmp_path):
     )
     for text, words in (
         (STUDY.replace('latitude = "50 deg"\n', ""), "no latitude"),
-        (STUDY + '[imu]\nmethod = "ferraris"\n', "imu.method: found another method"),
+        (STUDY + '[imu]\nmethod = "means"\n', "imu.method: found another method"),
     ):
         path.write_text(text)
         with pytest.raises(StudyError, match=words):
@@ -111,7 +114,93 @@ def test_a_study_states_course_truth_and_disturbances(tmp_path):
         ),
         (STUDY + '[disturbances]\nk2 = "30 ug"\n', "disturbances.k2: found"),
         (STUDY + '[disturbances]\nrestless_start = "-1 deg"\n', "a size of 0 or more"),
+        (
+            STUDY + '[disturbances]\ndelay = "20 ms"\n',
+            "disturbances.delay: found with method = 'multiposition'",
+        ),
+        (
+            STUDY + '[imu]\nmethod = "ferraris"\n[simulation]\nposes = 9\n',
+            "simulation.poses: found with method = 'ferraris', expected it with multiposition only",
+        ),
+        (
+            STUDY + '[imu]\nmethod = "aided"\n[disturbances]\nrestless_start = "1 deg"\n',
+            "expected it with multiposition or ferraris only",
+        ),
     ):
         path.write_text(text)
         with pytest.raises(StudyError, match=words):
             load_imu_study(path)
+
+
+FERRARIS = STUDY + (
+    '[imu]\nmethod = "ferraris"\n[imu.ferraris]\nturn = "360(0.2) deg"\nalignment = "0.3 deg"\n'
+    '[simulation]\nhold = "6 s"\nturning = "5 s"\n'
+)
+TABLE = STUDY + (
+    '[imu]\nmethod = "aided"\n[imu.aided.rig]\nkind = "two_axis_turntable"\n[imu.aided.rig.errors]\n'
+    'default = { normal = "10 arcsec" }\n[simulation]\nstart = "6 s"\nhold = "4 s"\nturning = "4 s"\n'
+    'sample_rate = "25 Hz"\n'
+)
+TRUE = {"K1_x": 420.0, "M_yx": 0.01, "S_z": 4800.0, "T_xy": -0.02}
+COEFFICIENTS = "[simulation.coefficients]\n" + "".join(
+    f'{name} = "{value}{unit}"\n'
+    for (name, value), unit in zip(
+        TRUE.items(), (" count/(m/s^2)", " rad", " count/(rad/s)", " rad"), strict=True
+    )
+)
+
+
+def round_trip(tmp_path, text, disturbances=""):
+    """The calibration of the recording that a study simulates, by the same study."""
+    path = tmp_path / "study.toml"
+    path.write_text(text + COEFFICIENTS + "[disturbances]\n" + disturbances)
+    of = load_imu_study(path)
+    record = simulate_study(of, np.random.default_rng(5))
+    return record, calibrate(record, of).estimate
+
+
+def codes(estimate):
+    return {finding.code for finding in estimate.findings}
+
+
+def test_six_positions_and_three_turns_come_back(tmp_path):
+    record, estimate = round_trip(tmp_path, FERRARIS)
+    assert estimate.status is Status.OK
+    assert set(record.labels) == {"", *SECTIONS}
+    for name, value in TRUE.items():
+        assert abs(estimate[name].value - value) < 4.0 * estimate[name].u, name
+
+
+def test_faults_of_a_session_are_seen_as_they_are(tmp_path):
+    """A restless position, a clipped turn; a clock shifts the scale factors by itself, closed form."""
+    _, sound = round_trip(tmp_path, FERRARIS)
+    _, restless = round_trip(tmp_path, FERRARIS, 'restless_start = "0.5 deg"\n')
+    assert restless.status is Status.INCONSISTENT
+    assert "poor_section" in codes(restless)
+    _, clipped = round_trip(tmp_path, FERRARIS, 'gyro_range = "100 deg/s"\n')
+    assert "saturation" in codes(clipped)
+    _, slow = round_trip(tmp_path, FERRARIS, 'clock = "1 %"\n')
+    for axis in "xyz":
+        assert slow[f"S_{axis}"].value / sound[f"S_{axis}"].value == pytest.approx(1.01, rel=1e-4)
+    _, bent = round_trip(tmp_path, FERRARIS, 'k2 = "100 ug/g^2"\n')
+    moved = (bent["K0_x"].value - sound["K0_x"].value) / sound["K1_x"].value
+    assert moved == pytest.approx(100e-6 / 9.80665 * 9.81**2, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_a_test_on_a_table_comes_back_with_lever_arms_and_a_delay(tmp_path):
+    _, estimate = round_trip(tmp_path, TABLE, 'lever_arm = "50 mm"\ndelay = "20 ms"\n')
+    assert estimate.status is Status.OK
+    assert "command_shift" in codes(estimate)
+    for name, value in TRUE.items():
+        assert abs(estimate[name].value - value) < 4.0 * estimate[name].u, name
+    shift = estimate.result["time_shift_s"]["acc"]
+    assert abs(shift["value"][0] - 0.02) < 4.0 * shift["u"][0]
+
+
+@pytest.mark.slow
+def test_faults_on_a_table_are_named(tmp_path):
+    _, knocked = round_trip(tmp_path, TABLE, 'knocks = 1\nknock = "1 deg"\n')
+    assert "outlier" in codes(knocked)
+    _, bent = round_trip(tmp_path, TABLE, 'gyro_range = "40 deg/s"\nk2 = "1000 ug/g^2"\n')
+    assert {"saturation", "unmodelled_k2"} <= codes(bent)

@@ -2,10 +2,30 @@
 
 import numpy as np
 import pytest
+from campaigns.rows import (
+    ANGLES,
+    ANGLES_U,
+    RATES,
+    RATES_U,
+    SITE,
+    TILT,
+    G,
+    by_means,
+    by_rates,
+    by_turns,
+    directions,
+    drawn,
+    platter,
+    pose_means,
+    record_of,
+    triad,
+    turns,
+)
 from recordings import shipped
+from scipy.stats import binom
 
+from inercal.errors import StudyError
 from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
 from inercal.imu.figures import page, pictures
 from inercal.imu.settings import (
     Exclusion,
@@ -15,107 +35,8 @@ from inercal.imu.settings import (
     MeansSettings,
 )
 from inercal.imu.task import calibrate, calibrate_files
-from inercal.inputs import Source
 from inercal.instruments.terms import GYRO_TRIAD
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.units import parse_unit
-
-G = 9.81
-SITE = Site(G, (GravityInput("gravity", 2e-4, "m/s^2", 1.0),), 0.8, 0.0)
-RPM = np.pi / 30.0
-RATES, RATES_U = RPM * np.array([0.0, 33.333, 45.0]), RPM * np.array([0.0, 0.015, 0.02])
-ANGLES, ANGLES_U = np.radians([361.338, 367.160, 363.670]), np.radians([0.05, 0.05, 0.05])
-TILT = np.radians(0.1)
-
-
-def record_of(sensor, values, t=None, unit="count"):
-    """A record of one triad (n, 3), its rows counted where there is no time."""
-    t = np.arange(len(values), dtype=float) if t is None else t
-    source = Source("made", "")
-    columns = [
-        Column(f"{sensor}_{axis}", parse_unit(unit), np.ascontiguousarray(column), t, source)
-        for axis, column in zip("xyz", values.T, strict=True)
-    ]
-    return Record({column.name: column for column in columns}, (), (source,))
-
-
-def directions(rng, n):
-    x = rng.normal(size=(n, 3))
-    return x / np.linalg.norm(x, axis=1, keepdims=True)
-
-
-def triad(rng, scale):
-    """True bias, scale and upper misalignments (9,), and the outputs for inputs (n, 3)."""
-    truth = np.concatenate(
-        [100.0 * rng.normal(size=3), scale * (1 + 0.02 * rng.normal(size=3)), 0.01 * rng.normal(size=3)]
-    )
-    M = np.array([[1.0, truth[6], truth[7]], [0.0, 1.0, truth[8]], [0.0, 0.0, 1.0]])
-    return truth, lambda x: x @ (truth[3:6, None] * M).T + truth[:3]
-
-
-def pose_means(rng, n=24, noise=0.3):
-    truth, outputs = triad(rng, 400.0)
-    gravity = G + 2e-4 * rng.normal()
-    return truth, outputs(gravity * directions(rng, n)) + noise * rng.normal(size=(n, 3))
-
-
-def platter(rng, noise=0.5, wow=1e-4, off=(0.0, 0.0, 0.0), orientations=(6, 15, 15)):
-    """Truth, and the rows of each rate, whose true values are off by what is stated and a relative ``off`` more."""
-    truth, outputs = triad(rng, 4000.0)
-    rows = []
-    for rate, u, more, n in zip(RATES, RATES_U, off, orientations, strict=True):
-        true = (rate + u * rng.normal()) * (1.0 + more)
-        x = true * (1.0 + wow * rng.normal(size=(n, 1))) * directions(rng, n)
-        rows.append(outputs(x) + noise * rng.normal(size=(n, 3)))
-    return truth, rows
-
-
-def turns(rng, tilt=TILT, drift=0.0, noise=2.0):
-    """Truth (12,) and recordings of 16 s at 100 Hz, each with a turn of 6 s after 5 s."""
-    scale = 940.0 * (1 + 0.02 * rng.normal(size=3))
-    T = np.where(np.eye(3) > 0, 1.0, 0.01 * rng.normal(size=(3, 3)))
-    bias = 20.0 * rng.normal(size=3)
-    t = np.arange(0.0, 16.0, 0.01)
-    profile = np.where((t > 5.0) & (t < 11.0), 1.0 - np.cos(2.0 * np.pi * (t - 5.0) / 6.0), 0.0) / 6.0
-    records = []
-    for j in range(3):
-        axis = np.eye(3)[j] + tilt * rng.normal(size=3) * (np.arange(3) != j)
-        rate = (ANGLES[j] + ANGLES_U[j] * rng.normal()) * np.outer(profile, axis / np.linalg.norm(axis))
-        output = (
-            rate @ (scale[:, None] * T).T + bias + drift * t[:, None] + noise * rng.normal(size=rate.shape)
-        )
-        records.append(record_of("gyro", output, t))
-    off_diagonal = [T[i, j] for i in range(3) for j in range(3) if i != j]
-    return np.concatenate([bias + 8.0 * drift, scale, off_diagonal]), records
-
-
-def by_means(values, **more):
-    return calibrate(record_of("acc", values), ImuSettings(SITE, method=MeansSettings(), **more)).estimate
-
-
-def by_rates(rows, rates=RATES, u=RATES_U):
-    records = [record_of("gyro", each) for each in rows]
-    return calibrate_files(
-        records, ImuSettings(SITE, method=KnownRatesSettings(tuple(rates), tuple(u)))
-    ).estimate
-
-
-def by_turns(records, alignment=TILT):
-    options = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), alignment)
-    return calibrate_files(records, ImuSettings(SITE, method=options)).estimate
-
-
-def drawn(method, rng):
-    """The truth of one draw, and its estimate."""
-    if method == "means":
-        truth, values = pose_means(rng)
-        return truth, by_means(values)
-    if method == "known_rates":
-        truth, rows = platter(rng)
-        return truth, by_rates(rows)
-    truth, records = turns(rng)
-    return truth, by_turns(records)
+from rows import for_each
 
 
 def covered(method, runs, seed):
@@ -221,7 +142,58 @@ def test_an_orientation_that_moved_is_named():
     estimate = by_rates(rows)
     (finding,) = [each for each in estimate.findings if each.code == "outlying_pose"]
     assert "row 4" in finding.message
+    assert 'imu.exclude = ["pose 10"]' in finding.message
     assert estimate.status is Status.SUSPECT
+    without = by_rates(rows, exclude=Exclusion(poses=(10,)))
+    assert without.status is Status.OK
+    numbers = [row["pose"] for row in without.result["orientations"]]
+    assert numbers == [n for n in range(1, 37) if n != 10]
+    alone = by_rates([rows[0], np.delete(rows[1], 3, axis=0), rows[2]])
+    np.testing.assert_allclose(without.values, alone.values, rtol=1e-9)
+
+
+@for_each(
+    ("exclude", "sentence"),
+    [
+        (Exclusion(poses=(40,)), "found pose 40, expected one of the orientations 1 to 36"),
+        (Exclusion(((3.0, 4.0),)), "each FILE has times of its own"),
+    ],
+)
+def test_an_orientation_that_is_not_there_gets_a_sentence(exclude, sentence):
+    _, rows = platter(np.random.default_rng(6))
+    with pytest.raises(StudyError, match=sentence):
+        by_rates(rows, exclude=exclude)
+
+
+def drifting(rng, bias=0.0, scale=0.0):
+    """Rows of a gyro whose bias [output] or scale factor (relative) drifts through all of them."""
+    truth, rows = platter(rng)
+    count, seen = sum(map(len, rows)), 0
+    for row in rows:
+        passed = (seen + np.arange(len(row)))[:, None] / count
+        row += bias * passed + scale * passed * (row - truth[:3])
+        seen += len(row)
+    return truth, rows
+
+
+@for_each(
+    ("drift", "words"),
+    [({"bias": 8.0}, "the biases drift"), ({"scale": 2e-3}, "the rate or the scale factors change by")],
+)
+def test_what_changes_over_the_orientations_is_named(drift, words):
+    _, rows = drifting(np.random.default_rng(14), **drift)
+    estimate = by_rates(rows)
+    assert estimate.status is Status.SUSPECT
+    (finding,) = [each for each in estimate.findings if each.code == "trend"]
+    assert words in finding.message
+    assert finding.harm
+
+
+def test_trends_are_named_falsely_as_rarely_as_stated():
+    """30 sound tests: two tests of 1e-3 each, at 99.99 %."""
+    rng = np.random.default_rng(15)
+    named = sum("trend" in {each.code for each in by_rates(platter(rng)[1]).findings} for _ in range(30))
+    assert named <= binom.ppf(0.9999, 30, 2e-3)
 
 
 def test_steady_stretches_of_a_recording_are_the_orientations():

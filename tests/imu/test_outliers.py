@@ -52,13 +52,13 @@ def test_other_rows_count_as_if_they_were_items():
 def test_false_names_are_as_rare_as_stated():
     """300 sound fits: as many false names as the risk of 5e-4 allows at 99.99 %."""
     rng = np.random.default_rng(2)
-    false = sum(bool(outlying(linear(rng))) for _ in range(300))
+    false = sum(bool(outlying(linear(rng), 5e-4)) for _ in range(300))
     assert false <= binom.ppf(0.9999, 300, 5e-4)
 
 
 def test_two_outliers_do_not_hide_each_other():
     rng = np.random.default_rng(3)
-    assert outlying(linear(rng, 40, 9, [(4, 12.0), (17, 12.0)])) == [4, 17]
+    assert outlying(linear(rng, 40, 9, [(4, 12.0), (17, 12.0)]), 5e-4) == [4, 17]
 
 
 def test_half_foretold_by_the_other_half_is_chi_square():

@@ -202,6 +202,15 @@ class TestOutliers:
     def test_noise_motion_and_steps_are_fine(self, signal):
         assert outliers(signal, "acc_x") == []
 
+    def test_a_stop_within_a_sample_is_no_knock(self):
+        """A rate that dips towards zero between two turns; beyond zero, or faster than both, it is a knock."""
+        signal = 0.02 + 1e-6 * np.random.default_rng(4).standard_normal(2000)
+        signal[[300, 600]] = 0.01, 0.001
+        assert outliers(signal, "gyro_x") == outliers(-signal, "wc_y") == []
+        assert said(outliers(signal, "acc_x")) == [("outlier", "rows 301, 601")]
+        signal[900], signal[1200] = -0.001, 0.03
+        assert said(outliers(signal, "gyro_x")) == [("outlier", "rows 901, 1201")]
+
 
 class TestUnits:
     N = 1000

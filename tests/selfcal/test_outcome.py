@@ -238,9 +238,9 @@ def test_the_result_holds_what_the_interface_asks(sound):
     _, result, _ = sound
     text = json.loads(json.dumps(to_json(result)))
     own = text["result"]
-    assert {"filter", "bounds", "at_prior", "goal", "step_us", "sample_share", "compare"} <= set(own)
+    assert {"filter", "bounds", "at_prior", "goal", "sample_interval", "compare"} <= set(own)
     assert (np.array(list(own["bounds"].values())) < result.u).all()  # which has the site's part, too
-    assert own["sample_share"] == pytest.approx(own["step_us"] * 1e-6 / 0.2)
+    assert own["sample_interval"] == pytest.approx(0.2)
     assert text["parameters"][0]["unit"] == "rad/s"
     assert text["conditions"]["ranges"]["duration_s"] == pytest.approx(540.0)
     assert text["statistics"]["condition"] > 1.0

@@ -6,10 +6,13 @@ freedom has a standard error of 0.65, a root mean square of 100 errors one of 7 
 of 0.01; they grow as the root of the runs falls.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from paper_study import TRUTH, study
 
+from inercal.estimate.runs import Threads
 from inercal.selfcal.monte_carlo import campaign
 
 SEED, FEW, RUNS = 20261121, 20, 100
@@ -72,11 +75,16 @@ def test_the_table_says_all_of_it():
         assert word in text
 
 
-def test_runs_do_not_depend_on_the_number_of_workers():
-    """Each run has a random stream of its own."""
-    one, two = (campaign(study(), 6, 5, workers=workers) for workers in (1, 2))
-    assert np.array_equal(one.error, two.error)
-    assert np.array_equal(one.joint_covariance, two.joint_covariance)
+def test_runs_do_not_depend_on_the_place_in_which_they_are_done(tmp_path):
+    """Each run has a random stream of its own; a pool of concurrent.futures stays open, a folder is picked up again."""
+    with ThreadPoolExecutor(2) as pool:
+        places = (Threads(1), Threads(2), pool)
+        found = [campaign(study(), 6, 5, executor=place, folder=tmp_path) for place in places]
+        found.append(campaign(study(), 6, 5, executor=pool))
+        assert pool.submit(int, "1").result() == 1
+    for each in found[1:]:
+        assert np.array_equal(found[0].error, each.error)
+        assert np.array_equal(found[0].joint_covariance, each.joint_covariance)
 
 
 def test_errors_are_those_of_the_product_form():

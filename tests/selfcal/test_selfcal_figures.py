@@ -189,7 +189,7 @@ def test_the_attitude_against_the_encoders_turns_from_these_to_the_estimate(monk
     """An estimate that is turned by 5 arcsec about X_p from the encoders' attitude is drawn so, with its sign."""
     told = {}
     monkeypatch.setattr(
-        drawn_by, "attitude_correction", lambda t, rotation, u: told.update(rotation=rotation)
+        drawn_by, "attitude_correction", lambda t, rotation, u, changes: told.update(rotation=rotation)
     )
     none = Estimate.without(Basis("selfcal"), Status.NOT_CONVERGED, "")  # spares the other pictures
     found = evidence(filtered("map", innovations=np.zeros((0, 6))), estimate=none)
@@ -291,7 +291,7 @@ def test_filters_side_by_side_with_the_truth():
     found, truth = filtered(), TRUTH.copy()
     truth[0] = 0.0
     estimates, errors, costs = side_by_side(
-        {"error-state": found}, truth, 0.2, {"error-state": "not_converged"}
+        {"error-state": found}, np.zeros(18), truth, 0.2, {"error-state": "not_converged"}
     )
     value = to_product(found.coefficients)
     for k, row in enumerate(errors.rows):
@@ -309,7 +309,9 @@ def test_filters_side_by_side_with_the_truth():
 def test_filters_side_by_side_without_a_truth():
     """Differences from the first, over its uncertainty; a filter that failed says so."""
     first, other = filtered(), filtered("mukf", seed=6)
-    _, apart, costs = side_by_side({"error-state": first, "mukf": other, "lm": diverged()}, None, 0.2, {})
+    _, apart, costs = side_by_side(
+        {"error-state": first, "mukf": other, "lm": diverged()}, np.zeros(18), None, 0.2, {}
+    )
     u = np.sqrt(np.diag(first.covariance))
     linear = (other.coefficients - first.coefficients) / u
     for k in (0, 8, 14, 17):  # those that are alike in both forms
@@ -457,7 +459,8 @@ def test_statistics_are_in_words():
     """Nothing of a self-calibration is a residual of |f|; what a row cost is there with its share of the interval."""
     statistics = {"residual_rms": 1.001, "chi2": 16220.0, "nis_mean": 6.008, "steps": 2700.0}
     calibration = evidence()
-    own = replace(calibration.estimate, statistics=statistics, result={"step_us": 4.0, "sample_share": 2e-5})
+    cost = {"result": {"sample_interval": 0.2}, "timing": {"step": 4e-6}}
+    own = replace(calibration.estimate, statistics=statistics, **cost)
     page = drawn_by.page(replace(calibration, estimate=own))
     for words in (
         "<dt>root-mean-square normalised innovation, expected 1</dt><dd>1.001</dd>",

@@ -14,6 +14,7 @@ from inercal.records.maps import read_map
 from inercal.records.read import read
 from inercal.records.write import write_record
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.selfcal.filters.filter_result import product_form
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import KA1, names
@@ -81,12 +82,30 @@ def test_lines_are_the_history_of_the_whole_file_to_the_last_digit(kind, tmp_pat
 
 
 @pytest.mark.parametrize(
-    "filter_", [Filter(extended=True), Filter(gating=Gating("channel")), Filter("mukf", factor="svd")]
+    "filter_",
+    [Filter("svd-qukf", extended=True), Filter(gating=Gating("channel")), Filter("mukf", factor="svd")],
 )
 def test_so_they_are_with_other_states_gating_and_factors(filter_, tmp_path):
     settings = study(plan=None, filter=filter_)
     text = recorded(tmp_path, 2)
     assert live(text, settings) == of_file(text, settings, tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["error-state", "mukf"])
+def test_rows_are_gone_through_again_where_a_file_takes_a_second_pass(kind, tmp_path):
+    """Of 281 rows the last pass is at 256: a tenth of u from the two of a file, which are of all rows. Killed and
+    resumed, the same digits."""
+    settings = study(plan=None, filter=Filter(kind, extended=True))
+    text, saving = recorded(tmp_path, 2), Saving(tmp_path / "state", 7)
+    lines = live(text, settings)
+    assert lines != of_file(text, settings, tmp_path)
+    (tmp_path / "record.csv").write_text(text)
+    found = estimate(recording_of(read(tmp_path / "record.csv"), settings), problem(settings))
+    last = np.array([float(each) for each in lines[-1].split(",")])
+    values, u = last[11:-2:2], last[12:-2:2]
+    assert_allclose(values / u, product_form(found)[0] / u, atol=0.1)
+    given = [each for kill in (60, 130, 200, None) for each in live(text, settings, saving=saving, kill=kill)]
+    assert list(dict.fromkeys(given)) == lines
 
 
 def across(rows):

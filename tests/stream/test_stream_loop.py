@@ -278,9 +278,10 @@ def test_a_reader_that_leaves_loses_no_row(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
-@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_finishes_the_row_in_work_and_saves(signum, tmp_path):
-    """As on Ctrl-C, so where a service is stopped."""
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_an_interrupt_finishes_the_row_in_work_and_saves(name, tmp_path):
+    """As on Ctrl-C, so where a service is stopped or a terminal closed."""
+    signum = signal.Signals[name]
     saving, rows = Saving(tmp_path / "state", 1000), recording(20)
     out = []
 
@@ -342,3 +343,21 @@ def test_runs_in_another_thread_too():
     thread.start()
     thread.join(10.0)
     assert out == play(Smoother(), recording(5))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
+def test_an_interrupt_does_not_lose_the_total_of_flaws(tmp_path):
+    """The first few of a kind are said as they come, the number of the others at the end, however it comes."""
+    said, out = [], []
+
+    def write(text):
+        out.append(text)
+        if len(out) == 15:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    rows = [row if k % 2 else "oops\n" for k, row in enumerate(recording(40))]
+    lines = Lines(io.BytesIO((HEADER + "".join(rows)).encode()), "stdin", None, said.append)
+    with pytest.raises(KeyboardInterrupt):
+        run(Smoother(), lines, write)
+    assert [finding.code for finding in said] == ["bad_row"] * 6
+    assert said[-1].message.endswith(": 2 more")

@@ -45,7 +45,7 @@ mean = "30 deg"
 amplitude = "10 deg"
 frequency = "1 Hz"
 [timing]
-gyro_delay = "estimate"          # or a value; 0 if absent; causal output uses only past samples for it
+gyro_delay = "estimate"          # the default, or a value; causal output uses only past samples for it
 common_delay = "0.5(1) ms"
 [estimator]
 states = 19

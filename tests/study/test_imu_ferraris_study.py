@@ -7,7 +7,7 @@ import pytest
 from inercal._toml import check
 from inercal.errors import StudyError
 from inercal.imu.settings import FerrarisSettings
-from inercal.studies.imu import FerrarisTable, ferraris_settings
+from inercal.studies.ferraris import FerrarisTable, ferraris_settings
 from rows import for_each
 
 

@@ -10,8 +10,9 @@ from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study
 from inercal.geometry.site import Site
 from inercal.instruments.polynomial import ChannelModel
 from inercal.rigs.plans import grid
-from inercal.turntable.positions.examination import examine, f_test
+from inercal.turntable.positions.examination import Examination, examine, f_test
 from inercal.turntable.positions.faults import approach
+from inercal.turntable.positions.shifts import Scale, doubts
 from inercal.turntable.task import calibrate, simulate
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "independent"))
@@ -43,6 +44,7 @@ LARGE = [
     (FORCE, Faults(backlash=20.0 * ARCSEC), "approach_hysteresis"),
     (FORCE, Faults(harmonic={(1, 1): 40.0 * ARCSEC}), "angle_harmonic"),
     (FORCE, Faults(warm_up=200.0 * UG), "warm_up"),
+    (SHUFFLED, Faults(field=0.5), "ground_field"),
 ]
 
 
@@ -70,6 +72,90 @@ def test_sound_records_end_ok(name, draws, tmp_path):
     """At 0.5 % 20 records have more than two others with a probability of 1.5e-4, 500 more than 8 with one of 1e-3."""
     done = calibrated(name, tmp_path, draws, Faults())
     assert sum(each.status.value != "ok" for each in done) <= (2 if draws == 20 else 8)
+    ratios = [turntable_faults.enlarged(each) for each in done]
+    assert np.quantile(ratios, 0.9) < 1.5
+    assert max(ratios) < 3.5
+
+
+def test_what_a_plan_hardly_shows_is_told_and_what_it_shows_is_not(tmp_path):
+    """A trend is nearly a term where the positions are taken in order, and not where they are shuffled; a field to the
+    north acts as earth rate in both."""
+    in_order, shuffled = (calibrated(name, tmp_path, 1, Faults())[0] for name in (WHEEL, SHUFFLED))
+    for fault, both in (("ramp", False), ("warm-up", False), ("backlash", False), ("field", True)):
+        assert turntable_faults.told(in_order, fault)
+        assert turntable_faults.told(shuffled, fault) is both
+
+
+def test_a_field_is_judged_with_the_part_that_does_not_show(tmp_path):
+    """Its west part shows and shifts no value, its north part shifts k_z and shows in no residual."""
+    (done,) = calibrated(SHUFFLED, tmp_path, 1, Faults(field=0.5))
+    (said, *_) = (each for each in done.findings if each.code == "ground_field")
+    assert {"k_z", "kY_z"} & set(said.harm)
+
+
+def test_noise_that_is_estimated_as_none_tells_nothing(tmp_path):
+    """Beside what the table does to a channel its noise may come out as zero: a fault is then no certainty."""
+    (tmp_path / "study.toml").write_text(turntable_faults.study(FORCE))
+    record = [1, 0, 3], Faults(scale_drift=50e-6)
+    evidence = turntable_faults.calibrated(FORCE, *record, tmp_path).evidence
+    fit = evidence.fitting.fit
+    asked = {each.fault.name: each for each in examine(evidence.readings, fit, [None] * 3).asked}
+    field = asked["field acc_z"]
+    now = fit.with_effects(fit.effects.beside(field.fault.columns @ field.base), [None] * 3)
+    assert now.noise[2] < 1e-3 * fit.noise[2]
+    assert now.noise_dof[2] < 1.0
+    assert f_test(fit, [None] * 3, field).chance > 1e-3
+
+
+def test_a_fault_in_doubt_counts_by_the_probability_that_it_is_there():
+    """Shift, its u and probability by ordinary least squares, noise stated and no errors of the table."""
+    from scipy.stats import chi2
+
+    noise = 0.01 * DEG_H
+    settings = study(grid((6, 6)), coefficients=WHEEL_X, noise=noise)
+    record = simulate(settings, np.random.default_rng(5))
+    record["y_x"].values[:] += 0.03 * np.linspace(0.0, 1.0, 36)
+    done = calibrate(record, settings)
+    fit = done.fitting.fit
+    A, y = fit.model.rows(done.readings.angles)[:, 0], done.readings.y[:, 0]
+    examination = examine(done.readings, fit, [noise])
+    assert not examination.significant
+    assert examination.doubtful
+    length = np.abs(A).max(axis=0)
+    own_u = noise * np.sqrt(np.diag(np.linalg.inv((A / length).T @ (A / length)))) / length
+    more, supports = 0.0, []
+    for each in examination.doubtful:
+        B = np.column_stack([A / length, Z := each.fault.columns[:, 0] @ each.seen.base])
+        m = Z.shape[1]
+        before, after = (np.linalg.lstsq(C, y, rcond=None)[0] for C in (A / length, B))
+        gained = np.sum((y - A / length @ before) ** 2) - np.sum((y - B @ after) ** 2)
+        p = chi2.sf(gained / noise**2, m)
+        assert each.chance == pytest.approx(p, rel=1e-6)
+        supports.append(0.5 / len(examination.asked) / (-np.e * p * np.log(p)))
+        u = noise * np.sqrt(np.diag(np.linalg.inv(B.T @ B)))[:12] / length
+        b2 = (u / own_u) ** 2 - 1.0
+        s = (before - after[:12]) / length / own_u
+        most = np.sqrt(chi2.isf(3e-3 / len(examination.asked), m) * b2)
+        more += supports[-1] * (s**2 + b2) * (4.0 / np.maximum(most, 4.0)) ** 2
+    more /= 1.0 + sum(supports)
+    assert done.estimate.u / own_u == pytest.approx(np.sqrt(1.0 + more), rel=1e-5)
+    assert more.max() > 0.05
+    drifts = [each.redrawn for each in done.estimate.budget if "not excluded" in each.source]
+    assert drifts == [each.fault.code in ("trend", "warm_up") for each in examination.doubtful]
+
+
+def test_the_base_is_the_same_in_repeat_runs_and_a_drift_is_another():
+    settings = study(grid((6, 6)), coefficients=WHEEL_X, noise=0.01 * DEG_H)
+    done = calibrate(simulate(settings, np.random.default_rng(5)), settings)
+    fit, noise = done.fitting.fit, [0.01 * DEG_H]
+    examination = examine(done.readings, fit, noise)
+    tested = tuple(f_test(fit, noise, each) for each in examination.asked)
+    scale = Scale(done.estimate.names, np.eye(len(fit.c)), done.estimate.u)
+    sources = doubts(Examination((), tested, examination.asked), fit, scale)
+    redrawn = {each.fault.kind: source.redrawn for each, source in zip(tested, sources, strict=True)}
+    assert {kind for kind, each in redrawn.items() if each} == {"trend", "warm-up", "scale drift"}
+    assert not redrawn["level"]
+    assert not redrawn["heading"]
 
 
 def test_the_test_of_a_trend_is_the_f_test_of_a_column():

@@ -137,7 +137,7 @@ def test_mean_and_spread_of_the_input_are_those_of_drawn_tables(mounting):
     """Monte Carlo: first and second order of the misalignment, earth rate included."""
     settings = study((100.0,), normal(1.0 * DEG), mounting, rate_u=1e-3)
     rate, angles, turn = np.array([100.0 * DEG]), np.array([[0.4, 0.0]]), np.array([[1.0, 0.0, 0.0]])
-    dwells = RateDwells(rate, angles, turn, ("gyro_z",), parse_unit("rad/s"), np.zeros((1, 1)))
+    dwells = RateDwells(rate, angles, turn, ("gyro_z",), parse_unit("rad/s"), np.zeros((1, 1)), np.array([1]))
     given = gyro_input(dwells, settings, 2)
     rng, n = np.random.default_rng(20261121), 100_000
     drawn = settings.chain.draw(rng, 1, runs=n)[:, 0]

@@ -178,6 +178,64 @@ class Limits:
     fading_interval: float = 10.0
     """Interval [s] at which constants fade."""
 
+    snap_time: float = 15.0
+    """Time [s] of a stretch by which the snap is chosen."""
+
+    snap_stretches: int = 4
+    """Stretches, the liveliest of a recording, by which it is chosen."""
+
+    snap_ratio: float = 1.4
+    """Mean squared innovation, over that of a still model with the same noise, up to which a snap is large enough."""
+
+    low_pass_order: int = 4
+    """Order of the low pass before the fusion."""
+
+    notch_quality: float = 3.0
+    """Frequency of a notch over its width."""
+
+    widest_corner: float = 0.4
+    """Corner of a low pass, or notch, over the rate of rows, from which on it is left out."""
+
+    fused_rate_ratio: float = 2.6
+    """Rate of the rows that are fused over the corner of the low pass, about: of more rows the noise is alike from row
+    to row, and counts as motion."""
+
+    rate_rows: int = 64
+    """First rows, by which the rate is known that the band is made for."""
+
+    corner_ratio: float = 2.0
+    """Corner of a low pass over the highest frequency of the motion, at least: the rest is a few per cent off."""
+
+    motion_power: float = 10.0
+    """Spectral density of the gyro over its noise from which it counts as motion."""
+
+    line_segment: float = 2.0
+    """Length [s] of the segments of a spectrum in which lines are looked for."""
+
+    floor_quantile: float = 0.25
+    """Share of the frequencies by whose spectral density white noise is judged."""
+
+    floor_share: float = 0.6
+    """Spectral density there over the mean one of white noise, at least."""
+
+    line_surroundings: float = 6.0
+    """Width [Hz] over which a spectrum's median is that beside a line."""
+
+    line_power: float = 30.0
+    """Spectral density of a line over that beside it."""
+
+    lowest_line: float = 20.0
+    """Frequency [Hz] below which a line may be flexure of the sting, which is a state of the filter."""
+
+    most_lines: int = 6
+    """Lines that are taken out; of more they are taken for noise in a band."""
+
+    spectral_delay_sigmas: float = 3.0
+    """Standard uncertainties of the delay by the spectra within which the filter estimates it."""
+
+    least_delay_u: float = 1e-5
+    """Smallest uncertainty [s] of that delay."""
+
     settling_time: float = 2.0
     """Time [s] after the first row from which innovations and errors are judged."""
 

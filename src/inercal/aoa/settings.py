@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from inercal.aoa.band import Band
 from inercal.aoa.disturbances import SIZE, Disturbances
 from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.limits import LIMITS
@@ -139,20 +140,22 @@ class Calibration:
 class Timing:
     """Delays [s], positive where outputs come late.
 
-    ``gyro_delay`` of the gyro against the accelerometers, None where it is to be estimated; ``common_delay`` of all
+    ``gyro_delay`` of the gyro against the accelerometers, None where it is estimated ``gyro_delay_about`` some value,
+    that of the spectra; ``common_delay`` of all
     sensors against the stamps, with its standard uncertainty ``common_delay_u``: no sensor sees it.
     """
 
-    gyro_delay: float | None = 0.0
+    gyro_delay: float | None = None
     common_delay: float = 0.0
     common_delay_u: float = 0.0
+    gyro_delay_about: float = 0.0
 
 
 @dataclass(frozen=True)
 class Estimator:
     """The fusion of all sensors.
 
-    ``snap`` [rad^2/s^7], None where it is not stated (`density`).
+    ``snap`` [rad^2/s^7], None where the recording decides (`inercal.aoa.diagnosis.choice`); until then `density`.
     """
 
     states: States = option("of three accelerometers: 19 all errors, 15, 11, 8 biases alone", 19)
@@ -356,6 +359,7 @@ class AoaSettings:
     prior: Prior = field(default_factory=Prior)
     sensors: Mapping[str, Calibration] = field(default_factory=dict)
     timing: Timing = field(default_factory=Timing)
+    band: Band = field(default_factory=Band)
     estimator: Estimator = field(default_factory=Estimator)
     methods: Methods = field(default_factory=Methods)
     attitude: Attitude = field(default_factory=Attitude)

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
+from inercal.aoa.diagnosis.choice import decided, of_band
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live, smoother
+from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.paper.delay import Delay, relative_delay
@@ -39,9 +41,10 @@ from inercal.records.record import Record
 class Measurement:
     """An ``estimate``, and the data behind it for files and pictures.
 
-    ``settings`` are those of the study, corrected by an earlier result; ``angles`` of the chosen method; ``filtered``
-    of the fusion, None for the paper's methods; ``points`` at rest; ``delay`` of the gyro by the spectra; ``errors`` by
-    method and ``verified`` sensors where there is a reference angle; ``compared`` angles of other methods, by name.
+    ``settings`` are those of the study, corrected by an earlier result, with what the recording decides;
+    ``angles`` of the chosen method; ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest;
+    ``delay`` of the gyro by the spectra; ``errors`` by method and ``verified`` sensors where there is a reference
+    angle; ``compared`` angles of other methods, by name.
     """
 
     estimate: Estimate
@@ -121,7 +124,8 @@ def measure(
     recording = recording_of(record, settings)
     if not recording.spatial:
         settings.attitude.check_pitch_shows()
-    findings = implausible(recording, settings)
+    stated, settings = settings, decided(recording, settings)
+    findings = [*implausible(*fused_case(recording, settings)), *of_band(stated, settings)]
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior if known is None else known)
     delay = relative_delay(recording, settings.layout)
@@ -131,7 +135,7 @@ def measure(
         filtered = filter_result.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
-        findings = [*findings, *diagnose(zeroed, settings, findings)]
+        findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)

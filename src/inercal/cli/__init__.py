@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import signal
 import sys
 import time
@@ -18,6 +19,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 _STARTED = time.perf_counter()
 
 _ASKED: list[bool] = []  # not empty once the user has interrupted
+
+_LONGEST = 900
+"""Characters of an error line."""
+
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""Control characters but tab and line feed, and marks that turn the direction of writing."""
 
 EXIT_BAD_VERDICT = 1
 EXIT_BAD_INPUT = 2
@@ -35,9 +42,9 @@ def process_age() -> float:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 interrupted, by Ctrl-C or SIGTERM."""
+    """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 asked to end."""
     gc.set_threshold(50_000, 20, 20)  # loading and drawing make many objects that stay: a tenth of the time
-    for signum in (signal.SIGINT, signal.SIGTERM):
+    for signum in asking_to_end():
         if signal.getsignal(signum) is not signal.SIG_IGN:
             signal.signal(signum, _interrupt)
     code = run(arguments)
@@ -45,6 +52,11 @@ def main(arguments: list[str] | None = None) -> None:
         # an interrupt within `exec` of a text, as in a dataclass being made, is sent once more by Python at its end
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     sys.exit(code)
+
+
+def asking_to_end() -> list[signal.Signals]:
+    """The signals by which a user, the system or a terminal that is closed ask a process to end."""
+    return [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 def _interrupt(signum: int, frame: FrameType | None) -> None:
@@ -89,7 +101,10 @@ def run(arguments: list[str] | None = None) -> int:
             "the traceback that INERCAL_DEBUG=1 shows"
         )
     abandon_output()
-    _say(f"error: {' '.join(problem.split())}")
+    problem = " ".join(problem.split())
+    if len(problem) > _LONGEST:  # the beginning says where, the end what was expected
+        problem = f"{problem[: 2 * _LONGEST // 3]} ... {problem[-_LONGEST // 3 :]}"
+    _say(f"error: {problem}")
     return EXIT_BAD_INPUT
 
 
@@ -110,13 +125,18 @@ def _say(text: str) -> None:
     import contextlib
 
     with contextlib.suppress(OSError, ValueError):
-        print(f"inercal: {text}", file=sys.stderr, flush=True)
+        print(f"inercal: {printable(text)}", file=sys.stderr, flush=True)
+
+
+def printable(text: str) -> str:
+    """The text with control characters written out: those of a foreign file must not command the terminal."""
+    return _CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode("ascii"), text)
 
 
 def show(text: str) -> None:
     """Print a result; a reader that has left, as `head` does, has had what it wanted."""
     try:
-        print(text, flush=True)
+        print(printable(text), flush=True)
     except BrokenPipeError:
         abandon_output()
 

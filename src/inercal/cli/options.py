@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from inercal.cli import show
+from inercal.cli import printable, show
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Output:
     def say_now(self, text: str) -> None:
         """A message about the progress of a command."""
         if not self.quiet:
-            print(text, file=sys.stderr)
+            print(printable(text), file=sys.stderr)
 
     def say_findings(self, findings: Iterable[Finding]) -> None:
         """Findings for people, one a line."""

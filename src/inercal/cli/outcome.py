@@ -71,7 +71,7 @@ def give(
     """Hand over a result of the face, which took ``read_s`` [s] to read; the others as in `hand_over`."""
     if write is None and result.view.rows is not None:
         write = result.save
-    estimate = replace(result.estimate, timing={"read": read_s, "solve": result.estimate.timing["solve"]})
+    estimate = replace(result.estimate, timing={"read": read_s, **result.estimate.timing})
     return hand_over(estimate, result.view.tables(), result.view.page, output, what, write, whole)
 
 

@@ -43,7 +43,7 @@ def simulate_imu(
     overrides: Overrides = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
-    """Simulate an IMU that is held by hand in many poses."""
+    """Simulate an IMU by hand in many poses, in six positions and three turns, or on a table."""
     _simulated("imu", study, seed, overrides, output)
 
 
@@ -59,12 +59,18 @@ def simulate_selfcal(
             help="Simulate and calibrate so often instead, and judge the stated uncertainties.",
         ),
     ] = None,
+    checkpoint: Annotated[
+        Path | None,
+        Parameter(help="Save here what is done, and go on from it where it exists."),
+    ] = None,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Simulate a platform that turns through the plan of a study, once or many times."""
     if runs is not None:
-        return _campaign(study, runs, seed, overrides or (), output)
+        return _campaign(study, runs, seed, checkpoint, overrides or (), output)
+    if checkpoint is not None:
+        raise InputError("--checkpoint", "found without --runs, expected them together")
     if output.report is not None:
         raise InputError("--report", "found without --runs, expected them together")
     _simulated("selfcal", study, seed, overrides, output)
@@ -83,10 +89,18 @@ def simulate_aoa(
     _simulated("aoa", study, seed, overrides, output)
 
 
-def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], output: ReportOutput) -> int:
+def _campaign(
+    study: Path,
+    runs: int,
+    seed: int,
+    checkpoint: Path | None,
+    overrides: Iterable[str],
+    output: ReportOutput,
+) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._jit import compiling
     from inercal.estimate.result import without_coefficients
+    from inercal.estimate.runs import Threads
     from inercal.face.study import read_study
     from inercal.findings import Status
     from inercal.records.read import source_of
@@ -105,7 +119,7 @@ def _campaign(study: Path, runs: int, seed: int, overrides: Iterable[str], outpu
             load_kernels(settings.filter.kind, problem(settings))
         clock = time.perf_counter()
         with reading(output, "simulating") as progress:
-            outcome = campaign(settings, runs, seed, workers=os.cpu_count() or 1, progress=progress)
+            outcome = campaign(settings, runs, seed, None, Threads(os.cpu_count() or 1), checkpoint, progress)
     timing = {"solve": time.perf_counter() - clock}
     estimate = without_coefficients(
         "simulate selfcal",

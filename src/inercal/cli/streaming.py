@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
@@ -51,11 +52,23 @@ class StreamOptions:
     """The options of a command that works on a stream."""
 
     checkpoint: Annotated[
-        Path | None, Parameter(help="Save the state to this file, and go on from it where it exists.")
+        Path | None, Parameter(help="Save here what is done, and go on from it where it exists.")
     ] = None
     checkpoint_every: Annotated[
         int, Parameter(converter=whole_number, help="Rows from one save to the next; 1000 if absent.")
     ] = 1000
+
+    after: Annotated[
+        str | None,
+        Parameter(help='Give no line up to this time, the stamp of the last one received, such as "12.4 s".'),
+    ] = None
+
+    @property
+    def received(self) -> float:
+        """Time [s] of the last line received, -inf if there is none; raises `InputError`."""
+        from inercal.units import parse_quantity
+
+        return -math.inf if self.after is None else parse_quantity(self.after, "time", "--after").value
 
     def check(self, output: Output, inputs: Iterable[Path | None]) -> None:
         """Fail before any work is done where lines or state could not be written; raises `InputError`."""
@@ -66,6 +79,8 @@ class StreamOptions:
         }
         for option in (name for name, there in given.items() if there):
             raise InputError(option, "found with a stream, expected its lines on standard output and no more")
+        if self.received == math.inf:
+            raise InputError("--after", f"found {self.after}, expected the time of a line")
         if self.checkpoint_every < 1:
             raise InputError("--checkpoint-every", f"found {self.checkpoint_every}, expected 1 or more rows")
         if self.checkpoint is None:
@@ -95,7 +110,11 @@ def recorded(
     """
     if not files:
         raise UsageError(f"{command}: FILES is missing, expected recordings, or --stream")
-    for option, given in (("--checkpoint", options != StreamOptions()), ("--every", every is not None)):
+    for option, given in (
+        ("--after", options.after is not None),
+        ("--checkpoint", options != StreamOptions()),
+        ("--every", every is not None),
+    ):
         if given:
             raise InputError(option, "found without --stream, expected them together")
     return files
@@ -156,7 +175,7 @@ def run_stream(
         where = _STANDARD_INPUT if file is None else str(file)
         lines = Lines(stream, where, record_map, output.say_finding)
         try:
-            run(estimator(lines), lines, _write, saving, output.say)
+            run(estimator(lines), lines, _write, saving, output.say, options.received)
         except BrokenPipeError:
             abandon_output()
             output.say("the reader of standard output has left")

@@ -26,6 +26,16 @@ TEMPERATURE_MARGIN = 5.0
 """Kelvin beyond 3 u of the temperature of a calibration at which a recording is said to be at another one."""
 
 
+RANGE_MARGIN = 0.05
+"""Part of a range that a calibration was made over by which samples may lie beyond it before that is said."""
+
+
+def widened(low: float, high: float, unit: str) -> tuple[float, float, str]:
+    """A range of `Correction`, with its margin."""
+    more = RANGE_MARGIN * (high - low)
+    return low - more, high + more, unit
+
+
 @dataclass(frozen=True)
 class Correction:
     """Correction of columns of a record, or its inverse, sample by sample.

@@ -1,4 +1,4 @@
-"""Gyros that were calibrated by a rate test, in use: each axis by itself, its asymmetry and polynomial undone."""
+"""Gyros that were calibrated by a rate test, in use: asymmetry, polynomial and misalignments undone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert.correction import Correction, Samples, factor_of, one_clock
+from inercal.convert.correction import Correction, Samples, factor_of, one_clock, widened
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -23,8 +23,9 @@ _APPLIED = ("D_F", "S", "S_asym", "S2", "S3")
 
 @dataclass(frozen=True)
 class RateGyros:
-    """Gyros by axis, ``y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3)``, x the rate about each.
+    """Gyros by axis i, ``y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3 + T_ij w_j + T_ik w_k)``.
 
+    x is the rate about the axis of each, w those about the others, as far as a record has them.
     ``values`` (*batch,) by symbol, ``output`` the unit of y, ``rates`` (lowest, highest) of the test [rad/s].
     """
 
@@ -47,19 +48,61 @@ class RateGyros:
         wanted, written = (si, self.output) if invert else (self.output, si)
         reads = {f"{before}_{k}": factor_of(record[f"{before}_{k}"], wanted, of) for k in present}
         one_clock(record, list(reads))
-        work = self._indicate if invert else self._correct
+        work = self._all_indicate if invert else self._all_correct
 
-        def by_axis(samples: Samples) -> Samples:
-            return {f"{after}_{axis}": work(axis, samples[f"{before}_{axis}"]) for axis in present}
+        def together(samples: Samples) -> Samples:
+            made = work({axis: samples[f"{before}_{axis}"] for axis in present})
+            return {f"{after}_{axis}": values for axis, values in made.items()}
 
         low, high = self.rates
+        lost = [name for name in self._misalignments() if name[-2] in present and name[-1] not in present]
+        findings: tuple[Finding, ...] = ()
+        if lost:
+            text = f"{', '.join(lost)}: the recording has no rate about that axis, which is taken as 0"
+            findings = (Finding("not_held", text),)
         return Correction(
-            by_axis,
+            together,
             reads,
             {f"{before}_{axis}": (f"{after}_{axis}", written) for axis in present},
             {"values": str(dict(self.values)), "axes": "".join(present), "invert": invert},
-            ranges={f"rate_{axis}": (low, high, "rad/s") for axis in present},
+            findings=findings,
+            ranges={f"rate_{axis}": widened(low, high, "rad/s") for axis in present},
         )
+
+    def _misalignments(self) -> list[str]:
+        """Misalignments between gyros of which both are calibrated."""
+        return [f"T_{i}{j}" for i in self.axes for j in self.axes if f"T_{i}{j}" in self.values]
+
+    def _across(self, axis: str, rates: Mapping[str, Array]) -> Any:
+        """Output of a gyro for the rates about the others, over its scale factor."""
+        return sum(self.values.get(f"T_{axis}{j}", 0.0) * w for j, w in rates.items() if j != axis)
+
+    def _all_indicate(self, rates: Mapping[str, Array]) -> dict[str, Array]:
+        """Outputs for rates [rad/s] by axis."""
+        return {
+            axis: np.asarray(self._indicate(axis, x) + self.values[f"S_{axis}"] * self._across(axis, rates))
+            for axis, x in rates.items()
+        }
+
+    def _all_correct(self, outputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Rates [rad/s] for outputs by axis: each by itself, then less what it reads of the others."""
+        rates = {axis: self._correct(axis, y) for axis, y in outputs.items()}
+        if not any(name[-1] in outputs and name[-2] in outputs for name in self._misalignments()):
+            return rates
+        moving = np.ones(np.shape(next(iter(rates.values()))), bool)
+        with np.errstate(all="ignore"):
+            for _ in range(_ROUNDS):
+                cleared = {
+                    axis: self._correct(axis, y - self.values[f"S_{axis}"] * self._across(axis, rates))
+                    for axis, y in outputs.items()
+                }
+                size = np.max([np.abs(x) for x in cleared.values()], axis=0)
+                moves = np.max([np.abs(cleared[axis] - rates[axis]) for axis in rates], axis=0) > 1e-14 * size
+                rates = {axis: np.where(moving, cleared[axis], rates[axis]) for axis in rates}
+                moving = moving & moves
+                if not moving.any():
+                    break
+        return {axis: np.where(moving, np.nan, x) for axis, x in rates.items()}
 
     def _of(self, axis: str) -> tuple[Any, ...]:
         return tuple(self.values.get(f"{symbol}_{axis}", 0.0) for symbol in _APPLIED)
@@ -109,7 +152,12 @@ def rate_gyros(estimate: Estimate, where: object = "calibration") -> RateGyros:
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
     """``not_held``: what a rate test says of a gyro beside its input and output."""
     along = {name[-1] for name in estimate.names if name.startswith("S_")}
-    across = [name for name in estimate.names if name.startswith("T_") or name[-1] not in along]
+    own = [name for name in estimate.names if name.startswith("T_") and {*name[-2:]} <= along]
+    across = [
+        name
+        for name in estimate.names
+        if name not in own and (name.startswith("T_") or name[-1] not in along)
+    ]
     limits = [name for name in estimate.names if name.rpartition("_")[0] in ("S_nl", "S_hyst")]
     findings = []
     if limits:

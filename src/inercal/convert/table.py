@@ -14,13 +14,13 @@ found by Newton's method. An axis that was not calibrated takes the value of its
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert.correction import Correction, Samples, factor_of, one_clock
+from inercal.convert.correction import Correction, Samples, factor_of, one_clock, widened
 from inercal.errors import InputError
 from inercal.findings import Finding
 from inercal.instruments.by_angle import channel_model
@@ -42,7 +42,8 @@ class TableInstrument:
     ``kind`` and the ``channels`` that were calibrated are as in `inercal.instruments.by_angle.CHANNELS`; ``values`` are
     terms (*batch,) by symbol, stated ones among them, absent ones 0. ``output`` is the unit of its outputs, ``gravity``
     [m/s^2] that of the site of the calibration. ``attitude`` holds the elements of the table from its base to the
-    instrument: a ``joint`` with its ``axis``, or a ``rotation`` (3, 3).
+    instrument: a ``joint`` with its ``axis``, or a ``rotation`` (3, 3). ``readings`` has the lowest and highest
+    reading of the calibration by channel.
     """
 
     kind: str
@@ -51,6 +52,7 @@ class TableInstrument:
     output: Unit
     gravity: float
     attitude: Sequence[Mapping[str, Any]]
+    readings: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of a record: outputs to ``rate_*`` [rad/s] or ``acc_*`` [m/s^2], or the other way round.
@@ -105,7 +107,11 @@ class TableInstrument:
             "kind": self.kind, "channels": ", ".join(present), "values": str(dict(self.values)), "invert": invert,
             "output": self.output.symbol, "g": self.gravity, "attitude": str(list(self.attitude)),
         }  # fmt: skip
-        return Correction(work, reads, writes, settings, findings=findings)
+        ranges = {c: widened(*self.readings[c], self.output.symbol) for c in present if c in self.readings}
+        if self.kind != "accelerometer":  # on a table no axis feels more than gravity
+            force = [name for name in gravity if name.startswith("acc")]
+            ranges |= {name: widened(-self.gravity, self.gravity, "m/s^2") for name in force}
+        return Correction(work, reads, writes, settings, findings=findings, ranges=ranges)
 
     def _terms(self, channel: str) -> ChannelModel:
         """The channel with its terms that are not 0, and the leading one."""

@@ -25,6 +25,11 @@ def table_instrument(estimate: Estimate, where: object = "calibration") -> Table
     inverted.
     """
     result = estimate.result
+    if "steps" in result:
+        raise InputError(
+            where,
+            "is of small steps about level, which tell threshold and dead zone, expected one by positions",
+        )
     needed = ("instrument", "unit", "stated", "attitude", "gravity_m_s2")
     missing = [key for key in needed if key not in result]
     if missing:
@@ -40,7 +45,14 @@ def table_instrument(estimate: Estimate, where: object = "calibration") -> Table
     units = {str(unit) for unit in result["unit"].values()}
     output = parse_unit(units.pop(), where)
     attitude = tuple(result["attitude"])
-    instrument = TableInstrument(kind, channels, values, output, float(result["gravity_m_s2"]), attitude)
+    ranges = estimate.conditions.get("ranges") or {}
+    readings = {}
+    for channel in (c for c in channels if f"reading_of_{c}" in ranges):
+        low, high = ranges[f"reading_of_{channel}"]
+        readings[channel] = (float(low), float(high))
+    instrument = TableInstrument(
+        kind, channels, values, output, float(result["gravity_m_s2"]), attitude, readings
+    )
     _check_axes(instrument, where)
     return instrument
 

@@ -7,30 +7,38 @@ and tags are errors. A package for the whole of YAML would be one more dependenc
 from __future__ import annotations
 
 import re
+from collections import deque
 from typing import Any
 
 from inercal.errors import InputError
 
 _KEY = re.compile(r"""(?:"(?P<quoted>[^"]*)"|(?P<plain>[^\s\[\]{}"'#&*!|>%@`-][^\s:\[\]{}]*))\s*:(?:\s+|$)""")
+_COMMENT = re.compile(r"(?:^|(?<=\s))#.*$")
 _DEEPEST = 50
+_LONGEST = 1 << 20
 
 Line = tuple[int, int, str]
 """Number, indent and content of a line."""
 
+Lines = deque[Line]
+"""The lines that are not read yet."""
+
 
 def parse(text: str, where: object) -> Any:
     """Dicts, lists, floats and texts; raises `InputError` naming ``where`` and the line of anything else."""
-    lines: list[Line] = []
+    if len(text) > _LONGEST:
+        raise InputError(where, f"found {len(text)} characters, expected at most {_LONGEST} (YAML)")
+    lines: Lines = deque()
     for number, raw in enumerate(text.splitlines(), 1):
-        line = re.sub(r"(?:^|\s)#.*$", "", raw).rstrip()
+        line = _COMMENT.sub("", raw).rstrip()
         if line.strip() in ("", "---", "...") or line.startswith("%"):
             continue
         lines.append((number, len(line) - len(line.lstrip(" ")), line.strip()))
     if not lines:
         raise InputError(where, "found nothing in it, expected keys and numbers (YAML)")
-    value, rest = _block(lines, where, 0)
-    if rest:
-        raise _bad(rest[0], where)
+    value = _block(lines, where, 0)
+    if lines:
+        raise _bad(lines[0], where)
     return value
 
 
@@ -41,15 +49,15 @@ def _bad(line: Line, where: object) -> InputError:
     )
 
 
-def _block(lines: list[Line], where: object, depth: int) -> tuple[Any, list[Line]]:
-    """The value that begins with the first line, and the lines after it."""
+def _block(lines: Lines, where: object, depth: int) -> Any:
+    """The value that begins with the first line; its lines are taken."""
     if depth > _DEEPEST:
         raise _bad(lines[0], where)
     if _item(lines[0]) is not None:
         return _list(lines, where, depth)
     if _KEY.match(lines[0][2]):
         return _dict(lines, where, depth)
-    return _scalar(lines[0], where), lines[1:]
+    return _scalar(lines.popleft(), where)
 
 
 def _item(line: Line) -> Line | None:
@@ -61,40 +69,40 @@ def _item(line: Line) -> Line | None:
     return number, indent + len(content) - len(rest), rest
 
 
-def _list(lines: list[Line], where: object, depth: int) -> tuple[list[Any], list[Line]]:
+def _list(lines: Lines, where: object, depth: int) -> list[Any]:
     """A list of items that stand below each other."""
     indent, items = lines[0][1], []
     while lines and lines[0][1] == indent and (item := _item(lines[0])) is not None:
         if not item[2]:
             raise _bad(lines[0], where)
-        value, lines = _block([item, *lines[1:]], where, depth + 1)
-        items.append(value)
-    return items, lines
+        lines[0] = item
+        items.append(_block(lines, where, depth + 1))
+    return items
 
 
-def _dict(lines: list[Line], where: object, depth: int) -> tuple[dict[str, Any], list[Line]]:
+def _dict(lines: Lines, where: object, depth: int) -> dict[str, Any]:
     """Keys that stand below each other, each with a value beside or below it."""
     indent, entries = lines[0][1], {}
     while lines and lines[0][1] == indent and (match := _KEY.match(lines[0][2])):
-        (number, _, content), lines = lines[0], lines[1:]
+        number, _, content = lines.popleft()
         rest = content[match.end() :]
         below = lines and (lines[0][1] > indent or (lines[0][1] == indent and _item(lines[0]) is not None))
         if rest:
             value = _scalar((number, indent, rest), where)
         elif below:
-            value, lines = _block(lines, where, depth + 1)
+            value = _block(lines, where, depth + 1)
         else:
             value = None
         entries[match["quoted"] or match["plain"]] = value
-    return entries, lines
+    return entries
 
 
 def _scalar(line: Line, where: object) -> Any:
     """A number, a bracketed list of values, or a word."""
     text = line[2]
     if text.startswith("["):
-        value, rest = _flow(line, text, where, 0)
-        if rest.strip():
+        value, end = _flow(line, 0, where, 0)
+        if text[end:].strip():
             raise _bad(line, where)
         return value
     if text[0] in "{&*!|>%@`":
@@ -105,22 +113,32 @@ def _scalar(line: Line, where: object) -> Any:
         return text.strip("\"'")
 
 
-def _flow(line: Line, text: str, where: object, depth: int) -> tuple[list[Any], str]:
-    """A list in brackets at the start of ``text``, and what follows it."""
+_VALUE = re.compile(r"[^\[\],]+")
+_BLANKS = re.compile(r"\s*")
+
+
+def _flow(line: Line, begin: int, where: object, depth: int) -> tuple[list[Any], int]:
+    """A list in brackets that begins at a place in the text of a line, and the place after it."""
+    number, indent, text = line
+
+    def after_blanks(place: int) -> int:
+        match = _BLANKS.match(text, place)
+        return place if match is None else match.end()
+
     items: list[Any] = []
-    text = text[1:].lstrip()
-    while not text.startswith("]"):
-        if text.startswith("[") and depth < _DEEPEST:
-            value, text = _flow(line, text, where, depth + 1)
+    place = after_blanks(begin + 1)
+    while not text.startswith("]", place):
+        if text.startswith("[", place) and depth < _DEEPEST:
+            value, place = _flow(line, place, where, depth + 1)
             items.append(value)
-        elif match := re.match(r"[^\[\],]+", text):
-            items.append(_scalar((line[0], line[1], match[0].strip() or "{"), where))
-            text = text[match.end() :]
+        elif match := _VALUE.match(text, place):
+            items.append(_scalar((number, indent, match[0].strip() or "{"), where))
+            place = match.end()
         else:
             raise _bad(line, where)
-        text = text.lstrip()
-        if text.startswith(","):
-            text = text[1:].lstrip()
-        elif not text.startswith("]"):
+        place = after_blanks(place)
+        if text.startswith(",", place):
+            place = after_blanks(place + 1)
+        elif not text.startswith("]", place):
             raise _bad(line, where)
-    return items, text[1:]
+    return items, place + 1

@@ -11,6 +11,7 @@ import dataclasses
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -83,7 +84,8 @@ def alone(path: str | Path) -> Iterator[None]:
     A file ``PATH.lock`` is locked meanwhile, where the system and the file system have such locks (not on Windows).
     They end with the process, however it ends; the file is then left, and harms nobody.
 
-    Raises `InputError` where another run has it, or the file cannot be written.
+    Raises `InputError` where another run has it, the file cannot be written, or one of the lock's name is somebody's:
+    a link, or not empty.
     """
     try:
         import fcntl
@@ -92,14 +94,21 @@ def alone(path: str | Path) -> Iterator[None]:
         return
     lock = Path(f"{os.path.realpath(path)}.lock")
     try:
-        file = lock.open("w")
+        file = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     except OSError as error:
+        if lock.is_symlink():
+            raise InputError(lock, "is a link, expected no file of that name beside a checkpoint") from error
         raise InputError(path, f"cannot be written ({error.strerror or error})") from error
-    with file:
+    try:
+        status = os.fstat(file)
+        if status.st_size or not stat.S_ISREG(status.st_mode):
+            raise InputError(
+                lock, "is not empty or no file, expected no file of that name beside a checkpoint"
+            )
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # locked, but no longer the file of that name: its owner has just ended, and removed it
-            if not os.path.samestat(os.fstat(file.fileno()), os.stat(lock)):
+            if not os.path.samestat(status, os.stat(lock)):
                 raise BlockingIOError
         except (BlockingIOError, FileNotFoundError) as error:
             raise InputError(path, "is in use by another run, expected a checkpoint for each") from error
@@ -109,6 +118,8 @@ def alone(path: str | Path) -> Iterator[None]:
             yield
         finally:
             lock.unlink(missing_ok=True)
+    finally:
+        os.close(file)
 
 
 def fingerprint(settings: object) -> str:

@@ -248,11 +248,11 @@ def _budget(runs: Sequence[Estimate], within: Array, between: Array, total: Arra
         parts = [np.array([share.get(name, 0.0) for name in names]) * u2 for u2, share in each]
         return np.asarray(np.sum(parts, axis=0) / len(runs))
 
-    elsewhere = (
-        replace(item, share=shares(variance(item.source)))
-        for item in runs[0].budget
-        if item.type == "B" and not item.redrawn
-    )
+    # a source may be in some runs only, as a fault that another run excludes
+    common = {
+        item.source: item for run in runs for item in run.budget if item.type == "B" and not item.redrawn
+    }
+    elsewhere = (replace(item, share=shares(variance(source))) for source, item in common.items())
     # each coefficient has its own size of scatter, so that there is no one u to state
     return (
         BudgetItem("scatter within the runs", "A", math.nan, "", shares(within)),

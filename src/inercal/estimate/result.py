@@ -248,7 +248,7 @@ class Estimate:
         return replace(
             self.in_units(list(self.shown_units().values())),
             conditions=in_words(self.conditions),
-            statistics=statistics_in_words(self.statistics, self.result),
+            statistics=statistics_in_words(self.statistics, self.result, self.timing),
             budget=budget_shown(self.command, self.budget),
         )
 

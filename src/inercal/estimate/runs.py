@@ -19,7 +19,14 @@ import pickle
 import signal
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures import (
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
+    wait,
+)
 from concurrent.futures import Executor as Pool
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -135,6 +142,24 @@ class Processes:
             pool.shutdown()
 
 
+@dataclass(frozen=True)
+class _Borrowed:
+    """A pool that somebody else made, and ends."""
+
+    pool: Pool
+
+    def map(self, work: Work, chunks: Sequence[range]) -> Finished:
+        """Yield the chunks as they are finished."""
+        pending: dict[Future[Sample], range] = {self.pool.submit(work, chunk): chunk for chunk in chunks}
+        try:
+            for future in as_completed(list(pending)):
+                yield pending.pop(future), future.result()
+        finally:
+            for future in pending:
+                future.cancel()
+            wait(pending)
+
+
 def _as_finished(pool: Pool, work: Work, chunks: Sequence[range]) -> Finished:
     """Yield the chunks as the pool finishes them, holding no result longer than that."""
     pending: dict[Future[Sample], range] = {pool.submit(work, chunk): chunk for chunk in chunks}
@@ -167,7 +192,7 @@ def run(
     *,
     runs: int,
     seed: int,
-    executor: Executor | None = None,
+    executor: Executor | Pool | None = None,
     chunk: int | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -181,7 +206,8 @@ def run(
     seed : int
         Seed of the campaign, not negative. With `runs` it settles every digit of the answer.
     executor : Executor, optional
-        `Serial` (the default), `Threads`, `Processes`, or anything else with their ``map``.
+        `Serial` (the default), `Threads`, `Processes`, anything else with their ``map``, or a
+        `concurrent.futures.Executor`, which stays open.
     chunk : int, optional
         Runs handed to a worker at a time, and kept as one file; by default some 64 chunks are made.
     folder : path, optional
@@ -219,7 +245,8 @@ def run(
     count = runs - sum(map(len, missing))
     if progress:
         progress(count, runs)
-    with closing((executor or Serial()).map(partial(_do, task, seed), missing)) as finished:
+    place = _Borrowed(executor) if isinstance(executor, Pool) else executor or Serial()
+    with closing(place.map(partial(_do, task, seed), missing)) as finished:
         for c, sample in finished:
             if folder is not None:
                 _keep(folder, c, sample)

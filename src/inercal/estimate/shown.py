@@ -41,14 +41,18 @@ def budget_shown(command: str, budget: tuple[BudgetItem, ...]) -> tuple[BudgetIt
     return tuple(replace(item, u=u, unit=unit) for item in budget for u, unit in [sized(item.u, item.unit)])
 
 
-def statistics_in_words(statistics: Mapping[str, float], result: Mapping[str, Any]) -> dict[str, float]:
+def statistics_in_words(
+    statistics: Mapping[str, float], result: Mapping[str, Any], timing: Mapping[str, float]
+) -> dict[str, float]:
     """Statistics of a filter under keys for people, and what a row cost; those of a fit keep their keys."""
     words = dict(statistics)
     if "nis_mean" in words:
         words = {_STATISTICS.get(key, key): value for key, value in words.items()}
-    if "step_us" in result:
-        words["time of a row_us"] = result["step_us"]
-        words["time of a row, of the sample interval_percent"] = 100.0 * result["sample_share"]
+    if "step" in timing and "sample_interval" in result:
+        words["time of a row_us"] = 1e6 * timing["step"]
+        words["time of a row, of the sample interval_percent"] = (
+            100.0 * timing["step"] / result["sample_interval"]
+        )
     return words
 
 

@@ -54,7 +54,7 @@ def calibrate(
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:
-    """A simulated record of an IMU that is held in the poses of the study."""
+    """A simulated record of an IMU in the poses, positions or rests of the study."""
     from inercal.imu import task
 
     with study.at_fault():

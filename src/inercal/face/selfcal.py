@@ -83,7 +83,8 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
     from inercal.selfcal.before.simulate import simulate as simulate_run
 
     with study.at_fault():
-        return to_record(simulate_run(experiment(study.settings), rng).recording)
+        made = simulate_run(experiment(study.settings), rng)
+        return to_record(made.recording, made.attitude)
 
 
 def prepare_design(study: Study) -> None:

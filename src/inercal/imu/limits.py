@@ -38,7 +38,10 @@ class Limits:
     other."""
 
     outlier_risk: float = 5e-4
-    """Accepted probability that a sound pose, or a sound turn, of a recording is named as outlying."""
+    """Accepted probability that a sound pose of a recording is named as outlying."""
+
+    turn_risk: float = 2e-3
+    """Accepted probability that a sound turn of a recording is named as outlying."""
 
     outlier_share: float = 0.2
     """Share of the poses, or turns, that outliers may be."""
@@ -68,15 +71,18 @@ class Limits:
     poses_with_k2: int = 13
     """Poses that a fit with K2 needs."""
 
-    ordinary_k2: float = 30e-6 / STANDARD_GRAVITY
-    """Second-order coefficient [1/(m/s^2)] that good accelerometers have, 30 ug/g^2: what is not fitted may be as
-    large, unless the poses say otherwise."""
+    ordinary_k2: float = 150e-6 / STANDARD_GRAVITY
+    """Standard deviation [1/(m/s^2)] of second-order coefficients that are neither fitted nor stated, 100 ug/g^2, as
+    consumer-grade sensors have them."""
 
-    possible_k2_shift: float = 2.0
-    """Shift of a value by the K2 that the poses leave open, over its u, beyond which it does harm where poses would
-    allow K2 to be fitted."""
+    fine_k2: float = 30e-6 / STANDARD_GRAVITY
+    """The same of sensors for navigation, 30 ug/g^2."""
 
-    k2_probability: float = 2e-3
+    fine_scatter: float = 20e-6 * STANDARD_GRAVITY
+    """Scatter [m/s^2] of the mean specific force of a pose, 20 ug, up to which sensors are as good as those for
+    navigation."""
+
+    k2_probability: float = 5e-4
     """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
 
     same_pose: float = 5e-3

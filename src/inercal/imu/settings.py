@@ -117,15 +117,15 @@ Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRate
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulated recording: the instrument lies still, then is turned from pose to pose by hand.
+    """A simulated recording: by hand from pose to pose, in six positions and three turns, or on a table.
 
     Biases wander with a correlation time of 100 s. ``coefficients`` are true values by symbol, in counts and SI.
     """
 
-    poses: int = option("held one after the other, the first level", 24, least=4, most=1000)
-    start: float = quantity("length of the first hold", "time", "30 s", bounds=TIME)
-    hold: float = quantity("length of each other hold", "time", "3 s", bounds=TIME)
-    turning: float = quantity("length of each turn", "time", "3 s", bounds=TIME)
+    poses: int = option("of multiposition: held one after the other, the first level", 24, least=4, most=1000)
+    start: float = quantity("length of the first hold, or rest of the table", "time", "30 s", bounds=TIME)
+    hold: float = quantity("length of each other hold, position or rest", "time", "3 s", bounds=TIME)
+    turning: float = quantity("length of each turn; of the table, by 90 deg", "time", "3 s", bounds=TIME)
     sample_rate: float = quantity("samples per second", "frequency", "100 Hz", bounds=FREQUENCY)
     accelerometer_noise: float = quantity(
         "white noise of the accelerometers", "velocity random walk", "80 ug/sqrt(Hz)", bounds=NOT_NEGATIVE
@@ -144,7 +144,7 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Disturbances that a simulation adds to a recording by hand; none if absent. ``k2`` [1/(m/s^2)]."""
+    """Disturbances that a simulation adds to a recording; none if absent. ``k2`` [1/(m/s^2)]."""
 
     restless_start: float = quantity(
         "standard deviation of a tremble of the attitude in the first hold, as of an IMU in the hand", "angle",
@@ -159,6 +159,13 @@ class Disturbances:
         "relative error of the clock, positive where it counts too many seconds", "number", "0", example="0.3 %",
         bounds=within(-0.5, 0.5, "within 50 %"),
     )  # fmt: skip
+    lever_arm: float = quantity(
+        "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes", "length",
+        "0 mm", example="50 mm", bounds=NOT_NEGATIVE,
+    )  # fmt: skip
+    delay: float = quantity(
+        "of aided: time by which the angles of the table come late", "time", "0 ms", example="20 ms"
+    )
     k2: float = 0.0
 
 
@@ -183,8 +190,12 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start, g_sensitivity, bias_drift, k2, time_base_u
+    static_start, g_sensitivity, bias_drift, time_base_u
         As their keys say.
+    k2 : bool
+        Second-order coefficients of the accelerometers are estimated.
+    k2_u : float or None
+        Their standard deviation about 0 [1/(m/s^2)] where they are not; as usual for such sensors if absent.
     exclude : Exclusion
         Poses and turns to be left out.
     traceability : mapping
@@ -206,10 +217,8 @@ class ImuSettings:
     )  # fmt: skip
     g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
     bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
-    k2: bool = option(
-        "also estimate the second-order coefficients of the accelerometers: K1 (f + K2 f^2), f along the input axis",
-        False,
-    )
+    k2: bool = False
+    k2_u: float | None = None
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="time_base",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,8 @@ from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, G
 from inercal.instruments.triad import TriadModel, triad_from_terms
 from inercal.records.record import Record, record_of
 from inercal.units import parse_unit
+
+_LOWER = (("y", "x"), ("z", "x"), ("z", "y"))
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,13 @@ def draw_truth(rng: np.random.Generator, g_sensitivity: float = 0.0) -> ImuTruth
         Noise(white=8e-4, wander=3e-4),
         Noise(white=5.6e-4, wander=5e-5),
     )
+
+
+def draw_full_truth(rng: np.random.Generator, g_sensitivity: float = 2e-4) -> ImuTruth:
+    """As `draw_truth`, with all six misalignments of the accelerometers."""
+    truth = draw_truth(rng, g_sensitivity)
+    misalignment = truth.accelerometer.misalignment + np.tril(rng.normal(0.0, 0.02, (3, 3)), -1)
+    return replace(truth, accelerometer=replace(truth.accelerometer, misalignment=misalignment))
 
 
 def hand_poses(rng: np.random.Generator, count: int) -> Array:
@@ -163,7 +172,7 @@ def simulate(
             rates.append(speed[:, None] * steps[k])
             moving.append(np.sin(2.0 * np.pi * s)[:, None] * rng.uniform(-1.0, 1.0, 3))
     if disturbances.restless_start > 0.0:
-        q[0], rates[0] = _trembling(poses[0], len(q[0]), rate, disturbances.restless_start, rng)
+        q[0], rates[0] = trembling(poses[0], len(q[0]), rate, disturbances.restless_start, rng)
     q_nb = np.concatenate(q)
     to_body = conjugate(q_nb)
     north, up = earth_rate(latitude)
@@ -172,18 +181,8 @@ def simulate(
     n = len(q_nb)
     f_error, f_wander = wandering_noise(truth.accelerometer_noise, n, rate, rng)
     w_error, w_wander = wandering_noise(truth.gyro_noise, n, rate, rng)
-    acc = truth.accelerometer.indicate(f + f_error)
-    if disturbances.k2:
-        along = f @ truth.accelerometer.misalignment.T
-        acc = acc + truth.accelerometer.scale * (disturbances.k2 * along**2)
     turned = [slice(a.stop, b.start) for a, b in itertools.pairwise(holds)]
-    knocked = rng.permutation(len(turned))[: disturbances.knocks] if disturbances.knocks else ()
-    for k in knocked:
-        w_error = w_error + _knock(turned[k], rate, disturbances.knock, n, rng)
-    gyro = truth.gyro.indicate(omega + w_error) + f @ truth.g_sensitivity.T
-    if disturbances.gyro_range is not None:
-        most = np.abs(truth.gyro.scale) * disturbances.gyro_range
-        gyro = np.clip(gyro, truth.gyro.bias - most, truth.gyro.bias + most)
+    acc, gyro = indicated(truth, f, omega, (f_error, w_error), turned, rate, disturbances, rng)
     t = np.arange(n, dtype=np.float64) * (clock / rate)
     return record_of_counts(t, acc, gyro), replace(
         truth,
@@ -192,9 +191,52 @@ def simulate(
     )
 
 
+def indicated(
+    truth: ImuTruth,
+    f: Array,
+    omega: Array,
+    errors: tuple[Array, Array],
+    turned: Sequence[slice],
+    rate: float,
+    disturbances: Disturbances,
+    rng: np.random.Generator,
+) -> tuple[Array, Array]:
+    """Outputs (n, 3) of accelerometers and gyro at specific force ``f`` and rate ``omega`` (n, 3), disturbed.
+
+    ``errors`` (n, 3) each are those of specific force and rate, ``turned`` the samples of each turn, ``rate`` [Hz] that
+    of the samples.
+    """
+    acc = truth.accelerometer.indicate(f + errors[0])
+    if disturbances.k2:
+        along = f @ truth.accelerometer.misalignment.T
+        acc = acc + truth.accelerometer.scale * (disturbances.k2 * along**2)
+    w_error = errors[1] + knocked(turned, rate, disturbances, len(f), rng)
+    gyro = truth.gyro.indicate(omega + w_error) + f @ truth.g_sensitivity.T
+    return acc, clipped(gyro, truth.gyro, disturbances)
+
+
+def knocked(
+    turned: Sequence[slice], rate: float, disturbances: Disturbances, n: int, rng: np.random.Generator
+) -> Array:
+    """Rates (n, 3) [rad/s] that a gyro reads in knocks, in turns at random, and that are none."""
+    made = np.zeros((n, 3))
+    for k in rng.permutation(len(turned))[: disturbances.knocks] if disturbances.knocks else ():
+        made += _knock(turned[k], rate, disturbances.knock, n, rng)
+    return made
+
+
+def clipped(gyro: Array, model: TriadModel, disturbances: Disturbances) -> Array:
+    """Outputs (n, 3) of a gyro within its range."""
+    if disturbances.gyro_range is None:
+        return gyro
+    most = np.abs(model.scale) * disturbances.gyro_range
+    return np.clip(gyro, model.bias - most, model.bias + most)
+
+
 def with_values(truth: ImuTruth, values: Mapping[str, float]) -> ImuTruth:
     """The instrument with these coefficients by term symbol in the place of its own."""
-    whole = truth.values() | dict(values)
+    lower = {f"M_{i}{j}": truth.accelerometer.misalignment["xyz".index(i), "xyz".index(j)] for i, j in _LOWER}
+    whole = lower | truth.values() | dict(values)
     g = np.array([[whole[f"G_{i}{j}"] for j in "xyz"] for i in "xyz"])
     return replace(
         truth,
@@ -204,7 +246,7 @@ def with_values(truth: ImuTruth, values: Mapping[str, float]) -> ImuTruth:
     )
 
 
-def _trembling(
+def trembling(
     attitude: Array, n: int, rate: float, size: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Attitudes (n, 4) and rates (n, 3) [rad/s] of a hold that trembles by ``size`` [rad], at 1 to 6 Hz."""

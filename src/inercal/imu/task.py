@@ -89,8 +89,8 @@ def calibrate_files(
     if rate_u and not settings.time_base_u:
         settings = replace(settings, time_base_u=rate_u)
     calibration = _by_method(records, settings, progress)
-    if rate_u == 0.0 and not settings.time_base_u and not in_rows(settings):
-        calibration = _with_exact_rate(calibration)
+    if not rate_u and not settings.time_base_u and not in_rows(settings):
+        calibration = _with_exact_clock(calibration, typed=rate_u is not None)
     if settings.site.inputs or in_order(settings):
         return calibration
     return _with_exact_gravity(calibration, settings.site.gravity)
@@ -128,19 +128,23 @@ def _by_method(
             return calibrate_multiposition(record, settings, progress)
 
 
-def _with_exact_rate(calibration: Calibrated) -> Calibrated:
-    """The calibration, saying what an ordinary error of a sample rate typed without an uncertainty would do."""
+def _with_exact_clock(calibration: Calibrated, typed: bool) -> Calibrated:
+    """The calibration, saying what an ordinary error of the clock would do: of a rate that was ``typed`` without an
+    uncertainty in any case, of time stamps where it would matter."""
     estimate = calibration.estimate
     scales = [estimate[f"S_{axis}"] for axis in "xyz" if f"S_{axis}" in estimate.names]
-    if not scales:
+    shifts = {p.name: LIMITS.ordinary_clock * abs(p.value) / p.u for p in scales if p.u > 0.0}
+    if not shifts or (not typed and max(shifts.values()) < 1.0):
         return calibration
-    shifts = {p.name: LIMITS.ordinary_clock * abs(p.value) / p.u for p in scales}
+    what, cure = "time stamps are taken as exact", "imu.time_base"
+    if typed:
+        what, cure = "sample rate is typed without an uncertainty", 'rate = "100.00(1) Hz", or imu.time_base'
     text = (
-        f"the sample rate is typed without an uncertainty: an error of {1e6 * LIMITS.ordinary_clock:.0f} ppm, ordinary "
-        f"for a clock, shifts the scale factors of the gyro by as much, {max(shifts.values()):.2g} of their u: state "
-        'its uncertainty, such as rate = "100.00(1) Hz", or imu.time_base'
+        f"the {what}: an error of {1e6 * LIMITS.ordinary_clock:.0f} ppm, ordinary for a clock, shifts the scale "
+        f"factors of the gyro by as much, {max(shifts.values()):.2g} of their u: state its uncertainty, "
+        f"{'such as ' if typed else 'by '}{cure}"
     )
-    harm = tuple(name for name, shift in shifts.items() if shift > 1.0)
+    harm = tuple(name for name, shift in shifts.items() if typed and shift > 1.0)
     findings, (status, message) = judged(
         (estimate.status, estimate.message),
         (*estimate.findings, Finding("rate_without_u", text, harm=harm)),
@@ -160,22 +164,38 @@ def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
 
 
 def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
-    """A simulated record of the study: an IMU held by hand in one pose after the other.
+    """A simulated record of the study: an IMU held by hand in one pose after the other, or as its method asks for.
 
     Coefficients that the study does not state are drawn.
 
     Raises
     ------
     StudyError
-        Another method than multi-position, or no latitude for the earth rate.
+        A method of which there is no simulation, or no latitude for the earth rate.
     """
+    if settings.site.latitude is None:
+        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
+    match settings.method:
+        case None:
+            return _by_hand(settings, settings.site.latitude, rng)
+        case FerrarisSettings():
+            from inercal.imu.ferraris.simulate import simulate_study as simulate_session
+
+            return simulate_session(settings, settings.method, rng)
+        case AidedSettings():
+            from inercal.imu.aided.simulate import simulate_study as simulate_table
+
+            return simulate_table(settings, settings.method, rng)
+    raise StudyError(
+        "imu.method", 'found another method, expected "multiposition", "ferraris" or "aided" for a simulation'
+    )
+
+
+def _by_hand(settings: ImuSettings, latitude: float, rng: np.random.Generator) -> Record:
+    """A simulated record of poses held by hand."""
     from inercal.imu.simulate import Noise, draw_truth, hand_poses, with_values
     from inercal.imu.simulate import simulate as simulate_poses
 
-    if settings.method is not None:
-        raise StudyError("imu.method", 'found another method, expected "multiposition" for a simulation')
-    if settings.site.latitude is None:
-        raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
     of, site = settings.simulation, settings.site
     truth = replace(
         with_values(draw_truth(rng), of.coefficients),
@@ -186,7 +206,7 @@ def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
         truth,
         hand_poses(rng, of.poses),
         site.gravity,
-        settings.site.latitude,
+        latitude,
         rng,
         rate=of.sample_rate,
         start=of.start,

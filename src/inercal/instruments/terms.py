@@ -42,6 +42,19 @@ _ACCELEROMETER = (
         for i, j in ("xy", "xz", "yz")
     ),
 )
+_ON_A_TABLE = (
+    *(
+        Term(
+            f"r_{i}{j}",
+            f"lever arm: place of accelerometer {i} along {j} beside the crossing of the axes",
+            "m",
+        )
+        for i in _AXES
+        for j in _AXES
+    ),
+    Term("tau_a", "delay of the accelerometers", "s"),
+    Term("tau_g", "delay of the gyro", "s"),
+)
 _GYRO = (
     *(Term(f"D_F_{i}", f"gyro {i} bias: output at zero rate", "output") for i in _AXES),
     *(Term(f"S_{i}", f"gyro {i} scale factor", "output/(rad/s)") for i in _AXES),
@@ -102,6 +115,9 @@ _ACCELEROMETER_BY_ANGLE = (
             ("Kpo", "cross-coupling of pendulous and output axis", "1/(m/s^2)"),
             ("Kpp", "cross-axis coefficient, of the square along the pendulous axis", "1/(m/s^2)"),
             ("Koo", "cross-axis coefficient, of the square along the output axis", "1/(m/s^2)"),
+            ("K_dz", "dead zone: width of the inputs about level to which there is no response", "m/s^2"),
+            ("K_th", "threshold: input from the middle of the dead zone with half of its response", "m/s^2"),
+            ("K_hyst", "hysteresis: output after the input was raised less after lowered, over K1", "m/s^2"),
         )
     ),
 )
@@ -159,6 +175,7 @@ TERMS: dict[str, Term] = {
         *_ACCELEROMETER_BY_ANGLE,
         *_DRIFT,
         *_SELF_CALIBRATION,
+        *_ON_A_TABLE,
     )
 }
 
@@ -227,7 +244,6 @@ MODEL_TERMS = {
         Term("b_roll", "bias of the roll gyro", "rad/s"),
         Term("b_yaw", "bias of the yaw gyro", "rad/s"),
         Term("k_g", "scale of the gyro", "1"),
-        Term("tau_g", "delay of the gyro", "s"),
         Term("tau", "delay of all sensors against the reference", "s"),
     )
 }

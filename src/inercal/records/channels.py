@@ -19,19 +19,20 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     (r"wc_[xyz]", ("rate", "count"), "angle"),
     (r"y_[xy]", ("rate", "number", *RAW), None),
     (r"phi[123]|th_[xyz]|theta_ref", ("angle", "count", "voltage"), None),
+    (r"q_ref_[0-3]", ("number",), None),
     (r"rate|(?:u_)?rate_[xyz]", ("rate",), None),
     (r"u_acc_[xyz]", ("acceleration", *RAW), None),
     (r"u_(?:gyro|wc)_[xyz]", ("rate", *RAW), None),
     (r"u_y_[xy]", ("rate", "number", *RAW), None),
     (r"temperature", ("temperature", "count", "voltage"), None),
     (r"trigger", ("number", "count", "voltage"), None),
-    (r"position|point|label", ("number", "count"), None),
+    (r"position|point|label|joint", ("number", "count"), None),
 )
 
 _EXAMPLES = (
     *(f"{sensor}_{axis}" for sensor in ("acc", "gyro", "wc", "th") for axis in "xyz"),
-    *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "y_x", "y_y"),
-    *("a1", "a2", "a3", "a4", "gyro", "gyro_roll", "gyro_yaw", "point", "trigger", "theta_ref"),
+    *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "joint", "y_x", "y_y"),
+    *("a1", "a2", "a3", "a4", "gyro", "gyro_roll", "gyro_yaw", "point", "trigger", "theta_ref", "q_ref_0"),
 )
 
 #: Where a channel is found in a file: column number, header or variable name, or variable and column.

@@ -21,6 +21,11 @@ def counted_names(names: Sequence[str], most: int = 5) -> str:
     return ", ".join(names[:most]) + more
 
 
+def shortened(name: str, most: int = 80) -> str:
+    """A name of a file's own, at most so many characters of it."""
+    return name if len(name) <= most else f"{name[: most - 3]}..."
+
+
 def places(word: str, numbers: ArrayLike) -> str:
     """Numbers (ascending, counted from 1) as ranges: the first few, and how many ranges more."""
     rows = np.asarray(numbers, dtype=np.int64)

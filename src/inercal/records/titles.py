@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 from inercal.errors import QuantityError, RecordError
 from inercal.records.channels import Channel, Origin, is_channel, misfit, needs_unit
-from inercal.records.places import counted_names
+from inercal.records.places import counted_names, shortened
+from inercal.records.read.limits import TITLE
 from inercal.units import Unit, parse_unit, shown
 
 EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
@@ -23,7 +24,7 @@ def bare(title: str) -> str:
 
 def name_and_unit(title: str) -> tuple[str, str | None]:
     """Name and unit of a title: ``acc_x`` and ``m/s^2`` of ``acc_x [m/s^2]``; the title itself if it is no such."""
-    match = _TITLE.fullmatch(title.strip())
+    match = _TITLE.fullmatch(title.strip()) if len(title) <= TITLE else None
     return (title, None) if match is None else (match[1], match[2])
 
 
@@ -37,8 +38,8 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
     channels: dict[str, Channel] = {}
     titles_read = []
     for origin, title, unit_beside in titles:
-        titles_read.append(title)
-        match = _TITLE.fullmatch(title)
+        titles_read.append(shortened(title))
+        match = _TITLE.fullmatch(title) if len(title) <= TITLE else None
         if match is None or not is_channel(name := match[1]):
             continue
         unit_text = unit_beside if match[2] is None else match[2]
@@ -103,6 +104,8 @@ def titled(title: str, given: str | None = None) -> tuple[str | None, str | None
     channel, unit : str or None
         The unit as it is written, known or not; plainly where a name spells it, as ``acc_x_m_s2``.
     """
+    if len(title) > TITLE:
+        return None, None
     match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title.strip())
     plain, unit = (match[1], match[2] or given) if match else (title, given)
     name = _named(plain)
@@ -122,6 +125,8 @@ def titled(title: str, given: str | None = None) -> tuple[str | None, str | None
 
 def numbered(title: str) -> str | None:
     """``a2`` of titles such as ``Accel 2 [g]`` or ``acc_2``, of a model whose accelerometers have numbers."""
+    if len(title) > TITLE:
+        return None
     match = re.fullmatch(
         rf"(?:.* )?(?:{_SENSORS['acc']}) ?([1-9]\d*)", _words(re.sub(r"\s*[\[(].*", "", title))
     )

@@ -177,8 +177,15 @@ def grid(
         yield page, axes, cells
 
 
-def panels_of_lines(title: str, caption: str, t: Array, panels: Mapping[str, Sequence[Line]]) -> Picture:
-    """Lines over ``t`` (n,) [s], a panel for each label of an axis, all with the same legend.
+def panels_of_lines(
+    title: str,
+    caption: str,
+    t: Array,
+    panels: Mapping[str, Sequence[Line]],
+    changes: Sequence[float] = (),
+) -> Picture:
+    """Lines over ``t`` (n,) [s], a panel for each label of an axis, all with the same legend; dots upright at the
+    ``changes`` [s].
 
     The second line and those after it are dashes in turn on top of the first, so that lines that agree are all seen.
     """
@@ -189,6 +196,8 @@ def panels_of_lines(title: str, caption: str, t: Array, panels: Mapping[str, Seq
             cell = replace(place, y=_limits(thinned))
             frame(axes, cell, times=number == len(panels) - 1, label=label)
             line(axes, cell, t[[0, -1]], np.zeros(2), color=QUIET, lw=0.6)
+            for change in changes:
+                line(axes, cell, np.full(2, change), np.array(cell.y), color=INK, lw=0.6, ls=":")
             for k, (each, points) in enumerate(zip(lines, thinned, strict=True)):
                 if each.band is not None:
                     half = np.where(np.isfinite(each.band), each.band, np.nan)[shown]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple, get_args
 
-FilterKind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm"]
+FilterKind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm", "linear"]
 FactorKind = Literal["cholesky", "eigen", "svd"]
 
 KINDS: Final[tuple[FilterKind, ...]] = get_args(FilterKind)
@@ -39,6 +39,11 @@ _CRASSIDIS = (
     "Control, and Dynamics 26 (2003) 536"
 )
 
+_GREWAL = (
+    "M. S. Grewal, V. D. Henderson, R. S. Miyasako, Application of Kalman filtering to the calibration and alignment "
+    "of inertial navigation systems, IEEE Transactions on Automatic Control 36 (1991) 4"
+)
+
 ESTIMATORS: Final[Mapping[FilterKind, Estimator]] = {
     "error-state": Estimator("error-state filter", (_LEFFERTS,)),
     "mukf": Estimator("multiplicative sigma-point filter", (_JULIER, _CRASSIDIS)),
@@ -46,4 +51,5 @@ ESTIMATORS: Final[Mapping[FilterKind, Estimator]] = {
     "gimbal-ukf": Estimator("gimbal-angle sigma-point filter", (_JULIER,)),
     "map": Estimator("batch, largest posterior"),
     "lm": Estimator("batch, Levenberg-Marquardt"),
+    "linear": Estimator("linear filter of misalignment angles", (_GREWAL,)),
 }

@@ -57,6 +57,16 @@ class Limits:
     search_turn: float = math.radians(3.0)
     """Turn [rad] between two rows, at most, while a path is searched for."""
 
+    second_prior: float = 10.0
+    """Standard uncertainties of the first pass of a filter that make the prior of its second one: so far from where it
+    is linearised it may go."""
+
+    estimators_apart: float = 0.3
+    """Part of u by which the batch estimator may differ from a filter: what linearising costs it."""
+
+    kept_rows: int = 8192
+    """Rows that a stream keeps to go through them again, linearised anew, each time that they have doubled."""
+
     base_sigma: float = math.radians(2.0 / 60.0)
     """Standard deviation [rad] of beta up to which filters find it from the base as stated: linearising neglects its
     square, 0.07 arcsec, less than what is averaged of the best encoders and accelerometers."""

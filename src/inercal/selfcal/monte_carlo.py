@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor as Pool
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import InputError
-from inercal.estimate.runs import Threads, run
+from inercal.estimate.runs import Executor, Threads, run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
@@ -158,22 +159,25 @@ def campaign(
     runs: int,
     seed: int,
     kind: FilterKind | None = None,
-    workers: int = 2,
+    executor: Executor | Pool | None = None,
     folder: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Campaign:
     """Simulate and estimate a study with plan and truth many times, with its estimator or another ``kind``.
 
-    ``runs``, ``seed``, ``folder``, ``progress`` as in `inercal.estimate.runs.run`; ``workers`` are threads. Raises
-    StudyError where the study has no plan or truth, or a base that would have to be found first, and InputError where
-    fewer than two runs converged.
+    ``runs``, ``seed``, ``executor``, ``folder``, ``progress`` as in `inercal.estimate.runs.run`; two threads if there
+    is no executor. Raises StudyError where the study has no plan or truth, or a base that would have to be found first,
+    and InputError where fewer than two runs converged.
     """
     stated_well(settings, "a campaign")
     of_study, made = problem(settings), experiment(settings)
     kind = of_study.filter.kind if kind is None else kind
     load_kernels(kind, of_study)
+    assert (
+        of_study.model
+    )  # kept in the problem, so that the task is the same to the byte whenever it is asked for
     one = partial(one_run, made, of_study, kind)
-    sample = run(one, runs=runs, seed=seed, executor=Threads(workers), folder=folder, progress=progress)
+    sample = run(one, runs=runs, seed=seed, executor=executor or Threads(2), folder=folder, progress=progress)
     truth, size = settings.truth, settings.size
     assert truth is not None
     sound = sample["converged"] > 0.0

@@ -19,11 +19,13 @@ from inercal.records.column import Column
 from inercal.records.places import counted, places
 from inercal.records.record import Record, recorded_temperature
 from inercal.selfcal.diagnosis.gross import clipped, implausible, off_the_path
-from inercal.selfcal.filters.gaps import with_held
+from inercal.selfcal.filters.gaps import walked, with_held
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.settings import SelfcalSettings
+
+_REFERENCE = ("q_ref_0", "q_ref_1", "q_ref_2", "q_ref_3")
 
 
 def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
@@ -31,8 +33,9 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     study.
 
     The record has ``th_x..z``, ``acc_x..z`` and the rate of the platform, commanded (``wc_x..z``) or, where there is no
-    such, measured (``gyro_x..z``), on one clock. A rate belongs to the interval from its row to the next, one recorded
-    as an increment to the interval before; the last row's rate (or the first increment) is not used.
+    such, measured (``gyro_x..z``), on one clock; it may have the true attitude, ``q_ref_0..3``. A rate belongs to the
+    interval from its row to the next, one recorded as an increment to the interval before; the last row's rate (or the
+    first increment) is not used.
 
     Raises RecordError for columns that are missing or on different clocks, time that does not increase, fewer than
     `LIMITS.least_rows` rows, no accelerometers, or units of rates and angles that contradict each other.
@@ -40,7 +43,8 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     where = record.sources[0].path if record.sources else "record"
     sensor = _rate_sensor(record, where)
     columns = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
-    for column in columns[1:]:
+    reference = [record[name] for name in _REFERENCE] if set(_REFERENCE) <= record.columns.keys() else []
+    for column in [*columns[1:], *reference]:
         if column.t is not columns[0].t:
             text = f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time"
             raise RecordError(where, text)
@@ -59,9 +63,13 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     th, turned = _continuous(th)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
+    recorded_rate = rate
     rate, held = with_held(t, rate, th, settings.world, all(increment))
     warm = recorded_temperature(record)
-    recording = Recording(t, rate, th, acc, sensor == "gyro", (), record.sources, held, warm)
+    measured = sensor == "gyro"
+    walk = walked(t, recorded_rate, held) if measured and held else None
+    true = np.stack([column.values for column in reference], axis=-1)[rows] if reference else None
+    recording = Recording(t, rate, th, acc, measured, (), record.sources, held, warm, walk, true)
     of_record = [  # without extremes beyond which no motion goes on
         each
         for each in (*worth_saying(record, columns), *findings)

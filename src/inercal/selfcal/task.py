@@ -14,22 +14,22 @@ from inercal.arrays import Array, short_repr
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
 from inercal.estimate.table import Table
-from inercal.findings import Status
 from inercal.records.record import Record
 from inercal.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.estimators import KINDS, FilterKind
 from inercal.selfcal.filters import run as filtering
-from inercal.selfcal.filters.filter_result import FilterResult, product_form
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import taken_anew
 from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
-from inercal.selfcal.platform.coefficients import BETA, names
+from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.reading import recording_of
+from inercal.selfcal.result.comparison import beside, differing, of_attitude, stated_variance
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.result.tables import side_by_side
+from inercal.selfcal.result.tables import of_attitudes, side_by_side
 from inercal.selfcal.settings import SelfcalSettings
 
 
@@ -37,7 +37,8 @@ from inercal.selfcal.settings import SelfcalSettings
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """An ``estimate``, and the evidence behind it: ``settings`` of the study, results of other estimators that it was
-    ``compared`` with, by kind, and the ``truth`` (p,), product form, where the study states it."""
+    ``compared`` with, by kind, the variance (p,) that what is ``stated`` adds to each, and the ``truth`` (p,), product
+    form, where the study states it."""
 
     estimate: Estimate
     problem: FilterProblem
@@ -46,6 +47,7 @@ class Calibration:
     bounds: PathBounds
     settings: SelfcalSettings
     compared: Mapping[FilterKind, FilterResult] = field(default_factory=dict)
+    stated: Array = field(default_factory=lambda: np.zeros(0))
     truth: Array | None = None
 
 
@@ -95,30 +97,28 @@ def calibrate(
         if kind != filtered.kind:
             progress(f"filtering ({kind})")
             compared[kind] = filtering.estimate(recording, of, kind)
+    faults += differing(filtered, compared)
     progress("assembling")
     estimate = assemble(recording, settings, filtered, bounds, faults)
     result, message = dict(estimate.result), estimate.message
     if rough and estimate.names:
         base, words = _base(settings, estimate)
         result, message = result | base, message + words
+    stated = stated_variance(filtered, estimate.u) if estimate.names else np.zeros(len(of.prior))
     for name, other in compared.items():
-        result["compare"] |= {name: _beside(other, verdict(other, recording, settings, faults)[0])}
-    timed = replace(estimate, result=result, message=message, timing={"solve": time.perf_counter() - clock})
+        own = verdict(other, recording, settings, faults)[0]
+        result["compare"] |= {name: beside(other, own, stated, recording.reference)}
+    result |= of_attitude(filtered, recording.reference)
+    steps = {"step": filtered, **{f"step {name}": other for name, other in compared.items()}}
+    timing = {
+        "solve": time.perf_counter() - clock,
+        **{key: 1e-6 * each.step_us for key, each in steps.items()},
+    }
+    timed = replace(estimate, result=result, message=message, timing=timing)
     truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
-    return Calibration(timed, of, recording, filtered, bounds, settings, compared, truth)
-
-
-def _beside(other: FilterResult, status: Status) -> dict[str, Any]:
-    """An estimator's part of a comparison."""
-    values, u = product_form(other)
-    each = zip(names(len(values)), values, u, strict=True)
-    return {
-        "parameters": {name: {"value": value, "u": own} for name, value, own in each},
-        "status": status.value,
-        "step_us": other.step_us,
-    }
+    return Calibration(timed, of, recording, filtered, bounds, settings, compared, stated, truth)
 
 
 def _base(settings: SelfcalSettings, estimate: Estimate) -> tuple[dict[str, Any], str]:
@@ -145,4 +145,7 @@ def compared(calibration: Calibration) -> list[Table]:
     status = {kind: str(each["status"]) for kind, each in estimate.result.get("compare", {}).items()}
     filters = {first.kind: first} | dict(calibration.compared)
     interval = float(np.median(calibration.recording.dt))
-    return side_by_side(filters, calibration.truth, interval, status | {first.kind: estimate.status.value})
+    status |= {first.kind: estimate.status.value}
+    tables = side_by_side(filters, calibration.stated, calibration.truth, interval, status)
+    true = calibration.recording.reference
+    return tables if true is None else [*tables, of_attitudes(filters, true)]

@@ -23,7 +23,7 @@ from inercal.records.column import Column
 from inercal.records.read.join import FileTable, check_present, conversion, row_rate
 from inercal.records.read.layout import Layout, comment_marks, find_layout, is_rounded
 from inercal.records.read.table import Part, Table
-from inercal.records.read.text import contents, locate
+from inercal.records.read.text import UNENDED, contents, locate
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
@@ -115,6 +115,8 @@ class Lines:
         self._waiting: list[tuple[str, Line]] = []
         self._form, self._held = self._begin(record_map)
         self._layout = self._form.layout
+        own = [*self._form.fields, *([] if self._form.time is None else [self._form.time])]
+        self._columns = {field.column for field in own}
 
     @property
     def record(self) -> Record:
@@ -183,6 +185,8 @@ class Lines:
             ]
         if bad:
             self._bad_row(line)
+        elif not line.whole and fields is not None and self._layout.width - 1 in self._columns:
+            self._flaw("truncated", f"{UNENDED} may be cut", line)
         label = fields[form.label].strip() if fields is not None and form.label is not None else ""
         return Sample(row, row / form.rate if form.time is None else t, values, label)
 
@@ -256,6 +260,11 @@ class Lines:
             text = line.text.strip()
             if self._number <= part.options.skip or not text or text.startswith(marks):
                 continue
+            if b"\r" in line.data:
+                raise RecordError(
+                    path,
+                    f"line {line.number}: found a carriage return in it, expected lines that end with a line feed",
+                )
             rows.append(line)
             # the first row or header, and the newest: one between may be cut; empty lines keep the numbers right
             lines = [""] * (rows[0].number - 1) + [row.text for row in rows[:1] + rows[1:][-1:]]

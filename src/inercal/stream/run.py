@@ -23,7 +23,7 @@ import signal
 import threading
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
@@ -150,6 +150,7 @@ def run(
     write: Callable[[str], None],
     saving: Saving | None = None,
     say: Callable[[str], None] = lambda _: None,
+    after: float = -math.inf,
 ) -> int:
     """Run an estimator to the end of a stream.
 
@@ -163,6 +164,8 @@ def run(
         The state is loaded from there if the file exists, and saved there.
     say : callable
         Told where a saved state is gone on from, and how many rows are passed over.
+    after : float
+        Time [s] of the last line that a reader has: those up to it, titles too, are not given again.
 
     Returns
     -------
@@ -175,10 +178,10 @@ def run(
         A checkpoint that is not of this estimator, in use by another run, or that cannot be written; a stream that
         begins as the saved one and then differs.
     KeyboardInterrupt
-        On an interrupt or SIGTERM, once the row in work is done and the state is saved.
+        On an interrupt, SIGTERM or SIGHUP, once the row in work is done and the state is saved.
     """
     with nullcontext() if saving is None else alone(saving.path):
-        return _run(estimator, lines, write, saving, say)
+        return _run(estimator, lines, write, saving, say, after)
 
 
 def _run(
@@ -187,6 +190,7 @@ def _run(
     write: Callable[[str], None],
     saving: Saving | None,
     say: Callable[[str], None],
+    after: float,
 ) -> int:
     """As `run`, with the checkpoint to itself."""
     mark = fingerprint({"estimator": estimator.settings, "stream": lines.settings})
@@ -203,11 +207,11 @@ def _run(
             saved = position.rows
 
     def give(outputs: Sequence[Output]) -> None:
-        for output in outputs:
+        for output in (each for each in outputs if not _given(each, after)):
             write(",".join(each if isinstance(each, str) else number(each) for each in output))
 
     give([estimator.columns])
-    with _interrupts() as interrupts:
+    with closing(lines), _interrupts() as interrupts:
         try:
             for line, sample in _new_samples(lines, position, interrupts, say):
                 if not line.whole:
@@ -221,10 +225,14 @@ def _run(
             if interrupts.waiting:
                 keep()
             raise
-    keep()
-    give(estimator.finish(state))
-    lines.close()
+        keep()
+        give(estimator.finish(state))
     return position.rows
+
+
+def _given(output: Output, after: float) -> bool:
+    """True for a line that a reader has: titles, and what is not later than ``after`` [s]."""
+    return math.isfinite(after) and (isinstance(output[0], str) or output[0] <= after)
 
 
 def _new_samples(
@@ -298,7 +306,7 @@ class _Interrupts:
         self._asked = False
 
     def handle(self, signum: int, frame: FrameType | None) -> None:
-        """Handle SIGINT and SIGTERM."""
+        """Handle SIGINT, SIGTERM and SIGHUP."""
         if self.waiting or self._asked:
             raise KeyboardInterrupt
         self._asked = True
@@ -320,8 +328,9 @@ def _interrupts() -> Iterator[_Interrupts]:
     if threading.current_thread() is not threading.main_thread():
         yield interrupts
         return
-    asking = (signal.SIGINT, signal.SIGTERM)
-    before = {signum: signal.signal(signum, interrupts.handle) for signum in asking}
+    asking = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    ignored = [signum for signum in asking if signal.getsignal(signum) is signal.SIG_IGN]  # as by nohup
+    before = {signum: signal.signal(signum, interrupts.handle) for signum in asking if signum not in ignored}
     try:
         yield interrupts
     finally:

@@ -1,9 +1,11 @@
 """A platform calibrated while it turns: rows in, coefficients and their uncertainties out, each at once.
 
-A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file
-(`inercal.selfcal.reading` says how rows are taken): the first row with all angles and a rate is the start; where no
-rate is recorded the platform is taken to turn on as before (`inercal.selfcal.filters.gaps`); other missing values are
-not measured. Only time is treated more kindly: a row that is not later than the one before is left out.
+A recursive filter of `inercal.selfcal` goes on by one row at a time, to the digits that it gives on the whole file.
+Where a file takes a second pass, a stream goes through all its rows again each time that they have doubled, up to
+`LIMITS.kept_rows` (`inercal.selfcal.filters.second_pass`). Rows are taken as `inercal.selfcal.reading` says: the first
+row with all angles and a rate is the start; where no rate is recorded the platform is taken to turn on as before
+(`inercal.selfcal.filters.gaps`); other missing values are not measured. Only time is treated more kindly: a row that is
+not later than the one before is left out.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from inercal.selfcal.filters.gaps import advance, held_rate, usual
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.run import load_kernels as load_filter
 from inercal.selfcal.filters.run import recursive
+from inercal.selfcal.filters.second_pass import Kept
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import KA1
 from inercal.selfcal.platform.recording import Steps
@@ -50,7 +53,7 @@ class SelfcalState(NamedTuple):
     intervals (NaN before). ``doubt``: a rate was held and the encoders have not read since. ``angles`` (3,) [rad]
     of the estimated attitude. ``nis`` and ``dims``: sums of the normalised innovations squared and of the scalars in
     them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``alarms`` are
-    those given; ``slots`` that of the last line.
+    those given; ``slots`` that of the last line; ``kept`` the rows for further passes.
     """
 
     begun: bool
@@ -70,6 +73,7 @@ class SelfcalState(NamedTuple):
     gaps: int
     alarms: Alarms
     slots: Slots
+    kept: Kept
 
 
 class Selfcal:
@@ -117,6 +121,7 @@ class Selfcal:
         names = list(record.columns)
         self._places = [names.index(column.name) for column in channels]
         self._factors = [column.unit.factor for column in channels]
+        self._measured = sensor == "gyro"
         self._gained = np.array([column.increment for column in channels[:3]])
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(len(problem.prior))]]
 
@@ -140,6 +145,7 @@ class Selfcal:
             begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
             rated=math.nan, read=math.nan, t=math.nan, steps=np.full(LIMITS.recent_intervals, np.nan), doubt=False,
             angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, alarms=Alarms(), slots=Slots(),
+            kept=Kept(),
         )  # fmt: skip
 
     def step(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[Output]]:
@@ -156,26 +162,29 @@ class Selfcal:
         if dt <= 0.0:
             return self._late(state, sample.t), ()
         state = self._after(state, sample.t, dt)
-        state, over, guessed = self._rate(state, sample.t, over)
-        doubt, seen = guessed or state.doubt, bool(np.isfinite(th).all())
+        state, over, walked = self._rate(state, sample.t, over)
+        doubt, seen = walked is not None or state.doubt, bool(np.isfinite(th).all())
+        walk = dt if walked is None else walked
+        step, held = Steps(np.array([dt]), over[None], acc[None], th[None]), (0,) if doubt else ()
         filter_, trace = advance(
-            self._module,
-            state.filter,
-            self._problem,
-            Steps(np.array([dt]), over[None], acc[None], th[None]),
-            (0,) if doubt else (),
+            self._module, state.filter, self._problem, step, held, walked=np.array([walk])
         )
+        kept = state.kept.after(step, doubt, walk)
+        estimate: History | Estimates = trace.estimates
+        if kept.full:
+            filter_, kept = kept.passed(self._module, self._problem, filter_)
+            estimate = estimate_of(filter_, self._problem)
         if trace.restarts:
             text = "the platform did not turn on as before: its attitude is taken anew from the encoders"
             state = self._gap(state, sample.t, text)
         nis, dims = float(trace.estimates.nis[0]), int(trace.estimates.dims[0])
         state = state._replace(
             filter=filter_, next=following, t=sample.t, late=0, doubt=doubt and not seen,
-            read=sample.t if seen else state.read,
+            read=sample.t if seen else state.read, kept=kept,
         )  # fmt: skip
         if math.isfinite(nis):
             state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
-        return self._line(self._alarmed(state, trace), trace.estimates, nis)
+        return self._line(self._alarmed(state, trace), estimate, nis)
 
     def finish(self, state: SelfcalState) -> Sequence[Output]:
         """Nothing."""
@@ -189,7 +198,10 @@ class Selfcal:
         if not begun:
             return state._replace(begun=False), ()
         filter_ = self._module.initial(self._problem, th)
-        state = state._replace(begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th)
+        kept = Kept.of(self._problem.filter.kind, self._problem, th)
+        state = state._replace(
+            begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th, kept=kept
+        )
         return self._line(state, estimate_of(filter_, self._problem), math.nan)
 
     def _late(self, state: SelfcalState, t: float) -> SelfcalState:
@@ -216,20 +228,23 @@ class Selfcal:
             self._say(Finding("gap", f"{text}{more}", f"t = {t:.10g} s"))
         return state._replace(gaps=state.gaps + 1)
 
-    def _rate(self, state: SelfcalState, t: float, rate: Array) -> tuple[SelfcalState, Array, bool]:
-        """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and whether it is held."""
+    def _rate(self, state: SelfcalState, t: float, rate: Array) -> tuple[SelfcalState, Array, float | None]:
+        """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and where it is held, the
+        time [s] over which its noise gathers."""
         whole, gained = bool(np.isfinite(rate).all()), bool(self._gained.all())
         if whole:
             state = state._replace(rate=rate, rated=t if gained else state.t)
         dt, step = t - state.t, float(usual(state.steps))
         long, half = dt > LIMITS.gap_ratio * step, 0.5 * step
         if whole and not long:
-            return state, rate, False
+            return state, rate, None
         middle = state.rated - half if gained else state.rated + half
         held = held_rate(
             state.rate, state.filter.th, self._problem.world, middle - state.read, state.t - state.read, dt
         )
-        return state, np.where(long | ~np.isfinite(rate), held, rate), True
+        begun = state.t if whole else state.rated - step if gained else state.rated
+        walked = ((t - begun) ** 2 - (state.t - begun) ** 2) / step if self._measured else dt
+        return state, np.where(long | ~np.isfinite(rate), held, rate), walked
 
     def _alarmed(self, state: SelfcalState, trace: Trace) -> SelfcalState:
         """The state with the alarms that were due now."""

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from inercal._toml import Strict, check
+from inercal.aoa.band import Band
 from inercal.aoa.disturbances import DELAY
 from inercal.aoa.settings import (
     AoaSettings,
@@ -70,8 +71,10 @@ def _certain(value: object) -> Quantity:
 _SNAP = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*rad(?:\^2|²)\s*/\s*s(?:\^7|⁷)\s*")
 
 
-def _snap(value: object) -> float:
-    """A spectral density [rad^2/s^7], as a text with that unit."""
+def _snap(value: object) -> float | None:
+    """A spectral density [rad^2/s^7], as a text with that unit; None for auto."""
+    if value == "auto":
+        return None
     match = _SNAP.fullmatch(value) if isinstance(value, str) else None
     try:
         density = float(match[1]) if match else math.nan
@@ -79,16 +82,16 @@ def _snap(value: object) -> float:
         density = math.nan
     if not 0.0 < density < math.inf:
         raise refusal(
-            f'found {shown(value)}, expected a spectral density above zero, such as "1e7 rad^2/s^7"'
+            f'found {shown(value)}, expected "auto" or a spectral density above zero, such as "1e7 rad^2/s^7"'
         )
     return density
 
 
 _Snap = Annotated[
-    float,
+    float | None,
     PlainValidator(_snap),
-    PlainSerializer(lambda value: f"{value!r} rad^2/s^7"),
-    WithJsonSchema({"type": "string", "examples": ["1e7 rad^2/s^7"]}),
+    PlainSerializer(lambda value: "auto" if value is None else f"{value!r} rad^2/s^7"),
+    WithJsonSchema({"type": "string", "examples": ["auto", "1e9 rad^2/s^7"]}),
 ]
 
 
@@ -122,8 +125,8 @@ class SensorPriorTable(table_of(Prior)):  # type: ignore[misc]
 class TimingTable(Strict):
     """Delays, positive where outputs come late."""
 
-    gyro_delay: _Delay | Literal["estimate"] | None = Field(
-        default=None, description="of the gyro against the accelerometers; or estimate; 0 if absent"
+    gyro_delay: _Delay | Literal["estimate"] = Field(
+        default="estimate", description="of the gyro against the accelerometers; or estimate"
     )
     common_delay: _CommonDelay | None = Field(
         default=None,
@@ -132,13 +135,43 @@ class TimingTable(Strict):
     )
 
 
+def _low_pass(value: object) -> float | None:
+    """A corner frequency [Hz], infinite for none, None for auto."""
+    if value in ("auto", "none"):
+        return None if value == "auto" else math.inf
+    if not isinstance(value, str):
+        raise refusal(f'found {shown(value)}, expected "auto", "none" or a frequency, such as "35 Hz"')
+    return QuantityText("frequency", "35 Hz", FREQUENCY.accept, FREQUENCY.words).parse(value).value
+
+
+_LowPass = Annotated[
+    float | None,
+    PlainValidator(_low_pass),
+    PlainSerializer(lambda f: "auto" if f is None else "none" if f == math.inf else f"{f!r} Hz"),
+    WithJsonSchema({"type": "string", "examples": ["auto", "35 Hz", "none"]}),
+]
+
+
+class BandTable(Strict):
+    """The filter of all sensors before the fusion: causal, its delay known to the model; zero phase if smoothed."""
+
+    low_pass: _LowPass = Field(
+        default=None,
+        description="corner of the low pass; none; auto: none where the sensors fit each other, or the widest of 100 "
+        "to 35 Hz above twice the motion under which they do, and notches at lines of the spectrum",
+    )
+    notch: list[_Frequency] = Field(
+        default=[], description="frequencies that are taken out", examples=[["50 Hz"]]
+    )
+
+
 class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
     """The fusion of all sensors."""
 
-    snap: _Snap | None = Field(
+    snap: _Snap = Field(
         default=None,
-        description="spectral density of the angle's fourth derivative; 1e7 rad^2/s^7 if absent, 1e8 from 15 "
-        "states on",
+        description="spectral density of the angle's fourth derivative; auto: 1e7 rad^2/s^7, 1e8 from 15 states on, "
+        "or in a livelier file the smallest of 1e9 to 1e12 that fits",
     )
 
 
@@ -182,6 +215,9 @@ class AoaStudyFile(Strict):
         description="what a simulation adds to the model",
     )
     timing: TimingTable = Field(default=TimingTable(), title="Timing", description="delays of the sensors")
+    band: BandTable = Field(
+        default=BandTable(), title="Band", description="what of the sensors the fusion takes"
+    )
     estimator: EstimatorTable = Field(default=EstimatorTable(), title="Estimator", description="the fusion")
     methods: Stated[Methods] = Field(default=Methods(), title="Methods", description="the paper's way")
     model: Stated[ModelAttitude] = Field(
@@ -218,6 +254,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         prior=_prior(file.prior),
         sensors=sensors,
         timing=_timing(file.timing),
+        band=Band(file.band.low_pass, tuple(each.value for each in file.band.notch)),
         estimator=_estimator(file.estimator, path),
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
@@ -262,7 +299,7 @@ def _flexure(table: FlexureTable, usual: Resonance) -> Resonance:
 def _timing(table: TimingTable) -> Timing:
     """The delays; None for one to be estimated."""
     gyro = table.gyro_delay
-    delay = None if gyro == "estimate" else gyro.value if isinstance(gyro, Quantity) else 0.0
+    delay = gyro.value if isinstance(gyro, Quantity) else None
     common = table.common_delay
     return Timing(delay, 0.0 if common is None else common.value, 0.0 if common is None else common.u)
 

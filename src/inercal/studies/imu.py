@@ -10,15 +10,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from inercal._toml import Strict, check
-from inercal.errors import QuantityError, StudyError
-from inercal.imu.ferraris.names import NAMES
+from inercal.errors import StudyError
 from inercal.imu.settings import (
     TILT,
     TURN,
     AidedSettings,
     Disturbances,
     Exclusion,
-    FerrarisSettings,
     ImuSettings,
     KnownRatesSettings,
     KnownTurnsSettings,
@@ -27,7 +25,12 @@ from inercal.imu.settings import (
     Simulation,
     mounting_of,
 )
-from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.instruments.terms import (
+    ACCELEROMETER_TRIAD,
+    ACCELEROMETERS_IN_A_FRAME,
+    GYRO_G_SENSITIVITY,
+    GYRO_TRIAD,
+)
 from inercal.studies.common import (
     Conditions,
     ConditionsTable,
@@ -37,11 +40,12 @@ from inercal.studies.common import (
     Version,
     site_of,
 )
+from inercal.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.studies.fields import QuantityText, refusal
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
 from inercal.studies.rig import RigTable, chain_of
 from inercal.studies.tables import as_typed, settings_of, table_of
-from inercal.units import Quantity, parse_quantity, parse_unit, shown
+from inercal.units import Quantity, parse_unit, shown
 
 SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
@@ -88,90 +92,13 @@ def aided_settings(table: AidedTable, where: object) -> AidedSettings:
     return AidedSettings(chain, None if azimuth is None else azimuth.u)
 
 
-_EXPECTED = (
-    'expected ["start", "end"] in time, such as ["5.2 s", "12.4 s"], or in samples, such as [540, 1271], or a '
-    "label"
-)
-
-
-def _ends(value: object) -> object:
-    """A section: two times, two sample numbers, or the label of its rows."""
-    match value:
-        case str() if value.strip():
-            return value
-        case [int(start), int(end)] if not isinstance(start, bool) and not isinstance(end, bool):
-            if 0 <= start < end - 1:
-                return value
-        case [str(start), str(end)]:
-            begin, stop = seconds_of(start), seconds_of(end)
-            if begin < stop:
-                return value
-    raise refusal(f"found {shown(value)}, {_EXPECTED}, the end after the start")
-
-
-def seconds_of(text: str) -> float:
-    """A time [s]."""
-    try:
-        return parse_quantity(text, "time", "time").value
-    except QuantityError as error:
-        raise refusal(error.message) from error
-
-
-_Ends = Field(min_length=2, max_length=2)
-
-Section = Annotated[
-    Annotated[list[str], _Ends] | Annotated[list[int], _Ends] | str,
-    BeforeValidator(_ends),
-    Field(examples=[["5.2 s", "12.4 s"], [540, 1271], "X up"]),
-]
-
-
-class SectionsTable(Strict):
-    """Places of the sections: times of the record's time axis, samples from 0, the end not included, or labels."""
-
-    x_p: Section | None = Field(default=None, description="+x up: accelerometer x reads +g")
-    x_a: Section | None = Field(default=None, description="-x up: accelerometer x reads -g")
-    y_p: Section | None = Field(default=None, description="+y up: accelerometer y reads +g")
-    y_a: Section | None = Field(default=None, description="-y up: accelerometer y reads -g")
-    z_p: Section | None = Field(default=None, description="+z up: accelerometer z reads +g")
-    z_a: Section | None = Field(default=None, description="-z up: accelerometer z reads -g")
-    x_rot: Section | None = Field(default=None, description="the turn about x, from rest to rest")
-    y_rot: Section | None = Field(default=None, description="the turn about y, from rest to rest")
-    z_rot: Section | None = Field(default=None, description="the turn about z, from rest to rest")
-
-
-class FerrarisTable(table_of(FerrarisSettings)):  # type: ignore[misc]
-    """Options of the Ferraris calibration: six positions, each axis up and down, and a turn about each axis."""
-
-    sections: SectionsTable = Field(
-        default=SectionsTable(),
-        title="Sections",
-        description="where the sections are; by the labels of the record if absent, or else detected",
-    )
-
-
-def ferraris_settings(table: FerrarisTable) -> FerrarisSettings:
-    """The options in SI."""
-    given = {name: ends for name in NAMES if (ends := getattr(table.sections, name)) is not None}
-    sections = {name: _span(ends) for name, ends in given.items()}
-    return settings_of(FerrarisSettings, table, sections=sections)
-
-
-def _span(ends: list[str] | list[int] | str) -> tuple[float, float] | str:
-    """A section as the settings have it: seconds, samples or a label."""
-    if isinstance(ends, str):
-        return ends
-    start, end = (seconds_of(each) if isinstance(each, str) else each for each in ends)
-    return start, end
-
-
 #: keys that not all methods heed -> those that do
 _METHODS = {
     "static_start": ("multiposition",),
     "g_sensitivity": ("multiposition", "aided"),
     "bias_drift": ("multiposition",),
-    "exclude": ("multiposition", "means"),
-    "k2": ("multiposition", "means", "aided"),
+    "exclude": ("multiposition", "means", "known_rates"),
+    "k2": ("multiposition", "ferraris", "means", "aided"),
     "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
@@ -244,11 +171,19 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         description="of known_turns: standard uncertainty of the direction of the axis of each turn; taken as square "
         "to each other if absent",
     )
+    k2: bool | Typed = Field(
+        default=False,
+        description="second-order coefficients of the accelerometers, K1 (f + K2 f^2), f along the input axis: true to "
+        "estimate them, or 0 with the standard uncertainty they have where they are not; by default 30 ug/g^2 where "
+        "the mean specific force scatters by 20 ug at most from pose to pose, else 150 ug/g^2",
+        examples=["0(50) ug/g^2"],
+    )
     exclude: list[Left] = Field(
         default=[],
         examples=[["249 s .. 253 s", "pose 12"]],
         description="what no fit uses: turns that a time of the record's clock touches and poses of which it holds the "
-        "middle, and poses by their numbers, which stay as without this key",
+        "middle, and poses by their numbers, which stay as without this key; of known_rates orientations, counted "
+        "through all files",
     )
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
@@ -270,8 +205,18 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         return self
 
 
+#: keys of simulations that not all methods heed -> those that do
+_SIMULATED = {
+    "poses": ("multiposition",),
+    "start": ("multiposition", "aided"),
+    "restless_start": ("multiposition", "ferraris"),
+    "lever_arm": ("aided",),
+    "delay": ("aided",),
+}
+
+
 class ImuDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
-    """Disturbances that a simulation adds to a recording by hand; none if absent."""
+    """Disturbances that a simulation adds to a recording; none if absent."""
 
     k2: Typed | None = Field(
         default=None, description="second-order coefficient of all accelerometers", examples=["30 ug/g^2"]
@@ -279,7 +224,7 @@ class ImuDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
 
 
 class SimulationTable(table_of(Simulation)):  # type: ignore[misc]
-    """A simulated recording: the instrument lies still, then is turned from pose to pose by hand."""
+    """A simulated recording: by hand from pose to pose, in six positions and three turns, or on a table."""
 
     coefficients: dict[str, Typed] = Field(
         default_factory=dict,
@@ -305,6 +250,19 @@ class ImuStudyFile(Strict):
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
+    @model_validator(mode="after")
+    def _of_the_method(self) -> ImuStudyFile:
+        """Refuse what the simulation of the method does not heed."""
+        for table, given in (("simulation", self.simulation), ("disturbances", self.disturbances)):
+            for key in sorted(given.model_fields_set):
+                methods = _SIMULATED.get(key, ())
+                if methods and self.imu.method not in methods:
+                    raise refusal(
+                        f"{table}.{key}: found with method = {self.imu.method!r}, expected it with "
+                        f"{' or '.join(methods)} only"
+                    )
+        return self
+
 
 def _method(table: ImuTable, path: str | Path) -> Method | None:
     """The options of a method other than multi-position, in SI."""
@@ -327,6 +285,27 @@ def _method(table: ImuTable, path: str | Path) -> Method | None:
     return None
 
 
+def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
+    """True where K2 is estimated, and its standard deviation about 0 [1/(m/s^2)] where that is stated."""
+    if isinstance(table.k2, bool):
+        if table.k2 and table.method == "ferraris":
+            raise StudyError(
+                path,
+                "imu.k2: found true with method = 'ferraris', expected \"0(50) ug/g^2\": its six "
+                "positions do not tell K2 from K0",
+            )
+        return table.k2, None
+    if table.method == "aided":
+        raise StudyError(path, "imu.k2: found an uncertainty with method = 'aided', expected true or false")
+    value, u = coefficient_of(table.k2, "K2_x", "accelerometer", parse_unit("count"), gravity, "imu.k2", path)
+    if value != 0.0:
+        raise StudyError(
+            path,
+            f'imu.k2: found {shown(table.k2)}, expected true or 0 with an uncertainty, such as "0(50) ug/g^2"',
+        )
+    return False, u
+
+
 def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
     """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
 
@@ -334,21 +313,28 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
     """
     file = check(ImuStudyFile, data, path, StudyError)
     site, count = site_of(file.site, path), parse_unit("count")
-    known = (*ACCELEROMETER_TRIAD, *GYRO_TRIAD, *GYRO_G_SENSITIVITY)
+    known = (
+        *(ACCELEROMETER_TRIAD if file.imu.method == "multiposition" else ACCELEROMETERS_IN_A_FRAME),
+        *GYRO_TRIAD,
+        *GYRO_G_SENSITIVITY,
+    )
     truth = {}
     for symbol, text in file.simulation.coefficients.items():
         key = f"simulation.coefficients.{symbol}"
         check_symbol(symbol, known, key, path)
-        kind = "accelerometer" if symbol in ACCELEROMETER_TRIAD else "gyro"
+        kind = "accelerometer" if symbol in ACCELEROMETERS_IN_A_FRAME else "gyro"
         truth[symbol], _ = coefficient_of(text, symbol, kind, count, site.gravity, key, path)
     other, k2 = file.disturbances, 0.0
     if other.k2 is not None:
         k2, _ = coefficient_of(
             other.k2, "K2_x", "accelerometer", count, site.gravity, "disturbances.k2", path
         )
+    fitted, k2_u = _k2(file.imu, site.gravity, path)
     return settings_of(
         ImuSettings,
         file.imu,
+        k2=fitted,
+        k2_u=k2_u,
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),

@@ -27,7 +27,16 @@ from inercal.studies.positions import GridTable, PlanName, PositionsTable, compa
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
 from inercal.studies.tables import as_typed, settings_of, table_of
 from inercal.studies.tolerances import CostsTable, WantedTable, tolerances_of
-from inercal.turntable.settings import Analysis, Constraint, Design, Disturbances, RateTest, TurntableSettings
+from inercal.turntable.settings import (
+    Analysis,
+    Constraint,
+    Design,
+    Disturbances,
+    Leg,
+    RateTest,
+    StepTest,
+    TurntableSettings,
+)
 from inercal.units import Quantity, Unit, parse_quantity
 
 _OF_OUTPUTS = ("ramp", "warm_up", "random_walk", "dead_zone", "hysteresis", "magnetic")
@@ -164,6 +173,12 @@ class AnglesTable(Strict):
     phi3: Angle | None = Field(default=None, description="of the inner axis of three; 0 if absent")
 
 
+class LegTable(AnglesTable):
+    """A part of a rate test: the axis that turns, and angles at which it begins."""
+
+    joint: Literal["phi1", "phi2", "phi3"] = Field(description="axis that turns")
+
+
 class RateTestTable(table_of(RateTest)):  # type: ignore[misc]
     """A rate test of gyros: the table turns at each rate in turn."""
 
@@ -172,6 +187,22 @@ class RateTestTable(table_of(RateTest)):  # type: ignore[misc]
         title="At",
         description="angles of a simulation, where each stay begins",
         examples=[{"phi1": "90 deg"}],
+    )
+    legs: list[LegTable] = Field(
+        default=[],
+        description="axes of a simulation that turn one after the other; joint alone if absent",
+        examples=[[{"joint": "phi1"}, {"joint": "phi1", "phi2": "90 deg"}, {"joint": "phi2"}]],
+    )
+
+
+class StepTestTable(table_of(StepTest)):  # type: ignore[misc]
+    """A test by small steps about level: threshold, dead zone and hysteresis of accelerometers."""
+
+    at: AnglesTable = Field(
+        default=AnglesTable(),
+        title="At",
+        description="angles of a simulation, where the accelerometer is level",
+        examples=[{"phi2": "90 deg"}],
     )
 
 
@@ -193,6 +224,9 @@ class TurntableStudyFile(Strict):
     design: DesignTable = Field(default=DesignTable(), title="Design", description="the search for positions")
     rate_test: RateTestTable | None = Field(
         default=None, title="Rate test", description="a rate test; none if absent"
+    )
+    step_test: StepTestTable | None = Field(
+        default=None, title="Step test", description="a test by small steps about level; none if absent"
     )
     disturbances: TableDisturbancesTable = Field(
         default=TableDisturbancesTable(),
@@ -227,6 +261,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         instrument=instrument,
         limits=limits,
         rate_test=None if file.rate_test is None else _rate_test(file.rate_test, chain, path),
+        step_test=None if file.step_test is None else _step_test(file.step_test, chain, path),
         disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
         tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
         traceability=file.traceability.model_dump(),
@@ -262,9 +297,25 @@ def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> 
 def _rate_test(table: RateTestTable, chain: Chain, where: object) -> RateTest:
     """A rate test."""
     _known([table.joint], chain.joints, "rate_test.joint", where)
-    at = {joint: angle.value for joint in AnglesTable.model_fields if (angle := getattr(table.at, joint))}
-    _known(list(at), chain.joints, "rate_test.at", where)
-    return settings_of(RateTest, table, at=at)
+    for k, leg in enumerate(table.legs):
+        _known([leg.joint], chain.joints, f"rate_test.legs.{k}.joint", where)
+    legs = tuple(
+        Leg(leg.joint, _at(leg, chain, f"rate_test.legs.{k}", where)) for k, leg in enumerate(table.legs)
+    )
+    return settings_of(RateTest, table, at=_at(table.at, chain, "rate_test.at", where), legs=legs)
+
+
+def _step_test(table: StepTestTable, chain: Chain, where: object) -> StepTest:
+    """A test by small steps."""
+    _known([table.joint], chain.joints, "step_test.joint", where)
+    return settings_of(StepTest, table, at=_at(table.at, chain, "step_test.at", where))
+
+
+def _at(table: AnglesTable, chain: Chain, key: str, where: object) -> dict[str, float]:
+    """Angles [rad] by joint, those that are stated."""
+    at = {joint: angle.value for joint in AnglesTable.model_fields if (angle := getattr(table, joint))}
+    _known(list(at), chain.joints, key, where)
+    return at
 
 
 def _known(names: Sequence[str], choices: Sequence[str], key: str, where: object) -> None:

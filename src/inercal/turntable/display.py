@@ -25,7 +25,7 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
     """
     gravity = float(estimate.conditions.get("site", {}).get("gravity_m_s2", STANDARD_GRAVITY))
     shown = [
-        per_g(name, *shown_unit(text, unit), gravity)
+        per_g(name, *_shown(text, unit), gravity)
         for name, text in zip(estimate.names, estimate.units, strict=True)
     ]
     return replace(
@@ -39,6 +39,11 @@ def displayed(estimate: Estimate, unit: Unit) -> Estimate:
         conditions=_conditions(estimate.conditions, unit),
         result=_result(estimate.result, unit),
     )
+
+
+def _shown(text: str, unit: Unit) -> tuple[str, float]:
+    """Unit of a coefficient for people; inputs (a dead zone) are in ug whatever the output is in."""
+    return shown_unit(text) if text == "m/s^2" != unit.si else shown_unit(text, unit)
 
 
 def per_g(name: str, text: str, size: float, gravity: float) -> tuple[str, float]:

@@ -40,14 +40,18 @@ class Limits:
     """Probability by chance of the score of a fault below which it is fitted."""
 
     doubtful: float = 0.03
-    """Probability by chance of a fault below which its shift counts in u, though it is not significant."""
+    """Probability by chance of a fault below which it counts in u with the probability that it is there, though it is
+    not significant."""
+
+    fault_odds: float = 0.5
+    """Odds, before a test, that it has one of the faults that are asked for."""
 
     harmful_shift: float = 0.5
     """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
 
-    blind_shift: float = 1.0
-    """Shift of a value, over u, by a fault as large as its own standard uncertainty, beyond which a finding says that
-    the test would not show it."""
+    blind_shift: float = 4.0
+    """Shift of a value, over u, by a fault that is named in half of the tests, beyond which a finding says that the
+    residuals might not show it; of a larger one so much counts in u."""
 
     drift_sigmas: float = 4.0
     """Standard uncertainties by which drift within the dwells may differ from that between them to be used with it."""
@@ -79,6 +83,18 @@ class Limits:
     across_cosine: float = 1e-3
     """Cosine of turning axis and a gyro axis below which the gyro lies across: of a misalignment of 10 mrad towards a
     third axis 2 arcsec pass for one towards the turning axis."""
+
+    small_step: float = 0.5
+    """Specific force [m/s^2] along the axis of an accelerometer up to which a tilt is a small one about level."""
+
+    fewest_steps: int = 10
+    """Steps of a test of threshold and dead zone, and distinct angles among them, at least."""
+
+    edge_at_end: float = 0.05
+    """Probability that a dead zone reaches as far as the steps beyond which nothing bounds it."""
+
+    term_sigmas: float = 3.0
+    """Dead zone and hysteresis, over their standard uncertainties, from which a finding names them."""
 
     scatter_dof: int = 3
     """Readings beyond the terms of a cubic from which the noise beside the curve of a rate test is estimated."""

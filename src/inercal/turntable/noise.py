@@ -23,6 +23,9 @@ from inercal.turntable.weights import Weights, whitened
 STEPS = 60
 """Scoring steps at most; a dozen do unless a channel has no noise at all."""
 
+TINY = 1e-100
+"""Least information about the logarithm of a variance."""
+
 LONGEST = 3.0
 """Change of log s^2 in a step at most."""
 
@@ -89,7 +92,9 @@ def scatter(
             break
     s2 = np.exp(log)[free]
     of_log = now.information[np.ix_(free, free)] * s2 * s2[:, None]
-    dof[free] = 2.0 / np.diag(np.linalg.pinv(of_log))
+    # of a variance that is estimated as none the readings know next to nothing
+    size = np.sqrt(np.maximum(np.diag(of_log), TINY))
+    dof[free] = 2.0 * np.square(size) / np.diag(np.linalg.pinv(of_log / np.outer(size, size)))
     return ReadingNoise(np.exp(0.5 * log), dof, now.value)
 
 

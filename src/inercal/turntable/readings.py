@@ -47,7 +47,7 @@ class Readings:
     findings: tuple[Finding, ...] = ()
 
 
-def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
+def readings(record: Record, joints: tuple[str, ...], kind: str, by_row: bool = False) -> Readings:
     """Find the positions of a record and average over them.
 
     Rows belong to one position while ``position`` keeps its number, or, where there is no such column, while the
@@ -57,6 +57,8 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     ----------
     record : Record
         Angles of the ``joints``, and any channels of an instrument of that ``kind``.
+    by_row : bool
+        Without a column ``position`` each row is a position, however near its angles are to those of the one before.
 
     Raises
     ------
@@ -91,7 +93,13 @@ def readings(record: Record, joints: tuple[str, ...], kind: str) -> Readings:
     if len(angles) != len(columns[0].values):
         raise RecordError(where, f"{joints[0]} and {channels[0]} have different lengths, expected one table")
     values = np.stack([column.values for column in columns], axis=-1) * columns[0].unit.factor
-    groups, short = (_by_number(record, angles, where), []) if "position" in record else _by_angle(angles)
+    short: list[NDArray[np.int64]] = []
+    if "position" in record:
+        groups = _by_number(record, angles, where)
+    elif by_row:
+        groups = list(np.flatnonzero(np.isfinite(angles).all(axis=1))[:, None])
+    else:
+        groups, short = _by_angle(angles)
     if not groups:
         raise RecordError(where, "found no rows with angles, expected one or more for each position")
     means = _averaged(angles, values, columns[0].t, groups, channels, columns[0].unit, where)

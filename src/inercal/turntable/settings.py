@@ -10,7 +10,17 @@ from typing import Any, Literal
 from inercal.arrays import short_repr
 from inercal.designs.tolerances import Price
 from inercal.geometry.site import Site
-from inercal.keys import FREQUENCY, RATE, RELATIVE_U, TIME, option, quantities, quantity, within
+from inercal.keys import (
+    FREQUENCY,
+    RATE,
+    RELATIVE_U,
+    TIME,
+    above_zero,
+    option,
+    quantities,
+    quantity,
+    within,
+)
 from inercal.rigs.chain import Chain
 from inercal.rigs.plans import Plan
 from inercal.units import Quantity, Unit
@@ -130,13 +140,22 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
+class Leg:
+    """A part of a rate test: the ``joint`` that turns, and angles [rad] ``at`` which it begins; 0 where absent."""
+
+    joint: str
+    at: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class RateTest:
     """A rate test of gyros: the table turns at each rate in turn, by whole turns or not.
 
     ``at`` holds angles [rad] of a simulation: where the other joints stand and each stay begins; 0 where absent.
+    ``legs`` are those of a simulation in which several axes turn, one after the other, each at all rates.
     """
 
-    joint: str = option("axis that turns", "phi2")
+    joint: str = option("axis that turns, where no column joint of the record says", "phi2")
     full_scale: float | None = quantity(
         "rate that non-linearity is stated against; the largest if absent", "rate", example="100 deg/s",
         bounds=RATE,
@@ -149,6 +168,28 @@ class RateTest:
         "relative standard uncertainty of the table's rate, common to all rates", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="rate_uncertainty",
     )  # fmt: skip
+    at: Mapping[str, float] = field(default_factory=dict)
+    legs: tuple[Leg, ...] = ()
+
+
+@dataclass(frozen=True)
+class StepTest:
+    """A test of accelerometers by small steps about level; all but its being there is for a simulation.
+
+    ``at`` holds angles [rad] at which the table is level; 0 where absent.
+    """
+
+    joint: str = option("axis that tilts; for simulate", "phi1")
+    largest: float = quantity(
+        "largest tilt to either side; for simulate", "angle", "60 arcsec", bounds=above_zero("an angle")
+    )
+    step: float = quantity(
+        "change of the tilt from step to step; for simulate",
+        "angle",
+        "2 arcsec",
+        bounds=above_zero("an angle"),
+    )
+    cycles: int = option("times up, down and back; for simulate", 2, least=1, most=1000)
     at: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -224,6 +265,7 @@ class TurntableSettings:
     instrument: Instrument = Instrument()
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rate_test: RateTest | None = None
+    step_test: StepTest | None = None
     disturbances: Disturbances = Disturbances()
     tolerances: Tolerances = Tolerances()
     traceability: Mapping[str, str] = field(default_factory=dict)

@@ -15,11 +15,13 @@ from inercal.convert.other_tools import from_tool, to_tool
 from inercal.estimate.result import Estimate
 from inercal.geometry.site import Site
 from inercal.imu.ferraris.method import NAMES
-from inercal.imu.ferraris.simulate import Session, draw_full_truth, quiet, simulate_session, true_values
+from inercal.imu.ferraris.simulate import Session, quiet, simulate_session, true_values
 from inercal.imu.settings import FerrarisSettings, ImuSettings
+from inercal.imu.simulate import draw_full_truth
 from inercal.imu.task import calibrate
 from inercal.imu.temperature.sweep import fit_recording
 from inercal.studies.load import load_imu_study
+from inercal.validate import rows
 from inercal.validate.case import Case, record_of, study_of
 
 _AXES = "xyz"
@@ -331,4 +333,5 @@ CASES = (
         )
         for tool in ("imu_tk", "imucal", "kalibr", "psins")
     ),
+    *rows.CASES,
 )

@@ -22,6 +22,7 @@ from inercal.turntable.task import calibrate
 from inercal.units import parse_unit
 from inercal.validate.case import Case
 from inercal.validate.gyrowheel import TABLE, one_turntable_calibration, settings_of
+from inercal.validate.table import TABLE_CASES
 
 _ARCMIN = np.radians(1.0 / 60.0)
 _CHAIN = turntable(TABLE, uniform(2.0 * _ARCMIN))
@@ -193,4 +194,5 @@ CASES = (
         4.5 * (2.0 / (24.0 * _RUNS)) ** 0.5,
         _nees,
     ),
+    *TABLE_CASES,
 )

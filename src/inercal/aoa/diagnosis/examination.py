@@ -185,7 +185,7 @@ def _livelier(settings: AoaSettings, snap: float) -> AoaSettings:
 def _of_snap(settings: AoaSettings, snap: float) -> Finding:
     """``unmodelled``: a larger snap makes a recording fit."""
     text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
-    advice = f'write snap = "{snap:.3g} rad^2/s^7" under [estimator]'
+    advice = f'write snap = "{snap:.3g} rad^2/s^7" or "auto" under [estimator]'
     return Finding("unmodelled", f"{text}: {advice}", harm=EVERYTHING)
 
 

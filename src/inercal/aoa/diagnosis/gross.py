@@ -118,15 +118,17 @@ def _of_gyro() -> Iterator[Hypothesis[Case]]:
 
 def _of_clock(recording: Recording, settings: AoaSettings, shown: Array) -> Iterator[Hypothesis[Case]]:
     """A gyro that is late, or one that does not measure pitch."""
-    if settings.timing.gyro_delay is not None:
-        delay = relative_delay(recording, settings.layout)
-        shift = 0.0 if delay is None else delay.value - settings.timing.gyro_delay
-        if delay is not None and abs(shift) > LIMITS.delay_sigmas * delay.u:
-            value = f"{1e3 * delay.value:.2g} ms"
+    stated, delay = settings.timing.gyro_delay, relative_delay(recording, settings.layout)
+    if delay is not None:
+        shift = delay.value - (stated or 0.0)
+        # an estimated delay is taken up as far as its prior goes
+        expected = LIMITS.prior_sigmas * settings.prior.gyro_delay if stated is None else 0.0
+        if abs(shift) > max(LIMITS.delay_sigmas * delay.u, expected):
+            value, other = f"{1e3 * delay.value:.2g} ms", "" if stated is None else ' or "estimate"'
             how = "later" if shift > 0.0 else "earlier"
             text = (
                 f"gyro comes {1e3 * abs(shift):.2g} ms {how} than the accelerometers and the study say: write "
-                f'gyro_delay = "{value}" or "estimate" under [timing]'
+                f'gyro_delay = "{value}"{other} under [timing]'
             )
             yield _fault("command_shift", text, lambda r, s: (aligned(r, shift), s))
     if _follows(recording, shown, settings.noise.gyro):

@@ -12,12 +12,16 @@ them: this removes biases of the gyros and keeps oscillations that the kept time
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.loop import OUTPUTS
+from inercal.aoa.band import WHOLE
+from inercal.aoa.fusion import band
+from inercal.aoa.fusion.ahead import between, carried_on
+from inercal.aoa.fusion.band import BandFilter
+from inercal.aoa.fusion.loop import MOTION, NO_MOTIONS, OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, State, Trace, advance, initial
 from inercal.aoa.fusion.smoother import smooth
@@ -74,15 +78,72 @@ def estimate(
 ) -> FilterResult:
     """Angles of a recording, causal or from all of it; raises `RecordError` where time does not go on."""
     clock = time.perf_counter()
+    if (of := band.filter_of(problem.band)) is not None:
+        return replace(_limited(recording, problem, of, smoothed, where), seconds=time.perf_counter() - clock)
+    return _estimate(recording, problem, smoothed, where, NO_MOTIONS)
+
+
+def _limited(
+    recording: Recording, problem: FilterProblem, of: BandFilter, smoothed: bool, where: object
+) -> FilterResult:
+    """The angles of a recording that is limited to a band: of the rows that are fused, carried on to all."""
+    taken = later(recording.t, where=where)
+    t, rows = recording.t[taken], recording.rows[taken]
+    fused = (
+        band.zero_phase(of, t, rows)
+        if smoothed
+        else band.causal(of, band.initial(of, rows.shape[1]), t, rows)
+    )
+    inner = replace(problem, band=WHOLE)
+    motions = np.full((len(fused.t), MOTION), np.nan)
+    result = _estimate(fused.recording(problem.count), inner, smoothed, where, motions)
+    if smoothed:
+        known = (result.theta, result.u, result.rate, result.rate_u, result.acceleration)
+        angles, roll = between(fused.t, known, t), None
+    else:
+        # the rows by which the filter starts are answered, as they come, without an angle
+        for start in result.starts:
+            motions[start : start + LIMITS.starting_rows - 1] = np.nan
+        there = fused.at >= 0
+        angles, roll = np.full((len(t), OUTPUTS), np.nan), np.full((len(t), 2), np.nan)
+        carried = carried_on(motions[fused.at[there]], t[there] - fused.t[fused.at[there]], problem.constants)
+        angles[there], roll[there] = carried[:, :OUTPUTS], carried[:, OUTPUTS:]
+        roll[:, 0] = principal(roll[:, 0])
+    n, came = len(recording.t), taken[fused.came]
+    motion, innovations = np.full((n, OUTPUTS), np.nan), np.full((n, problem.count + 1), np.nan)
+    motion[taken], innovations[came] = angles, result.innovations
+    rolls = np.full((n, 2), np.nan)
+    if roll is not None:
+        rolls[taken] = roll
+    tracked = problem.spatial and not smoothed
+    return replace(
+        result,
+        theta=motion[:, 0],
+        u=motion[:, 1],
+        rate=motion[:, 2],
+        rate_u=motion[:, 3],
+        acceleration=motion[:, 4],
+        innovations=innovations,
+        starts=tuple(int(came[k]) for k in result.starts),
+        roll=rolls[:, 0] if tracked else None,
+        roll_u=rolls[:, 1] if tracked else None,
+    )
+
+
+def _estimate(
+    recording: Recording, problem: FilterProblem, smoothed: bool, where: object, motions: Array
+) -> FilterResult:
+    """Angles of a recording without a band; ``motions`` as of `inercal.aoa.fusion.run.advance`."""
+    clock = time.perf_counter()
     taken = later(recording.t, where=where)
     t, rows = recording.t[taken], recording.rows[taken]
     every = max(1, len(t) // KEPT)
     if problem.spatial and not smoothed:
-        state, trace, kept, rolls = _with_roll(problem, t, rows, every)
+        state, trace, kept, rolls = _with_roll(problem, t, rows, every, motions)
     else:
         rolls = None
         kept = np.full(((len(t) + every - 1) // every, 2 * problem.size), np.nan)
-        state, trace = advance(initial(problem), problem, t, rows, kept, every, last=True)
+        state, trace = advance(initial(problem), problem, t, rows, kept, every, last=True, motions=motions)
     angles = trace.out[:, :OUTPUTS]
     if smoothed:
         kept[:] = np.nan
@@ -126,7 +187,7 @@ def roll_of(problem: FilterProblem, kept: Array) -> Array:
 
 
 def _with_roll(
-    problem: FilterProblem, t: Array, rows: Array, every: int
+    problem: FilterProblem, t: Array, rows: Array, every: int, motions: Array
 ) -> tuple[State, Trace, Array, Array]:
     """The causal filter's state and trace, states kept at each ``every``-th row, and roll (n, 2) at each.
 
@@ -138,7 +199,9 @@ def _with_roll(
     for a in range(0, max(1, len(t)), _BLOCK):
         b, held = min(a + _BLOCK, len(t)), len(state.held)
         states = np.full((held + b - a, 2 * problem.size), np.nan)
-        state, trace = advance(state, problem, t[a:b], rows[a:b], states, last=b == len(t))
+        state, trace = advance(
+            state, problem, t[a:b], rows[a:b], states, last=b == len(t), motions=motions[a - held : b]
+        )
         answered = len(trace.out)
         starts += [each._replace(row=each.row + done) for each in trace.starts]
         parts.append(

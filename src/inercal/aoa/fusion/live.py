@@ -80,7 +80,7 @@ class Live:
         self._out = np.empty((1, OUTPUTS + problem.count + 1))
         self._kept = np.empty((int(problem.spatial), 2 * problem.size))
         rows, kept = Rows(self._dt, self._row), Kept(self._kept, 1, 0)
-        self._arguments = rows, problem.model, self._out, kept, loop.NONE
+        self._arguments = rows, problem.model, self._out, kept, loop.NONE, loop.NO_MOTIONS
         belief = Belief(self._fusion.x, self._fusion.P, self._fusion.turns)
         self._advance = compiled(loop._advance, belief, *self._arguments)
 

@@ -44,6 +44,9 @@ _TURNS = 1e3
 OUTPUTS = 5
 """Columns of a row of output before the innovations: theta, its u, rate, its u, acceleration."""
 
+MOTION = 25
+"""Columns of a motion that is carried on from a row (`inercal.aoa.fusion.ahead`)."""
+
 BESIDE = 5
 """Columns of a row of measurements after the accelerometers: gyro, a stated angle and its u, roll and yaw."""
 
@@ -81,6 +84,8 @@ class Kept(NamedTuple):
 
 
 NOT_KEPT = Kept(np.empty((0, 0)), 1, 0)
+
+NO_MOTIONS = np.empty((0, MOTION))
 
 
 class Memory(NamedTuple):
@@ -229,7 +234,7 @@ def significant(value: float, variance: float) -> float:
 
 @kernel
 def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleration: float) -> None:
-    """Remove from a row the derivatives by positions and by the gyro's scale where the motion is only noise.
+    """Remove from a row the derivatives by positions and by the gyro's scale and delay where the motion is only noise.
 
     They multiply rate and acceleration. At rest the filter would learn them from noise, and be sure of wrong values.
     """
@@ -241,6 +246,17 @@ def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleratio
                 values[a] *= moved
         if places.scale >= 0 and at[a] == places.scale:
             values[a] *= of_rate
+        if places.delay >= 0 and at[a] == places.delay:
+            values[a] *= of_acceleration
+
+
+@kernel
+def beyond_first_order(P: Array, delay: int) -> float:
+    """Variance of the gyro's reading by the product of a delay and an acceleration that are both uncertain, and by that
+    of its square and half the jerk: where motion is lively, a derivative alone would teach a delay from noise."""
+    of_delay: float = P[delay, delay]
+    beyond: float = of_delay * (P[2, 2] + 0.75 * of_delay * P[3, 3])
+    return beyond
 
 
 @kernel
@@ -256,23 +272,48 @@ def write(x: Array, P: Array, constants: Constants, out: Array, k: int) -> None:
     out[k, 3] = root(rate)
 
 
+@kernel
+def moving(x: Array, P: Array, p: float, y: float, model: Model, out: Array) -> None:
+    """Put theta, rate, acceleration and jerk into ``out`` (`MOTION`,), their covariance, cosine of the roll and rate of
+    theta by yaw, the roll, its u and its rate; ``p``, ``y`` are indications of the roll and yaw gyros."""
+    roll = model.places.roll
+    for i in range(4):
+        out[i] = x[i]
+        for j in range(4):
+            out[4 + 4 * i + j] = P[i, j]
+    out[20], out[21], out[22], out[23], out[24] = 1.0, 0.0, math.nan, math.nan, 0.0
+    if roll >= 0:
+        s, c, st, ct = math.sin(x[roll]), math.cos(x[roll]), math.sin(x[0]), math.cos(x[0])
+        p, y = p - x[roll + 1], y - x[roll + 2]
+        out[20], out[21], out[22], out[23] = c, s * y, x[roll], root(P[roll, roll])
+        out[24] = p + (x[1] * s - y * c) * st * ct / (ct * ct + 1e-4)
+
+
 def advance(
-    belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept = NOT_KEPT, memory: Memory = NONE
+    belief: Belief,
+    rows: Rows,
+    model: Model,
+    out: Array,
+    kept: Kept = NOT_KEPT,
+    memory: Memory = NONE,
+    motions: Array = NO_MOTIONS,
 ) -> int:
     """Go on by m rows; the number of rows done.
 
     ``out`` (m, `OUTPUTS` + N + 1) receives what `write` says and the innovations over their standard deviations;
-    ``memory`` is filled if it has room for m rows.
+    ``memory`` is filled if it has room for m rows, and so are ``motions`` (m, `MOTION`), as of `moving`.
 
     Ends before a row in which theta is lost: its variance is too large, it is no angle any more, or a sensor has
     surprised too often.
     """
-    done: int = _advance(belief, rows, model, out, kept, memory)
+    done: int = _advance(belief, rows, model, out, kept, memory, motions)
     return done
 
 
 @kernel
-def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory) -> int:
+def _advance(
+    belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory, motions: Array
+) -> int:
     """The loop of `advance`."""
     x, P, turns = belief
     intervals, z = rows
@@ -311,6 +352,8 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
             if abs(z[k, i]) < _READING:
                 expected, noise, entries = reading(i, at, z[k, count + 2], model, row)
                 believed(row, entries, places, of_rate, of_acceleration)
+                if i == count and places.delay >= 0 and of_acceleration > 0.0:
+                    noise += beyond_first_order(P, places.delay)
                 v = z[k, i] - expected
                 for a in range(entries):
                     v -= entry[a] * (x[of[a]] - ahead[of[a]])
@@ -327,6 +370,8 @@ def _advance(belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, m
                     scalars[k, i, of[j]] = entry[j]
                 scalars[k, i, 2 * n], scalars[k, i, 2 * n + 1] = v, variance
         write(x, P, constants, out, k)
+        if len(motions) > 0:
+            moving(x, P, p, y, model, motions[k])
         if remember:
             for i in range(d):
                 for j in range(d):

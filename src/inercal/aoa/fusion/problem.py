@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from inercal.aoa.band import WHOLE, Band
 from inercal.aoa.fusion.model import Constants, Model, Places
 from inercal.aoa.layout import Layout
 from inercal.aoa.settings import AoaSettings
@@ -26,7 +27,8 @@ class FilterProblem:
     """The problem of the fusion, without the recording.
 
     ``names`` (n,) of the states; ``mean`` (n,) and ``covariance`` (n, n) of all but the four of motion, which have none
-    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.aoa.fusion.model.Model`.
+    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.aoa.fusion.model.Model`, the noise that
+    of a fused row; ``band`` of the sensors before.
     """
 
     layout: Layout
@@ -36,6 +38,7 @@ class FilterProblem:
     places: Places
     constants: Constants
     geometry: Array
+    band: Band = WHOLE
 
     @cached_property
     def model(self) -> Model:
@@ -118,12 +121,14 @@ def problem(
         a += len(block)
     if spatial and roll is not None:
         mean[parts["roll"]] = roll.value
+    if parts["delay"] >= 0:
+        mean[parts["delay"]] = settings.timing.gyro_delay_about
     moving = np.array([k for k, name in enumerate(names) if name in _MOVING], dtype=np.int64)
     places = Places(n, size, **parts, moving=moving)
     if posterior is not None:
         _known_before(names, mean, covariance, posterior)
     return FilterProblem(
-        layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry
+        layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry, settings.band
     )
 
 
@@ -131,12 +136,13 @@ def _constants(settings: AoaSettings) -> Constants:
     """The constants of a study."""
     noise, timing = settings.noise, settings.timing
     heave, axial = settings.prior.heave, settings.prior.axial
+    every = settings.band.every
     constants = Constants(
         gravity=settings.site.gravity,
         snap=settings.estimator.density,
-        accelerometer_noise=noise.accelerometer**2,
-        gyro_noise=noise.gyro**2,
-        turn_noise=noise.gyro**2,
+        accelerometer_noise=noise.accelerometer**2 / every,
+        gyro_noise=noise.gyro**2 / every,
+        turn_noise=noise.gyro**2 / every,
         gyro_delay=timing.gyro_delay or 0.0,
         common_delay=timing.common_delay,
         common_delay_u=timing.common_delay_u,

@@ -89,13 +89,14 @@ def advance(
     kept: Array | None = None,
     every: int = 1,
     last: bool = False,
+    motions: Array = loop.NO_MOTIONS,
 ) -> tuple[State, Trace]:
     """Go on by rows at the times ``t`` (m,) [s], increasing; ``rows`` (m, N + 5) as of
     `inercal.aoa.fusion.loop.advance`.
 
     The state handed in is used up. Rows that are held have no row in the trace yet: it comes with a later block, or at
     the end, if ``last``. ``kept`` receives states and their standard deviations at each ``every``-th row of the
-    trace.
+    trace, ``motions`` (m, `loop.MOTION`) what the angle is carried on from.
     """
     if kept is None:
         kept = np.empty((0, 2 * problem.size))
@@ -125,7 +126,8 @@ def advance(
             fade(x, P, problem, steps)
         stop = next_fading(t, at, since)
         part = Rows(dt[at:stop], rows[at:stop])
-        done = loop.advance(Belief(x, P, turns), part, problem.model, out[at:stop], Kept(kept, every, at))
+        belief, keep = Belief(x, P, turns), Kept(kept, every, at)
+        done = loop.advance(belief, part, problem.model, out[at:stop], keep, motions=motions[at:stop])
         # an angle that is lost in the row of its start is none
         at, running = (at + done, at + done == stop) if done or running else (end, False)
     before = float(t[at - 1]) if at else before

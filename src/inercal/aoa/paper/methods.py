@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles, continuous
 from inercal.aoa.layout import all_weights, tangential_arms
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper import lever, static
 from inercal.aoa.paper.delay import aligned, relative_delay
 from inercal.aoa.paper.lever import zero_phase
@@ -51,8 +52,9 @@ def label(methods: Methods) -> str:
 def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
     """The angles of a recording by the paper's methods, each row by itself but for filters and differences.
 
-    The gyro is shifted first, by its delay that the study states or that is estimated from the whole recording; the
-    delay common to all sensors is made up for at the end by theta' tau. A roll is that which the study states.
+    The gyro is shifted first, by its delay that the study states or that the spectra of the whole recording plainly
+    show (`Limits.delay_sigmas`); the delay common to all sensors is made up for at the end by theta' tau. A roll is
+    that which the study states.
 
     A row in which accelerometers are missing uses the others if the methods can; otherwise it has no angle. The
     uncertainty is of first order (`inercal.aoa.paper.residuals.error_terms`), without flexure of the sting.
@@ -70,8 +72,9 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
     taken = later(recording.t)
     gyro_delay = settings.timing.gyro_delay
     if gyro_delay is None:
-        estimated = relative_delay(recording, settings.layout)
-        gyro_delay = 0.0 if estimated is None else estimated.value
+        shown = relative_delay(recording, settings.layout)
+        plain = shown is not None and abs(shown.value) > LIMITS.delay_sigmas * shown.u
+        gyro_delay = shown.value if shown is not None and plain else 0.0
     t, acc, gyro = recording.t[taken], recording.acc[taken], aligned(recording, gyro_delay).gyro[taken]
     noise = settings.noise
     acc, compensated = lever.centrifugal(

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.fusion.band import fused
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as stated_problem
 from inercal.aoa.fusion.run import advance, initial
@@ -80,6 +81,10 @@ def parts(
     ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``answered`` (n,) marks
     the rows with an angle; those before the first, as where sensors are switched on late, are left out.
     """
+    first = recording.t[np.argmax(answered)]
+    limited, problem = fused(recording, problem)
+    if limited is not recording:
+        recording, answered = limited, limited.t >= first
     taken = later(recording.t)
     taken = taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.rows[taken]

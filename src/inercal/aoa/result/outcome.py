@@ -103,6 +103,7 @@ def assemble(
         "residual_rms": math.nan if rms is None else rms,
         "nis_mean": filtered.nis_mean,
         "starts": float(len(filtered.starts)),
+        "snap": settings.estimator.density,
     }
     status, message = verdict.of_fusion(recording, filtered, angles, all_findings)
     if status is Status.NOT_CONVERGED:

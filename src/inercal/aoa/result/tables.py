@@ -16,6 +16,7 @@ from inercal.aoa.result.budget import ANGLE
 from inercal.aoa.result.outcome import term_of
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import GYROS, AoaSettings
+from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded, short
 from inercal.estimate.table import Table
@@ -289,10 +290,11 @@ def delays(estimate: Estimate) -> str:
 def _of_gyro(estimate: Estimate, delay: Mapping[str, Any]) -> str:
     """A sentence on the delay of the gyro."""
     estimates = []
-    if "tau_g" in estimate.names:
-        estimates.append((estimate["tau_g"].value, estimate["tau_g"].u, "by the fusion"))
-    elif delay["stated"]:
+    own = estimate.result["posterior"].get("tau_g")
+    if delay["stated"]:
         estimates.append((delay["stated"], 0.0, "as stated"))
+    elif own is not None and own["u"] < UNSEEN * own["prior"]:
+        estimates.append((own["value"], own["u"], "by the fusion"))
     if delay["spectra"] is not None:
         estimates.append((delay["spectra"]["value"], delay["spectra"]["u"], "by the spectra"))
     if not estimates:

@@ -14,6 +14,10 @@ from inercal.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIV
 SQUARES = tuple(f"K2_{axis}" for axis in "xyz")
 """The second-order coefficients of the accelerometers."""
 
+LEVER_ARMS = tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz")
+"""Places of the accelerometers beside the crossing of the axes."""
+
+_DELAYS = {"acc": "tau_a", "gyro": "tau_g"}
 _LETTERS = {"acc": ("K0", "K1", "M"), "gyro": ("D_F", "S", "T")}
 
 
@@ -32,8 +36,16 @@ def names_of(triads: tuple[str, ...], g_sensitivity: bool, squares: bool = False
     return (*ACCELEROMETERS_IN_A_FRAME, *(SQUARES if squares else ()), *gyro)
 
 
-def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]:
-    """Values (p,), their derivatives (p, P) by the unknowns, and variances (p,) of their own."""
+def circumstances_of(triads: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of what belongs to the test: lever arms, and delays of the sensors against the table's angles."""
+    return (*LEVER_ARMS, *(_DELAYS[triad] for triad in triads))
+
+
+def coefficients(fit: Fit, names: tuple[str, ...], lag: float) -> tuple[Array, Array, Array]:
+    """Values (p,), their derivatives (p, P) by the unknowns, and variances (p,) of their own.
+
+    ``lag`` [s] is the time that the angles were taken earlier by before the fit.
+    """
     P = len(fit.x)
     by_name: dict[str, tuple[float, Array, float]] = {}
     for k, sensor in enumerate(fit.sensors):
@@ -60,6 +72,12 @@ def coefficients(fit: Fit, names: tuple[str, ...]) -> tuple[Array, Array, Array]
         row = np.zeros(P)
         row[place], row[own] = 1.0 / fit.x[own], -fit.x[place] / fit.x[own] ** 2
         by_name[name] = (float(fit.x[place] / fit.x[own]), row, 0.0)
+    for name, place in zip(LEVER_ARMS, fit.unknowns.places["lever arm"], strict=True):
+        by_name[name] = (float(fit.x[place]), np.eye(P)[place], 0.0)
+    for triad in fit.identified:
+        # angles that come late are sensors that are early
+        (place,) = fit.unknowns.places[f"time shift of {triad}"]
+        by_name[_DELAYS[triad]] = (-float(fit.x[place]) - lag, -np.eye(P)[place], 0.0)
     chosen = [by_name[name] for name in names]
     return (
         np.array([value for value, _, _ in chosen]),

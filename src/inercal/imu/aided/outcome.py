@@ -13,6 +13,7 @@ from inercal.estimate.budget import TypeB, combine
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status, settled
 from inercal.imu.aided.coefficients import (
+    circumstances_of,
     coefficients,
     names_of,
     of_triad,
@@ -58,8 +59,9 @@ def assemble(
 ) -> Estimate:
     """Put the estimate together."""
     triads = tuple(fit.identified)
-    names = names_of(triads, settings.g_sensitivity, settings.k2)
-    values, rows, own = coefficients(fit, names)
+    of_imu = names_of(triads, settings.g_sensitivity, settings.k2)
+    names = (*of_imu, *circumstances_of(triads))
+    values, rows, own = coefficients(fit, names, lag)
     sources_a = type_a(fit, rows, own, names)
     sources_b = type_b(fit, rows, names, values, settings.site, settings.time_base_u)
     faulty = misfits(fit, names, rows, motion, settings.site.gravity)
@@ -70,12 +72,13 @@ def assemble(
             TypeB("shifts with each turn", tilt, "rad", np.eye(len(names))[:, crossed], redrawn=True)
         )
     plain = combine(names, [*sources_a, *sources_b])
-    u = dict(zip(names, plain.u.tolist(), strict=True))
-    judged = verdict(fit, dict(zip(names, values.tolist(), strict=True)), u, len(rests), faulty)
+    u = dict(zip(of_imu, plain.u.tolist(), strict=False))
+    judged = verdict(fit, dict(zip(of_imu, values.tolist(), strict=False)), u, len(rests), faulty)
     sources_b += [TypeB(f"misfit ({each.code})", 1.0, "1", each.shift, redrawn=True) for each in faulty]
     symbols = {triad: of_triad(fit, triad)[0].side.blocks.triad.unit.symbol for triad in triads}
     units = [
-        TERMS[name].unit_for(symbols["acc" if name.startswith(("K", "M")) else "gyro"]) for name in names
+        TERMS[name].unit_for(symbols["gyro" if name.startswith(("D_", "S_", "T_", "G_")) else "acc"])
+        for name in names
     ]
     return Estimate.of(
         _basis(record, settings, _conditions(record, fit, settings)),

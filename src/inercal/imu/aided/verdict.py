@@ -36,7 +36,9 @@ def verdict(
     triads = tuple(fit.identified)
     limit = np.array(list(u.values()))
     for fault in faults:
-        if fault.part > LIMITS.fault_part and np.any(np.abs(fault.shift) > LIMITS.fault_shift * limit):
+        if fault.part > LIMITS.fault_part and np.any(
+            np.abs(fault.shift[: len(limit)]) > LIMITS.fault_shift * limit
+        ):
             return Status.INCONSISTENT, fault.message
     for triad in triads:
         wrong = _unit_words(fit, triad)

@@ -17,8 +17,17 @@ from inercal.imu.ferraris.method import NAMES, coefficients
 from inercal.imu.ferraris.names import NAMES as SECTIONS
 from inercal.imu.ferraris.names import POSITIONS, TURNS, in_words
 from inercal.imu.ferraris.sections import Sections
-from inercal.imu.ferraris.uncertainty import Propagation, doubtful_turns, noise_covariance, type_a, type_b
+from inercal.imu.ferraris.uncertainty import (
+    Propagation,
+    doubtful_turns,
+    mean_noise,
+    noise_covariance,
+    second_order,
+    type_a,
+    type_b,
+)
 from inercal.imu.ferraris.verdict import too_few, verdict
+from inercal.imu.second_order import k2_finding, k2_size
 from inercal.imu.settings import COMMAND, MASKED, FerrarisSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
@@ -59,7 +68,8 @@ def assemble(
     from_outside = type_b(errors, settings.site, settings.time_base_u, options, acc_unit, gyro_unit)
     if sections.turns is not None:
         from_outside += doubtful_turns(errors, sections.turns.doubt)
-    uncertainty = combine(NAMES, [*from_data, *from_outside])
+    size = k2_size(settings, mean_noise(errors))
+    uncertainty = combine(NAMES, [*from_data, *from_outside, *second_order(errors, size)])
     residual = np.sum([source.covariance for source in from_data], axis=0)
     gain = np.abs(np.diag(errors.solution.force_gain))
     left = scatter.left["acc"] / gain
@@ -70,7 +80,11 @@ def assemble(
         values,
         uncertainty,
         verdict(readings, scatter, against, options),
-        findings=(*settled(record.findings, *MASKED), *findings),
+        findings=(
+            *settled(record.findings, *MASKED),
+            *findings,
+            *k2_finding(NAMES, uncertainty, settings, size),
+        ),
         statistics={
             "dof": float(scatter.fits["acc"].dof),
             "condition": scatter.fits["acc"].identifiability.condition,

@@ -12,7 +12,17 @@ from inercal.geometry.earth import earth_rate
 from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
 from inercal.imu.ferraris.method import NAMES
 from inercal.imu.ferraris.names import POSITIONS, TURNS, UP
-from inercal.imu.simulate import ImuTruth, Noise, draw_truth, record_of_counts, wandering_noise
+from inercal.imu.settings import Disturbances, FerrarisSettings, ImuSettings
+from inercal.imu.simulate import (
+    ImuTruth,
+    Noise,
+    draw_full_truth,
+    indicated,
+    record_of_counts,
+    trembling,
+    wandering_noise,
+    with_values,
+)
 from inercal.instruments.triad import TriadModel
 from inercal.records.record import Record
 
@@ -43,13 +53,6 @@ class Session:
     pause: float = 1.0
 
 
-def draw_full_truth(rng: np.random.Generator, g_sensitivity: float = 2e-4) -> ImuTruth:
-    """As `inercal.imu.simulate.draw_truth`, with all six misalignments of the accelerometers."""
-    truth = draw_truth(rng, g_sensitivity)
-    misalignment = truth.accelerometer.misalignment + np.tril(rng.normal(0.0, 0.02, (3, 3)), -1)
-    return replace(truth, accelerometer=replace(truth.accelerometer, misalignment=misalignment))
-
-
 def true_values(truth: ImuTruth) -> Array:
     """The coefficients (33,) in the order of `NAMES`."""
     values = truth.values()
@@ -58,8 +61,15 @@ def true_values(truth: ImuTruth) -> Array:
     return np.array([values[name] for name in NAMES])
 
 
-def simulate_session(truth: ImuTruth, session: Session, rng: np.random.Generator) -> tuple[Record, ImuTruth]:
+def simulate_session(
+    truth: ImuTruth,
+    session: Session,
+    rng: np.random.Generator,
+    disturbances: Disturbances = Disturbances(),  # noqa: B008  (frozen)
+) -> tuple[Record, ImuTruth]:
     """Record a session: x_p, x_a, .. z_a, then each axis upright again and turned about.
+
+    ``disturbances`` are all but the error of the clock, which is that of the session.
 
     Returns
     -------
@@ -111,11 +121,20 @@ def simulate_session(truth: ImuTruth, session: Session, rng: np.random.Generator
             add("", *_motion(attitude, after * axis, 0.5 * session.way, session.rate))
             attitude = multiply(attitude, exp(after * axis))
         stay("", attitude, session.rest)
-    return _outputs(truth, session, np.concatenate(q), np.concatenate(rates), labels, rng)
+    if disturbances.restless_start > 0.0:
+        size = disturbances.restless_start
+        q[0], rates[0] = trembling(q[0][0], len(q[0]), session.rate, size, rng)
+    return _outputs(truth, session, np.concatenate(q), np.concatenate(rates), labels, rng, disturbances)
 
 
 def _outputs(
-    truth: ImuTruth, session: Session, q_nb: Array, omega: Array, labels: list[str], rng: np.random.Generator
+    truth: ImuTruth,
+    session: Session,
+    q_nb: Array,
+    omega: Array,
+    labels: list[str],
+    rng: np.random.Generator,
+    disturbances: Disturbances,
 ) -> tuple[Record, ImuTruth]:
     """The record that the instrument gives, and the truth with the biases of this record."""
     to_body, n, rate = conjugate(q_nb), len(q_nb), session.rate
@@ -125,8 +144,9 @@ def _outputs(
     f = rotate(to_body, np.array([0.0, 0.0, session.gravity]))
     f_error, f_wander = wandering_noise(truth.accelerometer_noise, n, rate, rng)
     w_error, w_wander = wandering_noise(truth.gyro_noise, n, rate, rng)
-    acc = truth.accelerometer.indicate(f + f_error)
-    gyro = truth.gyro.indicate(omega + w_error) + f @ truth.g_sensitivity.T
+    rows = [np.flatnonzero(np.array(labels) == name) for name in TURNS]
+    turned = [slice(int(each[0]), int(each[-1]) + 1) for each in rows]
+    acc, gyro = indicated(truth, f, omega, (f_error, w_error), turned, rate, disturbances, rng)
     record = record_of_counts(np.arange(n, dtype=np.float64) * (session.clock / rate), acc, gyro)
     held = np.isin(labels, POSITIONS)
     return replace(record, labels=tuple(labels)), replace(
@@ -171,3 +191,25 @@ def _motion(start: Array, step: Array, length: float, rate: float) -> tuple[Arra
 def quiet(truth: ImuTruth) -> ImuTruth:
     """The same instrument without noise."""
     return replace(truth, accelerometer_noise=Noise(0.0), gyro_noise=Noise(0.0))
+
+
+def simulate_study(settings: ImuSettings, options: FerrarisSettings, rng: np.random.Generator) -> Record:
+    """The session of a study; directions and turns are off by the uncertainties that it states."""
+    of, site = settings.simulation, settings.site
+    truth = replace(
+        with_values(draw_full_truth(rng), of.coefficients),
+        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
+        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
+    )
+    session = Session(
+        holds=(of.hold,) * 6,
+        turn=options.turn,
+        turning=of.turning,
+        rate=of.sample_rate,
+        alignment=options.alignment or 0.0,
+        turn_u=options.turn_u,
+        gravity=site.gravity,
+        latitude=site.latitude,
+        clock=1.0 + settings.disturbances.clock,
+    )
+    return simulate_session(truth, session, rng, settings.disturbances)[0]

@@ -19,6 +19,7 @@ from inercal.imu.ferraris.method import Matrices, derivatives
 from inercal.imu.ferraris.names import UP
 from inercal.imu.ferraris.readings import Readings
 from inercal.imu.ferraris.scatter import Scatter
+from inercal.imu.second_order import SOURCE
 from inercal.imu.settings import FerrarisSettings
 
 _AXIS = np.repeat(np.arange(3), 2)
@@ -138,6 +139,19 @@ def doubtful_turns(p: Propagation, doubt: Array) -> list[TypeB]:
     return (
         [TypeB("choice of the turns", size, "rad", p.by["angles"] * (u / size), redrawn=True)] if size else []
     )
+
+
+def second_order(p: Propagation, size: float) -> list[TypeB]:
+    """Uncertainty by K2 of the accelerometers, 0 with a standard deviation ``size`` [1/(m/s^2)]: it is all in K0."""
+    along = np.diag(p.solution.force_gain) * (float(p.readings.inputs.gravity) * UP) ** 2
+    by_axis = np.einsum("pki,ki->pi", p.by["force"], along)
+    return [TypeB(SOURCE, size, "1/(m/s^2)", by_axis)] if size > 0.0 else []
+
+
+def mean_noise(p: Propagation) -> float:
+    """Standard deviation [m/s^2] of the mean specific force in a position by the noise of the accelerometers."""
+    variance = p.readings.noise["acc"].variance(p.readings.lengths)
+    return float(np.sqrt(np.mean(variance / np.diag(p.solution.force_gain) ** 2)))
 
 
 def _horizontal_earth_rate(p: Propagation) -> Array:

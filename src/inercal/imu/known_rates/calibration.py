@@ -21,6 +21,7 @@ from inercal.imu.identified import weakness
 from inercal.imu.known_rates.fit import NAMES, RateFit, contradiction, fit_rates
 from inercal.imu.known_rates.orientations import Orientations, orientations
 from inercal.imu.known_rates.outlying import outlying, outlying_finding
+from inercal.imu.known_rates.trend import trend_findings
 from inercal.imu.known_rates.vector_sizes import PARAMETERS, SizeFit, curing
 from inercal.imu.limits import LIMITS
 from inercal.imu.recording import unit_words
@@ -68,7 +69,7 @@ def calibrate_known_rates(
         ``gyro_x..z`` in any unit, one record for each of the rates, in order: rows of means without times, one for each
         orientation, or a recording.
     settings : ImuSettings
-        Site and what goes with the result.
+        Site, orientations to be left out by number, and what goes with the result.
     options : KnownRatesSettings
         The rates with their uncertainties.
     progress : callable
@@ -82,7 +83,8 @@ def calibrate_known_rates(
     Raises
     ------
     InputError
-        Another number of records than of rates, or a record without a gyro or a steady stretch.
+        Another number of records than of rates, a record without a gyro or a steady stretch, or the study leaves out
+        an orientation that is not there.
     """
     clock = time.perf_counter()
     rates, rates_u = np.array(options.rates), np.array(options.rates_u)
@@ -95,7 +97,7 @@ def calibrate_known_rates(
     if not np.any(rates):
         raise StudyError("imu.rates", "found rates of zero alone, expected one at least that turns")
     progress("finding the orientations")
-    rows = orientations(records, rates)
+    rows = _used(orientations(records, rates), settings)
     triad = records[0].triad("gyro")
     sources = tuple(dict.fromkeys(source for record in records for source in record.sources))
     at = np.abs(rates)[rows.file]
@@ -130,13 +132,17 @@ def calibrate_known_rates(
     findings = list(rows.findings)
     dof = float(np.sum(rate_fit.dof))
     if weak is None:
-        off = outlying(rate_fit)
+        trends = list(trend_findings(rate_fit, at, uncertainty.u))
+        # what drifts makes single orientations look off
+        off = None if trends else outlying(rate_fit)
         if off is not None:
             kept = np.arange(len(rows.outputs)) != off
             others = fit_rates(rows.outputs[kept], rows.file[kept], rates, rates_u)
             u = combine(NAMES, _sources(others, rates, rates_u, settings.site)).u
-            findings.append(outlying_finding(fit.fit.x, others.fit.fit.x, u, rows.places[off]))
-        findings += _of_rates(rate_fit, rates, rates_u, rows)
+            place, number = rows.places[off], int(rows.numbers[off])
+            findings.append(outlying_finding(fit.fit.x, others.fit.fit.x, u, place, number))
+        findings += trends
+        findings += _of_rates(rate_fit, rates, rates_u)
     estimate = Estimate.of(
         basis,
         NAMES,
@@ -159,6 +165,22 @@ def calibrate_known_rates(
         },
     )
     return KnownRatesCalibration(timed(estimate, clock), rows, rate_fit)
+
+
+def _used(rows: Orientations, settings: ImuSettings) -> Orientations:
+    """The orientations that the study does not leave out."""
+    if settings.exclude.times:
+        raise StudyError(
+            "imu.exclude",
+            'found a time, expected the numbers of orientations, such as "pose 12": each FILE has times of its own',
+        )
+    missing = [number for number in settings.exclude.poses if number not in rows.numbers]
+    if missing:
+        raise StudyError(
+            "imu.exclude",
+            f"found pose {missing[0]}, expected one of the orientations 1 to {len(rows.numbers)}",
+        )
+    return rows.only(~np.isin(rows.numbers, settings.exclude.poses))
 
 
 def _sources(rate_fit: RateFit, rates: Array, rates_u: Array, site: Site) -> list[TypeA | TypeB]:
@@ -194,7 +216,7 @@ def _rpm(rate: float) -> str:
     return f"{rate * 30.0 / math.pi:.5g} rpm"
 
 
-def _of_rates(rate_fit: RateFit, rates: Array, rates_u: Array, rows: Orientations) -> list[Finding]:
+def _of_rates(rate_fit: RateFit, rates: Array, rates_u: Array) -> list[Finding]:
     """Findings about the rates: contradictions, missing uncertainties, and the specific force that goes with them."""
     findings = []
     probability, difference, u = contradiction(rate_fit, rates, rates_u)
@@ -246,10 +268,13 @@ def _table(rows: Orientations, fit: SizeFit, rates: Array) -> list[dict[str, obj
     size = np.linalg.norm(fit.x, axis=1)
     return [
         {
+            "pose": int(number),
             "place": place,
             "rate_rad_s": float(rates[k]),
             "direction": direction,
             "residual_rad_s": float(length - abs(rates[k])),
         }
-        for place, k, direction, length in zip(rows.places, rows.file, fit.directions, size, strict=True)
+        for number, place, k, direction, length in zip(
+            rows.numbers, rows.places, rows.file, fit.directions, size, strict=True
+        )
     ]

@@ -4,7 +4,7 @@ recording."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,23 @@ class Orientations:
     """The orientations of all files.
 
     ``outputs`` (n, 3) mean outputs, ``file`` (n,) the file of each from 0, ``places`` (n,) where it is: a row, or
-    times; ``left_out`` stretches at rest in files in which the table turned.
+    times; ``numbers`` (n,) count them from 1 through all files, those that a study leaves out too; ``left_out``
+    stretches at rest in files in which the table turned.
     """
 
     outputs: Array
     file: NDArray[np.int64]
     places: tuple[str, ...]
+    numbers: NDArray[np.int64]
     left_out: int
     findings: tuple[Finding, ...]
+
+    def only(self, kept: NDArray[np.bool_]) -> Orientations:
+        """A part of the orientations, a mask (n,)."""
+        places = tuple(place for place, each in zip(self.places, kept, strict=True) if each)
+        return replace(
+            self, outputs=self.outputs[kept], file=self.file[kept], places=places, numbers=self.numbers[kept]
+        )
 
 
 def orientations(records: Sequence[Record], rates: Array) -> Orientations:
@@ -70,6 +79,7 @@ def orientations(records: Sequence[Record], rates: Array) -> Orientations:
         stacked[turning],
         of_file[turning],
         tuple(place for place, kept in zip(places, turning, strict=True) if kept),
+        np.arange(1, int(np.count_nonzero(turning)) + 1),
         int(np.count_nonzero(~turning)),
         tuple(findings),
     )

@@ -20,8 +20,8 @@ def outlying(rate_fit: RateFit) -> int | None:
     return int(fit.row[worst]) if probability[worst] < LIMITS.outlier_risk else None
 
 
-def outlying_finding(values: Array, without: Array, u: Array, place: str) -> Finding:
-    """The finding about the orientation at that ``place``.
+def outlying_finding(values: Array, without: Array, u: Array, place: str, number: int) -> Finding:
+    """The finding about the orientation at that ``place``, the ``number`` th.
 
     ``values`` (9,) are the coefficients, ``without`` (9,) those without it with their ``u`` (9,), by more than which
     those move that are harmed.
@@ -31,7 +31,7 @@ def outlying_finding(values: Array, without: Array, u: Array, place: str) -> Fin
     text = (
         f"one orientation lies off what all others say ({place}); without it {NAMES[leading]} would be "
         f"{abs(shift[leading]):.1f} u {'smaller' if shift[leading] > 0 else 'larger'}: was it moved while the table "
-        "turned, or did the table turn at another rate? leave it out"
+        f'turned, or did the table turn at another rate? leave it out by imu.exclude = ["pose {number}"]'
     )
     harm = tuple(name for name, each in zip(NAMES, shift, strict=True) if abs(each) > 1.0)
     return Finding("outlying_pose", text, place, harm)

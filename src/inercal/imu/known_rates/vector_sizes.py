@@ -45,8 +45,8 @@ class SizeFit:
 
     @property
     def directions(self) -> Array:
-        """Unit vectors (n, 3) of the rows."""
-        return np.asarray(self.x / np.linalg.norm(self.x, axis=1, keepdims=True))
+        """Unit vectors (n, 3) of the rows; 0 where the vector is."""
+        return np.asarray(self.x / np.maximum(np.linalg.norm(self.x, axis=1, keepdims=True), 1e-300))
 
     def gain(self) -> Array:
         """(9, N): shift of the parameters by an error of each known size [SI]."""

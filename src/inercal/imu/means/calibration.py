@@ -26,10 +26,11 @@ from inercal.imu.multiposition.deletion import outlying
 from inercal.imu.multiposition.joint import Joint, Scatter, join, type_a, type_b
 from inercal.imu.multiposition.outcome import FRAME, REFERENCES
 from inercal.imu.multiposition.outliers import linear_poses
-from inercal.imu.multiposition.squares import squares_finding
+from inercal.imu.multiposition.squares import squares_finding, squares_source
 from inercal.imu.multiposition.verdict import curing_pose
 from inercal.imu.recording import unit_words
 from inercal.imu.rows import rows_of
+from inercal.imu.second_order import k2_size
 from inercal.imu.settings import COMMAND, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.places import counted, counted_names
@@ -170,6 +171,7 @@ def _fit(outputs: Array, settings: ImuSettings) -> _Fitted:
     sources: list[TypeA | TypeB] = [
         *type_a(joint, scatter, ""),
         *type_b(joint, settings.site, 0.0, np.zeros(3), ""),
+        *squares_source(joint, scatter, k2_size(settings, scatter.s)),
     ]
     return _Fitted(fit, scatter, joint, combine(joint.names, sources))
 
@@ -187,13 +189,11 @@ def _findings(
         )
         text += "the uncertainties themselves are uncertain, measure more poses"
         findings.append(Finding("few_degrees_of_freedom", text))
-    off = outlying(linear_poses(fitted.fit))
+    off = outlying(linear_poses(fitted.fit), LIMITS.outlier_risk)
     if not off:
-        gravity = settings.site.gravity
-        return [
-            *findings,
-            *squares_finding(fitted.joint, fitted.scatter, outputs, gravity, fitted.uncertainty.u),
-        ]
+        size = k2_size(settings, fitted.scatter.s)
+        of_k2 = squares_finding(fitted.joint, outputs, fitted.uncertainty, settings, size)
+        return [*findings, *of_k2]
     without = _fit(np.delete(outputs, off, axis=0), settings)
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = (fitted.fit.fit.x - without.fit.fit.x) / without.uncertainty.u

@@ -23,6 +23,7 @@ from inercal.imu.multiposition.poses import Poses, choose, excluded, refitted, s
 from inercal.imu.multiposition.squares import squares_finding
 from inercal.imu.multiposition.verdict import axis_findings, gyro_findings, rms_miss, scatter_findings
 from inercal.imu.recording import Recording, clipped_rows, prepare
+from inercal.imu.second_order import k2_size
 from inercal.imu.settings import Exclusion, ImuSettings
 from inercal.imu.turns import Turns, cut_turns, first_guess
 from inercal.instruments.triad import TriadModel
@@ -98,9 +99,9 @@ def calibrate_multiposition(
     if outliers:
         findings.append(_outlier_finding(recording, fitted, outliers, settings))
     else:
-        u = np.sqrt(np.diag(uncertainty.covariance))
+        size = k2_size(settings, fitted.scatter.s)
         noise = float(np.mean(poses.noise_variance)), poses.noise_dof
-        findings += squares_finding(fitted.joint, fitted.scatter, poses.means, gravity, u, *noise)
+        findings += squares_finding(fitted.joint, poses.means, uncertainty, settings, size, *noise)
     estimate = assemble(record, recording, poses, fitted.scatter, fitted.joint, settings, findings)
     return MultipositionCalibration(timed(estimate, clock), recording, poses, fitted.gyro, outliers)
 

@@ -67,21 +67,36 @@ class LinearFit:
         """Degrees of freedom: rows, less the parameters that the other data do not fix."""
         return int(self.residuals.size - self.jacobian.shape[2] + self.fixed)
 
-    def weights(self, variance: float) -> Array:
-        """(n d, n d) ``V^-1 - V^-1 J (J^T V^-1 J + information)^-1 J^T V^-1``, V of that ``variance``."""
+    def _whitened(self, variance: float) -> tuple[Array, Array, Array]:
+        """Factor L (n d, n d) of the covariance of that ``variance``, and Jacobian and residuals by L^-1."""
+        from scipy.linalg import solve_triangular
+
         V = self.known + np.diag(np.repeat(variance * self.growth, self.residuals.shape[1]))
-        weigh = np.linalg.inv(np.linalg.cholesky(V))
-        J = weigh @ self.jacobian.reshape(len(V), -1)
+        L = np.linalg.cholesky(V)
+        rows = np.column_stack([self.jacobian.reshape(len(V), -1), self.residuals.ravel()])
+        white = solve_triangular(L, rows, lower=True)
+        return np.asarray(L), np.asarray(white[:, :-1]), np.asarray(white[:, -1])
+
+    def _inverse(self, J: Array) -> Array:
+        """(P, P) ``(J^T J + information)^-1``, zero where nothing tells."""
         H = J.T @ J + self.information
         size = np.sqrt(np.maximum(np.diag(H), 1e-300))
-        J = J / size
-        inverse = np.linalg.pinv(H / np.outer(size, size), rcond=1e-12, hermitian=True)
-        return np.asarray(weigh.T @ (np.eye(len(V)) - J @ inverse @ J.T) @ weigh)
+        scales = np.outer(size, size)
+        return np.asarray(np.linalg.pinv(H / scales, rcond=1e-12, hermitian=True) / scales)
+
+    def weights(self, variance: float) -> Array:
+        """(n d, n d) ``V^-1 - V^-1 J (J^T V^-1 J + information)^-1 J^T V^-1``, V of that ``variance``."""
+        from scipy.linalg import cho_solve, solve_triangular
+
+        L, J, _ = self._whitened(variance)
+        K = solve_triangular(L, J, lower=True, trans="T")
+        return np.asarray(cho_solve((L, True), np.eye(len(L))) - K @ self._inverse(J) @ K.T)
 
     def chi2(self, variance: float) -> float:
         """Sum of squares left, weighted for that ``variance`` of what grows."""
-        r = self.residuals.ravel()
-        return float(r @ self.weights(variance) @ r)
+        _, J, r = self._whitened(variance)
+        pull = J.T @ r
+        return float(r @ r - pull @ self._inverse(J) @ pull)
 
     def variance(self) -> float:
         """Size of the growing part by which the sum of squares is its degrees of freedom; hardly anything at least."""
@@ -103,8 +118,8 @@ class LinearFit:
         return math.exp(float(brentq(surplus, math.log(least), math.log(most), xtol=1e-4)))
 
 
-def outlying(fit: LinearFit) -> list[int]:
-    """Items that do not belong to the others, at a risk of `LIMITS.outlier_risk` that any is named falsely."""
+def outlying(fit: LinearFit, risk: float) -> list[int]:
+    """Items that do not belong to the others, at that ``risk`` that any is named falsely."""
     from scipy.special import fdtrc
 
     d = fit.residuals.shape[1]
@@ -118,14 +133,13 @@ def outlying(fit: LinearFit) -> list[int]:
             break
         Q, r = part.weights(part.variance()), part.residuals.ravel()
         e, total = Q @ r, float(r @ Q @ r)
-        p = np.ones(len(part))
-        for k in range(len(part)):
-            rows = slice(d * k, d * (k + 1))
-            gain = float(e[rows] @ np.linalg.pinv(Q[rows, rows], hermitian=True) @ e[rows])
-            p[k] = fdtrc(d, left, (gain / d) / max((total - gain) / left, 1e-300))
+        of_items = Q.reshape(len(part), d, len(part), d)[np.arange(len(part)), :, np.arange(len(part))]
+        e = e.reshape(-1, d)
+        gain = np.einsum("ki,kij,kj->k", e, np.linalg.pinv(of_items, hermitian=True), e)
+        p = fdtrc(d, left, (gain / d) / np.maximum((total - gain) / left, 1e-300))
         worst = int(np.argmin(p))
         removed.append(int(np.flatnonzero(alive)[worst]))
-        if p[worst] * len(part) < LIMITS.outlier_risk:
+        if p[worst] * len(part) < risk:
             named = step
         alive[removed[-1]] = False
     return sorted(removed[:named])

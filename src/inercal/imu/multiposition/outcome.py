@@ -19,8 +19,10 @@ from inercal.imu.multiposition.gyro import GyroFit
 from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
 from inercal.imu.multiposition.outliers import linear_poses
 from inercal.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
+from inercal.imu.multiposition.squares import squares_source
 from inercal.imu.multiposition.verdict import rms_miss, verdict
 from inercal.imu.recording import Recording
+from inercal.imu.second_order import k2_size
 from inercal.imu.settings import COMMAND, MASKED, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
@@ -108,7 +110,8 @@ def uncertainty_of(
     unit = _gyro_unit(recording)
     resolution = recording.resolution.get("gyro", np.zeros(3))
     from_outside = type_b(joint, settings.site, settings.time_base_u, resolution, unit)
-    return combine(joint.names, [*type_a(joint, scatter, unit), *from_outside])
+    squares = squares_source(joint, scatter, k2_size(settings, scatter.s))
+    return combine(joint.names, [*type_a(joint, scatter, unit), *from_outside, *squares])
 
 
 def _gyro_unit(recording: Recording) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.findings import Finding
+from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.imu.multiposition.deletion import LinearFit, outlying
 from inercal.imu.multiposition.gyro import GyroFit
@@ -40,10 +41,10 @@ def outliers_of(poses: Poses, gyro: GyroFit | None) -> Outliers:
 
     A pose that is off spoils the turns to and from it: these are judged only where no pose is.
     """
-    off = tuple(outlying(linear_poses(poses.accelerometer)))
+    off = tuple(outlying(linear_poses(poses.accelerometer), LIMITS.outlier_risk))
     if off or gyro is None:
         return Outliers(off)
-    return Outliers((), tuple(outlying(gyro.linear)))
+    return Outliers((), tuple(outlying(gyro.linear, LIMITS.turn_risk)))
 
 
 def outlier_finding(

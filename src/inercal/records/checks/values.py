@@ -173,8 +173,17 @@ def saturated(values: Array) -> NDArray[np.int64]:
 
 
 def outliers(values: Array, name: str) -> list[Finding]:
-    """``outlier``: single samples far from their neighbours."""
+    """``outlier``: single samples far from their neighbours.
+
+    A rate that is nearer to zero than both is none: from one turn to the next many a rig stops within a sample.
+    """
     rows = outlying(values)
+    if name.startswith(("wc", "gyro")) and rows.size:
+        signal, known_rows = known(values)
+        at = np.searchsorted(known_rows, rows)
+        before, own, after = signal[at - 1], signal[at], signal[at + 1]
+        same = (np.sign(before) == np.sign(own)) & (np.sign(after) == np.sign(own))
+        rows = rows[~(same & (np.abs(own) < np.minimum(np.abs(before), np.abs(after))))]
     if rows.size == 0:
         return []
     text = f"{name}: {counted(rows.size, 'sample')} far from both neighbours, knocks or wrong bits"

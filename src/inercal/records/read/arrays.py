@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,14 @@ from inercal.errors import InercalError, RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel
 from inercal.records.checks import missing, too_long
+from inercal.records.places import counted_names, shortened
+from inercal.records.read.child import Tell, Work, in_child
+from inercal.records.read.limits import FIELDS, check_unpacked, memory, size_of
 from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
 from inercal.records.titles import bare, canonical
 from inercal.units import parse_unit
+
+T = TypeVar("T")
 
 _LISTED = 20
 
@@ -74,12 +80,11 @@ class Contents:
         if self.described:
             return self.described
         if self.tabular:
-            names = list(self.arrays)
+            names = [shortened(name) for name in self.arrays]
         else:
-            numbers = ((name, array) for name, array in self.arrays.items() if not array.text)
+            numbers = ((shortened(name), array) for name, array in self.arrays.items() if not array.text)
             names = [f"{name} ({array.rows} x {array.columns})" for name, array in numbers]
-        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-        return f"the {'columns' if self.tabular else 'arrays'} {', '.join(names[:_LISTED])}{more}"
+        return f"the {'columns' if self.tabular else 'arrays'} {counted_names(names, _LISTED)}"
 
 
 def transposed(contents: Contents, path: Path) -> Contents:
@@ -102,14 +107,16 @@ def transposed(contents: Contents, path: Path) -> Contents:
 
 @dataclass(frozen=True)
 class ArrayFormat:
-    """A format whose files hold named arrays: ``opened`` lends those of a file while it is open.
+    """A format whose files hold named arrays: ``opened`` lends those of a file while it is open, in a child process.
 
     ``name`` says what a file of it is, for the error about a damaged one: ``a MAT file``. Whatever a library
-    trips over in such a file becomes a `RecordError`.
+    trips over in such a file becomes a `RecordError`. ``library`` loads what a file is read with,
+    once for all children.
     """
 
     name: str
     opened: Callable[[Path], AbstractContextManager[Contents]]
+    library: Callable[[Path], object] = lambda _: None
 
     def read(
         self,
@@ -119,6 +126,25 @@ class ArrayFormat:
         progress: Callable[[int], None],
     ) -> list[Table]:
         """Read the wanted columns, or those that canonical names and units tell."""
+        return self._in_child(partial(self._read, path, options, channels), path, progress)
+
+    def header(self, path: Path) -> tuple[Channel, ...]:
+        """The channels that canonical names and units tell; raises `InputError` where there are none."""
+        return self._in_child(partial(self._header, path), path)
+
+    def peek(self, path: Path) -> list[Sample]:
+        """Look at the arrays of a file."""
+        return self._in_child(partial(self._peek, path), path)
+
+    def _in_child(self, work: Work[T], path: Path, progress: Tell = lambda _: None) -> T:
+        """The result of work in a child, which need not load the library again."""
+        self.library(path)
+        return in_child(work, path, progress)
+
+    def _read(
+        self, path: Path, options: FileOptions, channels: tuple[Channel, ...] | None, progress: Tell
+    ) -> list[Table]:
+        """As `read`, in the child."""
         with self._lent(path) as lent:
             contents = transposed(lent, path) if options.transpose else lent
             wanted = self_named(contents, path) if channels is None else channels
@@ -126,15 +152,15 @@ class ArrayFormat:
         progress(path.stat().st_size)
         return wanted_tables
 
-    def header(self, path: Path) -> tuple[Channel, ...]:
-        """The channels that canonical names and units tell; raises `InputError` where there are none."""
+    def _header(self, path: Path, _: Tell) -> tuple[Channel, ...]:
+        """As `header`, in the child."""
         with self._lent(path) as contents:
             return self_named(contents, path)
 
-    def peek(self, path: Path) -> list[Sample]:
-        """Look at the arrays of a file."""
+    def _peek(self, path: Path, _: Tell) -> list[Sample]:
+        """As `peek`, in the child."""
         with self._lent(path) as contents:
-            return samples(contents)
+            return samples(contents, path)
 
     @contextmanager
     def _lent(self, path: Path) -> Iterator[Contents]:
@@ -156,6 +182,11 @@ def guarded(path: Path, name: str) -> Iterator[None]:
             yield
     except InercalError:
         raise
+    except MemoryError as error:
+        most = memory(size_of(path)) >> 20
+        raise RecordError(
+            path, f"asks for more than the {most} MiB of memory that a file of its size may take"
+        ) from error
     except Exception as error:
         raise RecordError(path, f"cannot be read as {name} ({reason(error)})") from error
 
@@ -183,6 +214,7 @@ def tables(
     was ``mapped`` by hand. Raises `RecordError` where columns of one clock have different lengths.
     """
     placed = {channel: place for channel in channels if (place := _place(channel, contents, options, path))}
+    check_unpacked(path, sum(8 * contents.arrays[name].rows for name, _ in placed.values()), size_of(path))
     groups: dict[str | None, dict[Channel, tuple[str, int]]] = {}
     for channel, clock in _clocks(placed, contents.arrays, mapped).items():
         groups.setdefault(clock, {})[channel] = placed[channel]
@@ -195,9 +227,10 @@ def tables(
     return parts
 
 
-def samples(contents: Contents) -> list[Sample]:
-    """A first look at the arrays: single columns by length, with their names, and each table."""
-    arrays = {name: array for name, array in contents.arrays.items() if array.rows > 1}
+def samples(contents: Contents, path: Path) -> list[Sample]:
+    """A first look at the arrays of a file: single columns by length, with their names, and each table."""
+    arrays = {name: array for name, array in islice(contents.arrays.items(), FIELDS) if array.rows > 1}
+    check_unpacked(path, sum(8 * each.rows * each.columns for each in arrays.values()), size_of(path))
     looks = []
     for rows in dict.fromkeys(array.rows for array in arrays.values()):
         single = {name: each for name, each in arrays.items() if each.columns == 1 and each.rows == rows}

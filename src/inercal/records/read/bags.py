@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -20,8 +22,10 @@ from numpy.typing import NDArray
 from inercal.errors import MissingExtraError, RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel
-from inercal.records.places import counted
+from inercal.records.places import counted, counted_names, shortened
 from inercal.records.read.arrays import Contents, guarded, held, reason, samples, tables
+from inercal.records.read.child import in_child
+from inercal.records.read.limits import FIELDS, NESTING, size_of
 from inercal.records.read.table import FileOptions, Sample, Table
 from inercal.units import parse_unit
 
@@ -38,12 +42,27 @@ _TOLD = 5_000
 
 @dataclass(frozen=True)
 class _Topic:
-    """A topic of an open bag: type, connections, number of messages, and kind of each field by its path."""
+    """A topic of an open bag: type, connections, number of messages, and the definitions of types in the bag."""
 
     kind: str
     connections: tuple[Any, ...]
     count: int
-    fields: Mapping[str, str]
+    definitions: Mapping[str, Any]
+
+    def content(self, path: str) -> str | None:
+        """``number``, ``text``, ``time`` or ``list``, what the field at a path holds; None if there is none such.
+
+        Only the types along the path are looked at: definitions within each other may have fields without number.
+        """
+        if path == _RECORDED:
+            return "time"
+        kind, content = self.kind, None
+        for name in path.split("."):
+            if kind not in self.definitions:
+                return None
+            node, kind = dict(self.definitions[kind][1]).get(name, (None, ""))
+            content = None if node is None else _content(node, kind)
+        return content
 
 
 @dataclass(frozen=True)
@@ -56,14 +75,15 @@ class _Bag:
     @property
     def words(self) -> str:
         """The contents of the bag in words."""
-        return f"the topics {', '.join(f'{name} ({topic.kind})' for name, topic in self.topics.items())}"
+        names = [f"{shortened(name)} ({shortened(topic.kind)})" for name, topic in self.topics.items()]
+        return f"the topics {counted_names(names, 20)}"
 
     def place(self, name: str) -> tuple[str, str] | None:
         """Topic and field of ``/imu/data/linear_acceleration.x``; None if there are none such."""
         path = f"/{name.strip('/')}"
         topics = [topic for topic in self.topics if path.startswith(f"/{topic.strip('/')}/")]
         places = [(topic, path[len(topic.strip("/")) + 2 :]) for topic in topics]
-        return next((place for place in places if place[1] in self.topics[place[0]].fields), None)
+        return next((place for place in places if self.topics[place[0]].content(place[1])), None)
 
 
 def read(
@@ -76,42 +96,58 @@ def read(
 
     The stamps of the headers are the clock of a topic, unless all are zero.
     """
+    _library()
+    return in_child(partial(_read, path, options, channels), path, progress)
+
+
+def _read(
+    path: Path, options: FileOptions, channels: tuple[Channel, ...] | None, progress: Callable[[int], None]
+) -> list[Table]:
+    """As `read`, in a child."""
     with _opened(path) as bag:
         wanted = _imu(bag, path) if channels is None else channels
         names = [each.origin[0] if isinstance(each.origin, tuple) else each.origin for each in wanted]
         places = {place for name in names if isinstance(name, str) and (place := bag.place(name))}
-        size = sum(file.stat().st_size for file in ([path] if path.is_file() else path.iterdir()))
+        size = size_of(path)
         contents = _contents(bag, places, path, lambda part: progress(int(part * size)))
         return tables(contents, options, wanted, path, mapped=channels is not None)
 
 
 def header(path: Path) -> tuple[Channel, ...]:
     """The channels of the only topic of `sensor_msgs/Imu`; raises `RecordError` where there is not one."""
+    _library()
+    return in_child(partial(_header, path), path)
+
+
+def _header(path: Path, _: Callable[[int], None]) -> tuple[Channel, ...]:
+    """As `header`, in a child."""
     with _opened(path) as bag:
         return _imu(bag, path)
 
 
 def peek(path: Path) -> list[Sample]:
     """Look at the first messages of the topics of `sensor_msgs/Imu`, or of all where there are none."""
+    _library()
+    return in_child(partial(_peek, path), path)
+
+
+def _peek(path: Path, _: Callable[[int], None]) -> list[Sample]:
+    """As `peek`, in a child."""
     with _opened(path) as bag:
         topics = [name for name, topic in bag.topics.items() if topic.kind == _IMU] or list(bag.topics)
         places = {
-            (name, field)
+            (name, each)
             for name in topics
-            for field, kind in bag.topics[name].fields.items()
-            if kind == "number"
+            for each, content in islice(_fields(bag.topics[name].definitions, bag.topics[name].kind), FIELDS)
+            if content == "number"
         }
-        return samples(_contents(bag, places, path, lambda _: None, _PEEKED))
+        return samples(_contents(bag, places, path, lambda _: None, _PEEKED), path)
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[_Bag]:
     """The bag while it is open; errors as `RecordError`."""
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise MissingExtraError("Reading bags", "files") from error
+    AnyReader, Stores, get_typestore = _library()
     with (
         guarded(path, "a bag"),
         AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader,
@@ -120,28 +156,45 @@ def _opened(path: Path) -> Iterator[_Bag]:
         for name, topic in reader.topics.items():
             definitions = reader.typestore.fielddefs
             if topic.msgtype in definitions and topic.msgcount:
-                fields = dict(_fields(definitions, topic.msgtype)) | {_RECORDED: "time"}
-                topics[name] = _Topic(topic.msgtype, tuple(topic.connections), topic.msgcount, fields)
+                topics[name] = _Topic(topic.msgtype, tuple(topic.connections), topic.msgcount, definitions)
         if not topics:
             raise RecordError(path, "found no topic with messages of a known type, expected one at least")
         yield _Bag(reader, topics)
 
 
-def _fields(definitions: Mapping[str, Any], kind: str, above: str = "") -> Iterator[tuple[str, str]]:
-    """Paths of the fields of a message type, and whether each is a number, text, time or list of numbers."""
+def _library() -> tuple[Any, Any, Any]:
+    """The parts of rosbags that are used; raises `MissingExtraError`."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise MissingExtraError("Reading bags", "files") from error
+    return AnyReader, Stores, get_typestore
+
+
+def _fields(
+    definitions: Mapping[str, Any], kind: str, above: tuple[str, ...] = ()
+) -> Iterator[tuple[str, str]]:
+    """Paths of the fields of a message type, and what each holds; what lies deeper than `NESTING` is left out."""
+    for name, (node, of) in definitions[kind][1]:
+        path = (*above, name)
+        if content := _content(node, of):
+            yield ".".join(path), content
+        elif of in definitions and len(path) < NESTING:
+            yield from _fields(definitions, of, path)
+
+
+def _content(node: Any, of: Any) -> str | None:
+    """``number``, ``text``, ``time`` or ``list``: what a field of that node holds; None for other messages."""
     from rosbags.interfaces import Nodetype
 
-    for name, (node, of) in definitions[kind][1]:
-        path = f"{above}{name}"
-        if node == Nodetype.NAME:
-            if of in ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"):
-                yield path, "time"
-            elif of in definitions:
-                yield from _fields(definitions, of, f"{path}.")
-        elif node == Nodetype.BASE:
-            yield path, "text" if "string" in of[0] else "number"
-        elif of[0][0] == Nodetype.BASE and "string" not in of[0][1][0]:
-            yield path, "list"
+    if node == Nodetype.NAME:
+        return "time" if of in ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration") else None
+    if node == Nodetype.BASE:
+        return "text" if "string" in of[0] else "number"
+    if node is not None and of[0][0] == Nodetype.BASE and "string" not in of[0][1][0]:
+        return "list"
+    return None
 
 
 def _imu(bag: _Bag, path: Path) -> tuple[Channel, ...]:
@@ -165,12 +218,13 @@ def _contents(
     """The wanted (topic, field) as arrays with the clocks of their topics; ``progress`` is told the part done."""
     wanted: dict[str, dict[str, list[Any]]] = {}
     for topic, field in sorted(places):
-        stamps = [each for each in (_STAMP, _RECORDED) if each in bag.topics[topic].fields]
+        stamps = [each for each in (_STAMP, _RECORDED) if bag.topics[topic].content(each)]
         wanted.setdefault(topic, {each: [] for each in stamps}).setdefault(field, [])
     findings = _collect(bag, wanted, path, progress, limit)
     arrays = {}
     for topic, columns in wanted.items():
-        values = {field: _array(bag.topics[topic].fields[field], column) for field, column in columns.items()}
+        of = bag.topics[topic]
+        values = {field: _array(of.content(field), column) for field, column in columns.items()}
         clock = _STAMP if _STAMP in values else _RECORDED
         if clock == _STAMP and not values[_STAMP].astype(np.int64).any():
             clock = _RECORDED
@@ -181,7 +235,7 @@ def _contents(
                 raise RecordError(path, f"{topic}/{field} has lists of several lengths, expected one")
             if clock == _RECORDED and field == _STAMP and (topic, field) not in places:
                 continue
-            unit = _UNITS.get(field) if bag.topics[topic].kind == _IMU else None
+            unit = _UNITS.get(field) if of.kind == _IMU else None
             own = None if field in (_STAMP, _RECORDED) else f"{topic}/{clock}"
             arrays[f"{topic}/{field}"] = held(column, unit, own)
     return Contents(arrays, tuple(findings), described=bag.words)
@@ -227,7 +281,7 @@ def _collect(
     return []
 
 
-def _array(kind: str, column: list[Any]) -> NDArray[Any]:
+def _array(kind: str | None, column: list[Any]) -> NDArray[Any]:
     """The values of a field, one for each message."""
     if kind != "time":
         lengths = {len(value) for value in column} if kind == "list" else set()

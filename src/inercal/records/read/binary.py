@@ -13,6 +13,7 @@ from inercal.errors import RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel
 from inercal.records.read.arrays import Contents, held, tables
+from inercal.records.read.limits import check_unpacked, unpacked
 from inercal.records.read.table import FileOptions, Table
 
 
@@ -29,9 +30,11 @@ def read(
     raw = path.read_bytes()
     if raw[:2] == b"\x1f\x8b":
         try:
-            raw = gzip.decompress(raw)
+            with gzip.open(path) as file:
+                raw = file.read(unpacked(len(raw)) + 1)
         except (OSError, EOFError, zlib.error) as error:
             raise RecordError(path, f"cannot be read as gzip ({error})") from error
+        check_unpacked(path, len(raw), path.stat().st_size)
     contents = contents_of(raw[options.skip :], options, path)
     progress(path.stat().st_size)
     return tables(contents, options, channels or (), path, mapped=True)

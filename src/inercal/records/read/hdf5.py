@@ -7,17 +7,27 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.errors import QuantityError
+from inercal.errors import QuantityError, RecordError
+from inercal.records.places import counted_names
 from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray
-from inercal.units import parse_unit
+from inercal.records.read.limits import FIELDS, NESTING, TITLE
+from inercal.units import parse_unit, shown
 
 _CELSIUS = re.compile(r"(?:deg(?:ree)?s?[ _]?)?c(?:elsius)?", re.IGNORECASE)
+
+
+def library(_: Path) -> object:
+    """The library of the format."""
+    import h5py
+
+    return h5py
 
 
 @contextmanager
@@ -26,7 +36,8 @@ def opened(path: Path) -> Iterator[Contents]:
     import h5py
 
     with h5py.File(path, "r") as file:
-        arrays = {name: array for dataset in _datasets(file, set()) for name, array in _arrays(dataset)}
+        datasets = islice(_datasets(file, set()), FIELDS)
+        arrays = {name: array for dataset in datasets for name, array in _arrays(dataset)}
         yield Contents({name: _with_clock(array, name, file, arrays) for name, array in arrays.items()})
 
 
@@ -34,7 +45,7 @@ def stated_unit(attributes: Mapping[str, Any]) -> str | None:
     """The unit in the attributes ``units`` or ``unit`` of a variable, also as the CF conventions write it."""
     for key in ("units", "unit"):
         text = _text(attributes.get(key))
-        if text:
+        if text and len(text) <= TITLE:
             text = re.sub(r"\s+since\s.*", "", text.strip())
             return "degC" if _CELSIUS.fullmatch(text) else re.sub(r"(?<=[A-Za-z])(-?\d)(?!\w)", r"^\1", text)
     return None
@@ -58,8 +69,11 @@ def characters(rows: NDArray[Any]) -> NDArray[Any]:
     return np.array([row.tobytes().rstrip(b"\0 ").decode("utf-8", "replace") for row in rows])
 
 
-def _datasets(group: Any, seen: set[Any]) -> Iterator[Any]:
-    """All datasets below a group, in the order of the file; links to other files are not followed."""
+def _datasets(group: Any, seen: set[Any], depth: int = 0) -> Iterator[Any]:
+    """All datasets below a group, in the order of the file; links to other files are not followed.
+
+    Groups that lie deeper than `NESTING` are left out.
+    """
     import h5py
 
     seen.add(group.id)
@@ -69,8 +83,26 @@ def _datasets(group: Any, seen: set[Any]) -> Iterator[Any]:
         item = group[name]
         if isinstance(item, h5py.Dataset):
             yield item
-        elif isinstance(item, h5py.Group) and item.id not in seen:
-            yield from _datasets(item, seen)
+        elif isinstance(item, h5py.Group) and item.id not in seen and depth < NESTING:
+            yield from _datasets(item, seen, depth + 1)
+
+
+def _stored(dataset: Any) -> Any:
+    """The dataset, whose values are in its own file; raises `RecordError` for values elsewhere, which no checksum of
+    the file covers, and which read as fill values where they are gone."""
+    elsewhere = dataset.external or dataset.is_virtual
+    if elsewhere:
+        names = (
+            [source.file_name for source in dataset.virtual_sources()]
+            if dataset.is_virtual
+            else ([name for name, *_ in dataset.external])
+        )
+        there = counted_names([shown(name) for name in dict.fromkeys(names)], 3)
+        raise RecordError(
+            dataset.file.filename,
+            f"{shown(dataset.name)} keeps its values elsewhere ({there}), expected a copy of the file that holds all",
+        )
+    return dataset
 
 
 def _arrays(dataset: Any) -> Iterator[tuple[str, NamedArray]]:
@@ -102,15 +134,15 @@ def _is_bare_dimension(attributes: Mapping[str, Any]) -> bool:
 def _column(dataset: Any, attributes: Mapping[str, Any], column: int, along: int) -> NDArray[Any]:
     """A column of numbers, whose rows are along that axis."""
     if len(dataset.shape) == 1:
-        numbers = dataset[()]
+        numbers = _stored(dataset)[()]
     else:
-        numbers = dataset[column, :] if along else dataset[:, column]
+        numbers = _stored(dataset)[column, :] if along else _stored(dataset)[:, column]
     return unpacked(numbers, attributes)
 
 
 def _field(dataset: Any, field: str, _: int) -> NDArray[Any]:
     """A field of a compound."""
-    values: NDArray[Any] = dataset[field]
+    values: NDArray[Any] = _stored(dataset)[field]
     return values
 
 
@@ -120,14 +152,16 @@ def _reader_of_text(dataset: Any, matlab: str | None) -> Callable[[int], NDArray
 
     shape, dtype = dataset.shape, dataset.dtype
     if matlab == "char" and len(shape) == 2:
-        return lambda _: _decoded(dataset[()])
+        return lambda _: _decoded(_stored(dataset)[()])
     if matlab == "cell" and len(shape) == 2 and 1 in shape and h5py.check_ref_dtype(dtype):
-        return lambda _: np.array(["".join(_decoded(dataset.file[cell][()])) for cell in dataset[()].ravel()])
+        return lambda _: np.array(
+            ["".join(_decoded(_stored(dataset.file[cell])[()])) for cell in _stored(dataset)[()].ravel()]
+        )
     if matlab is not None or h5py.check_string_dtype(dtype) is None:
         return None
     if len(shape) == 2 and dtype == "S1":
-        return lambda _: characters(dataset[()])
-    return (lambda _: dataset.asstr(errors="replace")[()]) if len(shape) == 1 else None
+        return lambda _: characters(_stored(dataset)[()])
+    return (lambda _: _stored(dataset).asstr(errors="replace")[()]) if len(shape) == 1 else None
 
 
 def _decoded(codes: NDArray[Any]) -> NDArray[Any]:
@@ -166,5 +200,5 @@ def _text(attribute: Any) -> str | None:
     return attribute if isinstance(attribute, str) else None
 
 
-_FORMAT = ArrayFormat("an HDF5 file", opened)
+_FORMAT = ArrayFormat("an HDF5 file", opened, library)
 read, header, peek = _FORMAT.read, _FORMAT.header, _FORMAT.peek

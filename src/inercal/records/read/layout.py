@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import math
+import os
 import re
 import zlib
 from collections import Counter
@@ -15,9 +16,10 @@ from itertools import islice
 from pathlib import Path
 
 from inercal.errors import RecordError
+from inercal.records.read.limits import HEADER, LINE, check_unpacked, unpacked
 from inercal.records.read.table import LARGEST, FileOptions
 
-_BLOCK = 1 << 21
+_BLOCK = LINE
 _GZIP = b"\x1f\x8b"
 _BOM = b"\xef\xbb\xbf"
 
@@ -46,21 +48,29 @@ class Block:
 
 
 def blocks(file: BufferedReader, path: Path) -> Iterator[Block]:
-    """Blocks of lines of an open file, at least one; raises `RecordError` if it can't be text."""
+    """Blocks of lines of an open file, at least one; raises `RecordError` if it can't be text.
+
+    Lines end with a line feed, or with a carriage return where no line feed is in the first block.
+    """
     packed = file.peek(2)[:2] == _GZIP
     stream = gzip.GzipFile(fileobj=file) if packed else file
-    first, early, held = 1, False, bytearray()
+    first, early, held, read = 1, False, bytearray(), 0
+    mark = b""
     try:
         while piece := stream.read1(_BLOCK):
+            read += len(piece)
+            if packed and read > unpacked(0):
+                check_unpacked(path, read, os.fstat(file.fileno()).st_size)
             held += piece
             if len(held) < _BLOCK:
                 continue
-            end = held.rfind(b"\n") + 1
+            mark = mark or _line_end(held)
+            end = held.rfind(mark) + 1
             if end == 0:
                 raise RecordError(
                     path, f"line {first}: longer than {len(held)} bytes, expected lines of text"
                 )
-            lines = _text(held[:end], first).split("\n")
+            lines = _text(held[:end], first, mark).split("\n")
             lines.pop()
             yield Block(lines, first)
             first += len(lines)
@@ -72,12 +82,17 @@ def blocks(file: BufferedReader, path: Path) -> Iterator[Block]:
     if not held and first == 1:
         raise RecordError(path, "is empty, expected lines of numbers")
     if held or early:
-        lines = _text(held, first).split("\n")
+        lines = _text(held, first, mark or _line_end(held)).split("\n")
         cut = lines[-1] != ""
         yield Block(lines if cut else lines[:-1], first, cut, early)
 
 
-def _text(data: bytearray, first: int) -> str:
+def _line_end(data: bytearray) -> bytes:
+    """The mark at which lines end."""
+    return b"\r" if b"\r" in data and b"\n" not in data else b"\n"
+
+
+def _text(data: bytearray, first: int, mark: bytes) -> str:
     """Bytes as text: UTF-8, else Latin-1; line ends as a single newline."""
     if first == 1 and data.startswith(_BOM):
         data = data[len(_BOM) :]
@@ -85,13 +100,14 @@ def _text(data: bytearray, first: int) -> str:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    return text.replace("\r\n", "\n") if "\r" in text else text
+    return text.replace("\r" if mark == b"\r" else "\r\n", "\n") if "\r" in text else text
 
 
 _SAMPLE = 100
+_ENOUGH = 5
 _DELIMITERS = ("\t", ";", ",", None)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*")
-_WHOLE = re.compile(r"\s*[+-]?\d+\s*")
+_WHOLE = re.compile(r"\s*[+-]?0*(\d+)\s*")
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
 
 
@@ -125,8 +141,22 @@ class Layout:
         return fields if len(fields) == self.width else None
 
     def number(self, text: str) -> float | None:
-        """The number a field holds, NaN where it is empty; None if it is no number."""
-        return parse_number(text.replace(",", ".") if self.decimal == "," else text)
+        """The number a field holds, NaN where it is empty; None if it is no number.
+
+        A point among decimal commas may part thousands: ``1.000`` is no number there.
+        """
+        if self.decimal != ",":
+            return parse_number(text)
+        return None if "." in text else parse_number(text.replace(",", "."))
+
+    def is_whole(self, text: str, before: Sequence[str]) -> bool:
+        """True if the last number of a file, which no line end follows, is written to as many places as those before.
+
+        Where these have no decimals, or not equally many, nothing tells, and the number may be cut.
+        """
+        mark = self.decimal or "."
+        places = {len(each.strip().partition(mark)[2]) for each in before}
+        return len(before) >= _ENOUGH and places == {len(text.strip().partition(mark)[2])} != {0}
 
     def settled(self, lines: Iterable[str]) -> Layout:
         """The layout with the decimal mark of the first of more lines that tells it, where none has told so far."""
@@ -152,7 +182,8 @@ def parse_number(text: str) -> float | None:
 
 def is_rounded(text: str, value: float) -> bool:
     """True for a whole number, read as ``value``, that float64 cannot hold."""
-    return 2.0**53 <= abs(value) < math.inf and _WHOLE.fullmatch(text) is not None and int(text) != value
+    whole = _WHOLE.fullmatch(text) if 2.0**53 <= abs(value) < math.inf else None
+    return whole is not None and int(whole[1]) != abs(value)
 
 
 def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layout:
@@ -182,6 +213,10 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
     names = _names(line, delimiter)
     if not is_header(layout, names):
         return layout
+    if len(line) > HEADER:
+        raise RecordError(
+            path, f"line {index + 1}: found a header of {len(line)} characters, expected at most {HEADER}"
+        )
     if len(rows) == 1:
         raise RecordError(path, f"line {index + 1}: found a header and no row after it, expected numbers")
     if len(names) != width and not (
@@ -211,7 +246,7 @@ def is_header(layout: Layout, fields: Sequence[str]) -> bool:
 def _names(line: str, delimiter: str | None) -> tuple[str, ...]:
     """The names of a header line; blanks within ``t [s]`` part nothing."""
     if delimiter is None:
-        return tuple(re.findall(r"[^\s\[]+(?:\s*\[[^\]]*\])?", line))
+        return tuple(re.findall(r"[^\s\[]++(?:\s*+\[[^\[\]]*+\])?", line))
     return tuple(name.strip() for name in _split(line, delimiter))
 
 

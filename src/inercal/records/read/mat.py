@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from inercal.errors import RecordError
 from inercal.records.channels import Channel
 from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray, held
+from inercal.records.read.limits import NESTING
 from inercal.records.read.table import FileOptions, Table
 
 _HDF5 = (b"MATLAB 7.3", b"\x89HDF\r\n\x1a\n")
@@ -35,12 +36,27 @@ def header(path: Path) -> NoReturn:
     raise RecordError(path, "a MAT file names no units, expected a column map")
 
 
+def _is_hdf5(path: Path) -> bool:
+    """True for a file of MATLAB v7.3."""
+    with path.open("rb") as file:
+        return file.read(16).startswith(_HDF5)
+
+
+def _library(path: Path) -> object:
+    """The library that reads a file."""
+    if _is_hdf5(path):
+        import h5py
+
+        return h5py
+    import scipy.io
+
+    return scipy.io
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[Contents]:
     """The arrays of numbers and text; a single row is turned into a column."""
-    with path.open("rb") as file:
-        start = file.read(16)
-    if start.startswith(_HDF5):
+    if _is_hdf5(path):
         from inercal.records.read import hdf5
 
         with hdf5.opened(path) as contents:
@@ -53,14 +69,15 @@ def _opened(path: Path) -> Iterator[Contents]:
     yield Contents(dict(_arrays(members)))
 
 
-def _arrays(members: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, NamedArray]]:
-    """Variables, and members of structures by their path."""
+def _arrays(members: Iterable[tuple[str, Any]], depth: int = 0) -> Iterator[tuple[str, NamedArray]]:
+    """Variables, and members of structures by their path; what lies deeper than `NESTING` is left out."""
     for name, value in members:
         if not isinstance(value, np.ndarray) or not value.size:
             continue
         if value.dtype.names is not None:
-            if value.size == 1:
-                yield from _arrays((f"{name}/{part}", value[part].flat[0]) for part in value.dtype.names)
+            if value.size == 1 and depth < NESTING:
+                parts = ((f"{name}/{part}", value[part].flat[0]) for part in value.dtype.names)
+                yield from _arrays(parts, depth + 1)
         elif value.ndim == 2 and value.dtype.kind in "fiub":
             numbers = value.T if value.shape[0] == 1 else value
             yield name, held(numbers)
@@ -80,5 +97,5 @@ def _texts(value: NDArray[Any]) -> NDArray[Any] | None:
     return None
 
 
-_FORMAT = ArrayFormat("a MAT file", _opened)
+_FORMAT = ArrayFormat("a MAT file", _opened, _library)
 peek = _FORMAT.peek

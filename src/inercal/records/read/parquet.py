@@ -14,13 +14,19 @@ from inercal.errors import MissingExtraError
 from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[Contents]:
-    """The columns, with the units in the metadata of their fields; members of structures are ``imu.acc_x``."""
+def _library(_: Path) -> Any:
+    """The library of the format; raises `MissingExtraError`."""
     try:
         from pyarrow import parquet
     except ImportError as error:
         raise MissingExtraError("Reading Parquet files", "files") from error
+    return parquet
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Contents]:
+    """The columns, with the units in the metadata of their fields; members of structures are ``imu.acc_x``."""
+    parquet = _library(path)
     with parquet.ParquetFile(path) as file:
         rows = file.metadata.num_rows
         columns = [leaf for field in file.schema_arrow for leaf in _leaves(field)]
@@ -60,7 +66,7 @@ def _column(file: Any, name: str, _: int) -> NDArray[Any]:
     """A column as NumPy's; what is missing is NaN, NaT or None."""
     import pyarrow
 
-    table = file.read(columns=[name])
+    table = file.read(columns=[name], use_threads=False)
     while pyarrow.types.is_struct(table.schema.field(0).type):
         table = table.flatten()
     column = table.column(0)
@@ -73,5 +79,5 @@ def _column(file: Any, name: str, _: int) -> NDArray[Any]:
     return values
 
 
-_FORMAT = ArrayFormat("a Parquet file", _opened)
+_FORMAT = ArrayFormat("a Parquet file", _opened, _library)
 read, header, peek = _FORMAT.read, _FORMAT.header, _FORMAT.peek

@@ -17,17 +17,23 @@ from inercal.findings import Finding
 from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray
 
 
+def _library(_: Path) -> tuple[Any, Any]:
+    """The parts of npTDMS that are used; raises `MissingExtraError`."""
+    try:
+        from nptdms import TdmsFile
+        from nptdms.log import log_manager
+    except ImportError as error:
+        raise MissingExtraError("Reading TDMS files", "files") from error
+    return TdmsFile, log_manager
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[Contents]:
     """The channels as ``"Group/Channel"``, with their units; waveforms have a clock, ``"Group/waveform time"``.
 
     Where the waveforms state when they began, times count from the first of them.
     """
-    try:
-        from nptdms import TdmsFile
-        from nptdms.log import log_manager
-    except ImportError as error:
-        raise MissingExtraError("Reading TDMS files", "files") from error
+    TdmsFile, log_manager = _library(path)
     log_manager.set_level(logging.ERROR)  # what it warns of becomes a finding
     with path.open("rb") as stream, TdmsFile.open(stream, raw_timestamps=True) as file:
         channels = [channel for group in file.groups() for channel in group.channels() if len(channel)]
@@ -85,5 +91,5 @@ def _column(channel: Any, _: int) -> NDArray[Any]:
     return numbers
 
 
-_FORMAT = ArrayFormat("a TDMS file", _opened)
+_FORMAT = ArrayFormat("a TDMS file", _opened, _library)
 read, header, peek = _FORMAT.read, _FORMAT.header, _FORMAT.peek

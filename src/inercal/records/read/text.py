@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from itertools import chain, repeat
 from pathlib import Path
@@ -21,11 +21,14 @@ from inercal.errors import RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel, may_be_empty
 from inercal.records.checks import too_long
-from inercal.records.places import counted, places
+from inercal.records.places import counted, counted_names, places, shortened
 from inercal.records.read.layout import Block, Layout, blocks, find_layout, is_rounded
 from inercal.records.read.table import LARGEST, FileOptions, Sample, Table
 from inercal.records.titles import EXAMPLE, bare, canonical
 from inercal.units import shown
+
+UNENDED = "no line end follows: the last number"
+"""Beginning of the finding on a last line that may have had more digits."""
 
 _HEADER_LINES = 50
 _LAYOUT_LINES = 400
@@ -81,7 +84,7 @@ def read(
             path, f"no row of numbers, line {layout.first + 1} is {shown(line)}, expected numbers"
         )
     count = len(next(iter(values.values())))
-    findings = _findings(flaws, tuple(numbers), block, layout.width)
+    findings = _findings(flaws, tuple(numbers), block, layout, set(numbers.values()))
     findings += tuple(too_long(name, "line", lines) for name, lines in rounded.items() if lines)
     return [Table(tuple(located), values, contents(layout), count, tuple(labels), findings)]
 
@@ -161,9 +164,9 @@ def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
 
 def contents(layout: Layout) -> str:
     """The contents of the file in words."""
-    return (
-        f"columns {', '.join(layout.header)}" if layout.header else f"{layout.width} columns without a header"
-    )
+    if not layout.header:
+        return f"{layout.width} columns without a header"
+    return f"columns {counted_names([shortened(name) for name in layout.header], 20)}"
 
 
 def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | None:
@@ -176,6 +179,8 @@ def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | 
     if widths != {layout.width} or any(map(str.startswith, lines, repeat(layout.comments))):
         return None
     if layout.decimal == ",":
+        if any("." in line for line in lines):
+            return None
         lines = [line.replace(",", ".") for line in lines]
     try:
         rows: Array = np.loadtxt(lines, delimiter=delimiter, usecols=indices, comments=None, ndmin=2)
@@ -224,8 +229,18 @@ def _labels(block: Block, layout: Layout, index: int) -> list[str]:
     return [sys.intern(fields[index].strip()) if fields else "" for fields in rows]
 
 
+def _cut(last: Block, layout: Layout) -> str:
+    """The last number of a block that does not end with a line end, if it may have had more digits; else nothing."""
+    *before, line = last.lines[-_LAYOUT_LINES:]
+    fields = layout.fields(line) if layout.is_row(line) else None
+    if fields is None or not fields[-1].strip():
+        return ""
+    rows = (layout.fields(each) for each in before if layout.is_row(each))
+    return "" if layout.is_whole(fields[-1], [row[-1] for row in rows if row]) else fields[-1].strip()
+
+
 def _findings(
-    flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, width: int
+    flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, layout: Layout, indices: Collection[int]
 ) -> tuple[Finding, ...]:
     """Findings on rows that cannot be read, and on a file that ends too soon."""
     none = np.empty(0, np.int64)
@@ -236,8 +251,10 @@ def _findings(
         findings.append(Finding("truncated", "the file ends within a row", f"line {last.last}"))
     elif last.early:
         findings.append(Finding("truncated", "the compressed data ends too soon", f"line {last.last}"))
+    elif last.cut and layout.width - 1 in indices and (number := _cut(last, layout)):
+        findings.append(Finding("truncated", f"{UNENDED}, {shown(number)}, may be cut", f"line {last.last}"))
     if bad.size:
-        text = f"{counted(bad.size, 'row')} other than {width} fields with numbers, left as NaN"
+        text = f"{counted(bad.size, 'row')} other than {layout.width} fields with numbers, left as NaN"
         findings.append(Finding("bad_row", text, places("line", bad)))
     for index, name in enumerate(names):
         lines = np.concatenate([none, *(flaw.missing[index] for flaw in flaws)])

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from inercal.errors import RecordError
+from inercal.findings import Finding
 from inercal.records.channels import Channel
 from inercal.records.read.arrays import Contents, held, tables
 from inercal.records.read.layout import blocks, find_layout
 from inercal.records.read.table import FileOptions, Table
+from inercal.records.read.text import UNENDED
 
 
 def read(
@@ -24,8 +26,10 @@ def read(
 
     Raises `RecordError` where the lines have no numbers, or not equally many.
     """
+    lines: list[str] = []
     with path.open("rb") as file:
-        lines = [line for block in blocks(file, path) for line in block.lines]
+        for block in blocks(file, path):
+            lines += block.lines
     layout = find_layout(lines, options, path).settled(lines)
     rows = [layout.fields(line) for line in lines[options.skip :] if layout.is_row(line)]
     if any(row is None for row in rows):
@@ -39,6 +43,11 @@ def read(
     if any(value is None for row in numbers for value in row):
         raise RecordError(path, "found words among the numbers, expected a line of numbers for each channel")
     values = np.array(numbers, dtype=float)
+    last = texts[-1]
+    cut = block.cut and not layout.is_whole(last[-1], last[named:-1])
+    findings = (
+        (Finding("truncated", f"{UNENDED}, {last[-1]}, may be cut", f"line {block.last}"),) if cut else ()
+    )
     progress(path.stat().st_size)
     columns = {name: held(row) for name, row in zip(names, values, strict=True)}
-    return tables(Contents(columns, tabular=True), options, channels or (), path, mapped=True)
+    return tables(Contents(columns, findings, tabular=True), options, channels or (), path, mapped=True)

@@ -9,7 +9,7 @@ Bounds, 2007): its Riccati recursion needs no measurements. Split by source, it 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeAlias
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
-from inercal.selfcal.filters.gaps import anew
+from inercal.selfcal.filters.gaps import anew, walking
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
 from inercal.selfcal.platform.coefficients import names, product_slope, to_linear
 from inercal.selfcal.platform.kinematics import attitude
@@ -124,7 +124,8 @@ def recorded_bounds(
     """
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     path = recording.th, recording.dt, recording.rate
-    return _along(attitudes, *path, seen, coefficients, problem, history, contributions, restarts)
+    walked = None if recording.walked is None else recording.walked / recording.dt
+    return _along(attitudes, *path, seen, coefficients, problem, history, contributions, restarts, walked)
 
 
 def _along(
@@ -138,8 +139,10 @@ def _along(
     history: bool,
     contributions: bool,
     restarts: Sequence[int] = (),
+    walked: Array | None = None,
 ) -> PathBounds:
-    """Bounds along attitudes (n, 4) with coefficients (p,), linear form."""
+    """Bounds along attitudes (n, 4) with coefficients (p,), linear form; ``walked`` (n - 1,) factors of the variance of
+    the angle random walk in each step."""
     p, noise = len(c), problem.noise
     u = np.empty((len(q) if history else 0, p))
     start = np.zeros((2, 3 + p))
@@ -150,8 +153,9 @@ def _along(
         P[3], P[4] = np.diag(start[0]), np.diag(start[1])
     first, angles = 0, np.arange(3)
     for last in (*restarts, len(q)):
-        rows, steps = slice(first, last), slice(first, max(last - 1, 0))
-        riccati(P, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows]), c, problem.model, u[rows])
+        for begin, end, own in _evenly(first, last, problem, walked):
+            rows, steps = slice(begin, end), slice(begin, max(end - 1, 0))
+            riccati(P, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows]), c, own.model, u[rows])
         if last < len(q):
             P[:, :3], P[:, :, :3] = 0.0, 0.0
             P[:, angles, angles] = [
@@ -162,6 +166,19 @@ def _along(
     whole, *parts = (slope @ each[3:, 3:] @ slope.T for each in P)
     split = dict(zip(SOURCES, parts, strict=True)) if contributions else {}
     return PathBounds(names(p), whole, problem.prior, u, split)
+
+
+def _evenly(
+    first: int, last: int, problem: FilterProblem, walked: Array | None
+) -> Iterator[tuple[int, int, FilterProblem]]:
+    """Rows from ``first`` to ``last`` in parts of one random walk, with the problem of each; a part begins with the
+    last row of the one before, which counts there."""
+    begin = first
+    for k in () if walked is None else np.flatnonzero(walked[first : max(last - 1, first)] != 1.0) + first:
+        yield begin, int(k) + 1, problem
+        yield int(k), int(k) + 2, walking(problem, float(walked[k]))  # type: ignore[index]
+        begin = int(k) + 1
+    yield begin, last, problem
 
 
 @kernel

@@ -84,8 +84,9 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
 _UNITS = {"wc": "deg/h", "th": "deg", "acc": "m/s^2"}
 
 
-def to_record(recording: Recording) -> Record:
-    """A record as a file holds it: ``t``, ``wc_x..`` (the last row's empty), ``th_x..``, ``acc_x..``."""
+def to_record(recording: Recording, attitude: Array | None = None) -> Record:
+    """A record as a file holds it: ``t``, ``wc_x..`` (the last row's empty), ``th_x..``, ``acc_x..``, and ``q_ref_0..``
+    where the true ``attitude`` (n, 4) q_bp is given."""
     values = {
         "wc": np.vstack([recording.rate, np.full(3, np.nan)]),
         "th": recording.th,
@@ -97,4 +98,6 @@ def to_record(recording: Recording) -> Record:
         columns += [
             (f"{sensor}_{axis}", unit, values[sensor][:, k] / unit.factor) for k, axis in enumerate("xyz")
         ]
+    if attitude is not None:
+        columns += [(f"q_ref_{k}", parse_unit("1"), attitude[:, k]) for k in range(4)]
     return record_of(columns, recording.t)

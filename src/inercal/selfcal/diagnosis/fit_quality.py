@@ -35,7 +35,7 @@ JUDGE = ErrorState()
 
 def filtered(case: Case) -> FilterResult:
     """Result of the error-state filter for a case."""
-    return estimate(*case, "error-state")
+    return estimate(*case, "error-state", twice=False)
 
 
 def regular(recording: Recording, result: FilterResult) -> Array:

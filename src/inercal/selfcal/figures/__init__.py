@@ -16,7 +16,9 @@ from inercal.report.innovations import innovations, nis
 from inercal.selfcal.figures.filters import (
     attitude_correction,
     attitude_errors,
+    attitudes_apart,
     bounds_beside,
+    changes_of_turn,
     filters_apart,
     gimbals_on_base,
     path_of,
@@ -33,6 +35,7 @@ from inercal.selfcal.platform.coefficients import (
     to_product,
 )
 from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.result.comparison import with_stated
 from inercal.selfcal.result.tables import weak_combinations
 from inercal.selfcal.task import compared
 
@@ -44,6 +47,8 @@ if TYPE_CHECKING:
 
 _AT_ONCE = ("map", "lm")
 """Estimators that know all at once: their coefficients have no course over time."""
+
+_OF_THE_PAPER = ("svd-qukf", "gimbal-ukf")
 
 _CHANNELS = ("acc x", "acc y", "acc z")
 
@@ -63,8 +68,8 @@ def page(calibration: Calibration) -> str:
 def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first.
 
-    ``attitude`` (n, 4) is the true q_bp at each row of a simulation; without it the attitude is drawn against the
-    encoders'.
+    ``attitude`` (n, 4) is the true q_bp at each row, that of the recording if absent; without one the attitude is drawn
+    against the encoders'.
     """
     filtered, estimate = calibration.filtered, calibration.estimate.shown()
     t, history = calibration.recording.t, filtered.history
@@ -73,7 +78,8 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
         drawings += convergence(calibration)
     drawings += [_path(calibration), gimbals_on_base(calibration.settings.base, calibration.settings.gimbals)]
     if history is not None:
-        drawings.append(_attitude(calibration, history, attitude))
+        true = calibration.recording.reference if attitude is None else attitude
+        drawings += _attitude(calibration, history, true)
         if filtered.kind not in _AT_ONCE:
             drawings.append(relative_errors(t, history, calibration.truth))
     drawings.append(nis(t[1:], filtered.nis, filtered.dims))
@@ -97,7 +103,7 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     filters = _all(calibration)
     if len(filters) < 2:
         return []
-    values, u = product_form(calibration.filtered)
+    values, u = with_stated(calibration.filtered, calibration.stated)
     first = calibration.filtered.kind
     apart: dict[str, Array] = {
         kind: (product_form(each)[0] - values) / u for kind, each in filters.items() if kind != first
@@ -176,22 +182,29 @@ def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
     )
 
 
-def _attitude(calibration: Calibration, history: History, truth: Array | None) -> Picture:
-    """The attitude against the truth where that is known, else against the encoders."""
-    t = calibration.recording.t
+def _attitude(calibration: Calibration, history: History, truth: Array | None) -> list[Picture]:
+    """The attitude against the truth where that is known, else against the encoders; and filters that were compared
+    against the paper's, or the one that counts."""
+    t, th, own = calibration.recording.t, calibration.recording.th, calibration.filtered.kind
+    courses: dict[str, Array] = {
+        kind: each.history.attitude
+        for kind, each in _all(calibration).items()
+        if each.history is not None and kind in (own, *_OF_THE_PAPER)
+    }
+    changes = changes_of_turn(t, th)
+    drawings = []
+    if len(courses) > 1:
+        by = "svd-qukf" if "svd-qukf" in courses else own
+        others = {kind: q for kind, q in courses.items() if kind != by}
+        drawings = [attitudes_apart(t, courses[by], others, by, changes)]
     if truth is not None:
-        courses: dict[str, Array] = {
-            kind: each.history.attitude
-            for kind, each in _all(calibration).items()
-            if each.history is not None and kind in (calibration.filtered.kind, "svd-qukf", "gimbal-ukf")
-        }
-        return attitude_errors(t, truth, courses)
-    th = calibration.recording.th
+        return [attitude_errors(t, truth, courses, changes), *drawings]
     read, _ = residuals.gimbals(np.nan_to_num(th), calibration.problem.world)
     correction = boxminus(history.attitude, read)
     correction[np.isnan(th).any(axis=1)] = np.nan
     about_axes = calibration.filtered.kind != "gimbal-ukf"
-    return attitude_correction(t, correction, history.attitude_u if about_axes else None)
+    correction_u = history.attitude_u if about_axes else None
+    return [attitude_correction(t, correction, correction_u, changes), *drawings]
 
 
 def _bounds(calibration: Calibration) -> Picture:

@@ -8,13 +8,14 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded
-from inercal.report.courses import Line, panels_of_lines, path
+from inercal.report.courses import Line, panels_of_lines, path, turning
 from inercal.report.html import Picture
 from inercal.report.marks import Axis, Dots, Level, Mark, Panel, Strips
 from inercal.report.panels import draw
 from inercal.report.rig import Triad, Turn, rig
 from inercal.report.style import ALARM, COLOURS, QUIET, plain_unit, power_of_ten
 from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals
+from inercal.selfcal.result.comparison import attitude_errors as errors_of
 
 _MARKS = "osD^vP"
 
@@ -45,13 +46,49 @@ def gimbals_on_base(base: Base, gimbals: Gimbals) -> Picture:
     )
 
 
-def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> Picture:
+def changes_of_turn(t: Array, th: Array) -> list[float]:
+    """Times [s] within a record at which another joint begins or ends to turn, by angles (n, 3) [rad]; those within 5 s
+    are one, more than 40 none."""
+    edges = sorted(edge for angle in th.T for span in turning(t, angle) for edge in span)
+    apart = [edge for k, edge in enumerate(edges) if k == 0 or edge - edges[k - 1] > 5.0]
+    inside = [edge for edge in apart if t[0] + 5.0 < edge < t[-1] - 5.0]
+    return inside if len(inside) <= 40 else []
+
+
+def attitude_errors(
+    t: Array, truth: Array, attitudes: Mapping[str, Array], changes: Sequence[float] = ()
+) -> Picture:
     """Errors of attitudes (n, 4), by the name of the filter, against the ``truth`` (n, 4) over ``t`` (n,) [s]; q and -q
-    are one attitude."""
-    errors = {}
-    for label, q in attitudes.items():
-        sign = np.where(np.sum(q * truth, axis=1) < 0.0, -1.0, 1.0)
-        errors[label] = sign[:, None] * q - truth
+    are one attitude. Dots at the ``changes`` [s] of the turn."""
+    errors = {label: errors_of(q, truth).q for label, q in attitudes.items()}
+    return _components(
+        "Error of the attitude",
+        "Estimated less true components of the unit quaternion of the platform's attitude; the gimbal-angle filter's "
+        "angles are converted. A component is off by half the angle in radians at most.",
+        t,
+        errors,
+        changes,
+    )
+
+
+def attitudes_apart(
+    t: Array, first: Array, others: Mapping[str, Array], by: str, changes: Sequence[float] = ()
+) -> Picture:
+    """Attitudes (n, 4) of other filters less that of the ``first`` (n, 4), of the name ``by``, over ``t`` (n,) [s]."""
+    return _components(
+        "Attitudes of the filters apart",
+        f"Components of the unit quaternion of each filter less those of {by}: what one line of the picture of errors "
+        "hides under the other.",
+        t,
+        {label: errors_of(q, first).q for label, q in others.items()},
+        changes,
+    )
+
+
+def _components(
+    title: str, caption: str, t: Array, errors: Mapping[str, Array], changes: Sequence[float]
+) -> Picture:
+    """A panel for each component of ``errors`` (n, 4), by the name of the filter."""
     finite = (np.abs(e[np.isfinite(e)]) for e in errors.values())
     largest = max((float(e.max(initial=0.0)) for e in finite), default=0.0)
     power = 3 * int(np.floor(np.log10(largest) / 3.0)) if 0.0 < largest < 1e100 else 0
@@ -63,19 +100,16 @@ def attitude_errors(t: Array, truth: Array, attitudes: Mapping[str, Array]) -> P
         f"{label} " + ", ".join(f"{x:.1e}" for x in np.sqrt(np.nanmean(np.square(e), axis=0)))
         for label, e in errors.items()
     )
-    return panels_of_lines(
-        "Error of the attitude",
-        "Estimated less true components of the unit quaternion of the platform's attitude; the gimbal-angle filter's "
-        f"angles are converted. A component is off by half the angle in radians at most. Root mean square of q0, q1, "
-        f"q2, q3: {rms}.",
-        t,
-        panels,
-    )
+    dots = " Dotted: changes of the turn." if changes else ""
+    text = f"{caption}{dots} Root mean square of q0, q1, q2, q3: {rms}."
+    return panels_of_lines(title, text, t, panels, changes)
 
 
-def attitude_correction(t: Array, correction: Array, u: Array | None) -> Picture:
+def attitude_correction(
+    t: Array, correction: Array, u: Array | None, changes: Sequence[float] = ()
+) -> Picture:
     """Rotation (n, 3) [rad] from the encoders' attitude to the estimated one, about the axes of p, over ``t`` (n,) [s],
-    with the standard uncertainties ``u`` (n, 3) [rad] of the estimate."""
+    with the standard uncertainties ``u`` (n, 3) [rad] of the estimate; dots at the ``changes`` [s] of the turn."""
     arcsec = np.radians(1.0 / 3600.0)
     bands = [None] * 3 if u is None else list(2.0 * u.T / arcsec)
     panels = {
@@ -89,6 +123,7 @@ def attitude_correction(t: Array, correction: Array, u: Array | None) -> Picture
         f"seconds of arc: mostly the noise of the encoders.{band}",
         t,
         panels,
+        changes,
     )
 
 
@@ -141,7 +176,8 @@ def filters_apart(names: Sequence[str], apart: Mapping[str, Array], first: str) 
         "Filters against each other",
         f"Estimate of each filter less that of {first}, over the standard uncertainty of {first}; logarithmic beyond "
         f"± {linear:g}. Band: ± 1. All have the same data: good approximations lie close together; lm, which "
-        "leaves the noise of the gyros out of its fit, is a start for others and lies up to some u away.",
+        "leaves the noise of the gyros out of its fit, is a start for others and lies up to some u away, and so may "
+        "linear, which is linearised once, about the commanded path.",
         [[Panel(marks, across, Axis(names=names), grid="both")]],
         0.8 + 0.17 * len(names),
         6,

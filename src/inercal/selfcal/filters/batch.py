@@ -87,7 +87,7 @@ def estimate_map(
     for _ in range(ITERATIONS):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # lost numbers are refused below
-                terms = _terms(q, c, recording, problem, measured, first, loose)
+                terms = terms_at(q, c, recording, problem, measured, first, loose)
                 step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
             message = "the iteration diverged: the normal equations are not positive definite"
@@ -137,7 +137,7 @@ class _Terms(NamedTuple):
     prior: Array
 
 
-def _terms(
+def terms_at(
     q: Array,
     c: Array,
     recording: Recording,
@@ -158,7 +158,7 @@ def _terms(
         by_earth = -dt[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
         slope[:, :, -3:] += np.swapaxes(to_matrix(propagated), 1, 2) @ by_earth
     residual = boxminus(q[1:], propagated)
-    weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(dt))
+    weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(recording.walking))
     weight[list(loose)] = 1.0 / np.pi
     left = inverse_left_jacobian(residual) * weight[:, None, None]
     miss = boxminus(start.attitude, q[0])

@@ -5,13 +5,16 @@ p meanwhile, by 2 seconds of arc after 4 s at 1 deg/s.
 
 That is a guess. So nothing measured after such a step counts before the encoders read again, and where these contradict
 it, as where a turn began or ended meanwhile, the attitude is theirs from then on: coefficients and their covariance
-stay, correlations with the attitude are dropped. Measured rates are dealt with in the same way.
+stay, correlations with the attitude are dropped. Measured rates are dealt with in the same way, but for the noise of
+the one reading that is held: it turns the platform on for T where it was averaged over dt, which makes ARW^2 T^2/dt of
+the ARW^2 T of a command.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
@@ -88,6 +91,23 @@ def with_held(t: Array, rate: Array, th: Array, world: World, gained: bool) -> t
     return filled, tuple(held.tolist())
 
 
+def walked(t: Array, rate: Array, held: Sequence[int]) -> Array:
+    """Time (n - 1,) [s] over which angle random walk gathers in each step, where rates (n - 1, 3) are measured.
+
+    That of a step is its own length, but where a rate is held: with dt the usual interval over which it was averaged,
+    and A, B the time from its row to the begin and the end of the step, ``(B^2 - A^2) / dt``, so that all steps of one
+    rate together have ``B^2 / dt``. ``t`` (n,) [s]; rates are NaN where not recorded.
+    """
+    dt = np.diff(t)
+    out, rows = dt.copy(), np.array(held, dtype=np.int64)
+    if rows.size:
+        before = np.append(np.full(LIMITS.recent_intervals - 1, np.nan), dt)
+        step = usual(np.lib.stride_tricks.sliding_window_view(before, LIMITS.recent_intervals))[rows]
+        since = t[_last(np.all(np.isfinite(rate), axis=1))[rows]]
+        out[rows] = (np.square(t[rows + 1] - since) - np.square(t[rows] - since)) / step
+    return out
+
+
 def _last(complete: NDArray[np.bool_]) -> NDArray[np.int64]:
     """The last complete row before or at each row."""
     return np.asarray(np.maximum.accumulate(np.where(complete, np.arange(len(complete)), 0)))
@@ -100,9 +120,13 @@ def advance(
     steps: Steps,
     held: Sequence[int],
     history: bool = True,
+    walked: Array | None = None,
 ) -> tuple[State, Trace]:
     """Take a recursive filter through m steps, of which those ``held`` are guesses; other arguments as of
-    `inercal.selfcal.filters.error_state.advance`."""
+    `inercal.selfcal.filters.error_state.advance`.
+
+    ``walked`` (m,) [s] as of `inercal.selfcal.platform.recording.Recording`, the steps themselves if absent.
+    """
     if not held:
         state, trace = module.advance(state, problem, steps, history)
         return state, trace
@@ -116,18 +140,25 @@ def advance(
             parts.append(trace)
         unmeasured = step._replace(acc=nothing, th=nothing)
         own = State._make(each.copy() for each in state)  # as a filter uses up the arrays that it is given
-        propagated, trace = module.advance(own, problem, unmeasured, history)
+        restless = problem if walked is None else walking(problem, walked[k] / steps.dt[k])
+        propagated, trace = module.advance(own, restless, unmeasured, history)
         if not seen[k]:
             state = propagated
         elif _contradicted(propagated, problem, steps.th[k]):
             state, trace = _anew(module, propagated, problem, steps.th[k], history)
             restarts.append(k)
         else:
-            state, trace = module.advance(state, problem, step, history)
+            state, trace = module.advance(state, restless, step, history)
         parts.append(trace)
         done = k + 1
     state, trace = module.advance(state, problem, steps.part(slice(done, None)), history)
     return state, _joined([*parts, trace])._replace(restarts=tuple(restarts))
+
+
+def walking(problem: FilterProblem, factor: float) -> FilterProblem:
+    """The problem with a variance of the angle random walk larger by a factor."""
+    walk = math.sqrt(factor) * problem.noise.angle_random_walk
+    return replace(problem, noise=replace(problem.noise, angle_random_walk=walk))
 
 
 def doubtful(held: Sequence[int], th: Array) -> list[int]:
@@ -145,7 +176,7 @@ def broken(recording: Recording, problem: FilterProblem, start: Start | None = N
         return []
     state = error_state.initial(problem, recording.th[0], start)
     steps = recording.steps
-    _, trace = advance(error_state, state, problem, steps, recording.held, history=False)
+    _, trace = advance(error_state, state, problem, steps, recording.held, False, recording.walked)
     seen = np.all(np.isfinite(steps.th), axis=1)
     return [
         k for k in recording.held for end in trace.restarts if k <= end and not seen[k:end].any()

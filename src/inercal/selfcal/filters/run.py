@@ -22,7 +22,9 @@ from inercal.selfcal.filters.filter_result import (
     estimate_of,
 )
 from inercal.selfcal.filters.gaps import advance
+from inercal.selfcal.filters.linear import estimate_linear
 from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.filters.second_pass import is_due, second_pass
 from inercal.selfcal.filters.start import estimate_lm
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording, Steps
@@ -32,10 +34,10 @@ _LOADED = set[FilterKind]()
 
 
 def recursive(kind: FilterKind) -> ModuleType | None:
-    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map`` and ``lm``."""
+    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map``, ``lm`` and ``linear``."""
     return {
         "error-state": error_state, "mukf": multiplicative, "svd-qukf": quaternion, "gimbal-ukf": gimbal,
-        "map": None, "lm": None,
+        "map": None, "lm": None, "linear": None,
     }[kind]  # fmt: skip
 
 
@@ -45,22 +47,30 @@ def estimate(
     kind: FilterKind | None = None,
     start: Start | None = None,
     history: bool = True,
+    twice: bool = True,
 ) -> FilterResult:
     """Estimate the coefficients from a recording, by the estimator of the problem or another ``kind``.
 
     ``start`` of the attitude is the first encoder reading if absent; with ``history`` the estimates after each row are
-    kept.
+    kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`), if ``twice``; history
+    but its last row, innovations and NIS are those of the first pass.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
     if module is None:
-        whole = estimate_map if kind == "map" else estimate_lm
+        whole = {"map": estimate_map, "lm": estimate_lm, "linear": estimate_linear}[kind]
         return whole(recording, problem, start, history)
     load_kernels(kind, problem)
     began = time.perf_counter()
     state: State = module.initial(problem, recording.th[0], start)
     first = estimate_of(state, problem)
-    state, trace = advance(module, state, problem, recording.steps, recording.held, history)
+    motion = recording.steps, recording.held
+    state, trace = advance(module, state, problem, *motion, history, recording.walked)
+    last = None
+    if twice and is_due(kind, problem):
+        begun = module.initial(problem, recording.th[0], start)
+        state = second_pass(module, begun, state, problem, *motion, recording.walked)
+        last = estimate_of(state, problem)
     seconds = time.perf_counter() - began
     size = len(problem.prior)
     result = FilterResult(
@@ -71,7 +81,7 @@ def estimate(
         nis=trace.estimates.nis,
         dims=trace.estimates.dims,
         innovations=trace.estimates.innovations,
-        history=_history(first, trace) if history else None,
+        history=_history(first, trace, last) if history else None,
         seconds=seconds,
         lowest_eigenvalue=trace.lowest_eigenvalue,
         fallbacks=trace.fallbacks,
@@ -92,10 +102,14 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
         _LOADED.add(kind)
 
 
-def _history(first: History, trace: Trace) -> History:
-    """The estimates of the start and of all steps."""
+def _history(first: History, trace: Trace, last: History | None) -> History:
+    """The estimates of the start and of all steps; with another one of the last."""
     of_steps = trace.estimates._asdict()
-    return History(**{name: np.concatenate([row, of_steps[name]]) for name, row in vars(first).items()})
+    whole = {name: np.concatenate([row, of_steps[name]]) for name, row in vars(first).items()}
+    if last is not None:
+        for name, row in vars(last).items():
+            whole[name][-1:] = row
+    return History(**whole)
 
 
 def _fault(result: FilterResult) -> str:

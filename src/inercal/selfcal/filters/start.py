@@ -77,7 +77,7 @@ def estimate_lm(
             f"the platform did not turn on as before from t = {recording.t[loose[0]]:.10g} s on, where no rate was "
             "recorded, and a fit of one path cannot go on behind that: use map or a filter"
         )
-    wander = arw**2 * (recording.t[1:] - recording.t[0])
+    wander = arw**2 * np.cumsum(recording.walking)
     unknowns, u = _uncertainty(fit, at, recording, arw)
     covariance = unknowns[3:, 3:] * np.outer(problem.prior, problem.prior)
     by_attitude, residual = at.sensed.by_attitude, at.sensed.residual
@@ -212,7 +212,7 @@ def _uncertainty(fit: NonlinearFit, at: _Along, recording: Recording, arw: float
 
     Each step of the wander, isotropic in the inertial frame, moves all rows after it, and the estimates by these.
     """
-    root = arw * np.sqrt(recording.dt)
+    root = arw * np.sqrt(recording.walking)
     C, m, p = to_matrix(at.inertial), len(root), len(at.c)
     gain = fit.gain()[:, 3 + p :].reshape(3 + p, m, 6)
     by_row = np.einsum("pki,kij,klj->kpl", gain, at.sensed.by_attitude, C[1:], optimize=True)
@@ -223,7 +223,7 @@ def _uncertainty(fit: NonlinearFit, at: _Along, recording: Recording, arw: float
     crossed = np.zeros((m + 1, 3 + p, 3))
     crossed[1:] = np.cumsum(moved * root[:, None, None], axis=0)
     shared = np.einsum("kip,kpl,kli->ki", S, crossed, C, optimize=True)
-    wander = arw**2 * (recording.t - recording.t[0])
+    wander = np.append(0.0, np.cumsum(root**2))
     variance = np.einsum("kip,pq,kiq->ki", S, unknowns, S, optimize=True) - 2.0 * shared + wander[:, None]
     with np.errstate(invalid="ignore"):  # unknown where a huge wander leaves but rounding
         return unknowns, np.sqrt(variance)

@@ -32,9 +32,11 @@ class Recording:
     """A recording of a platform; NaN where a number is missing.
 
     ``t`` (n,) [s], increasing; ``rate`` (n - 1, 3) [rad/s] of the platform against inertial space, in p, held from each
-    row to the next: commanded, or ``measured`` by gyros. ``th`` (n, 3) [rad] gimbal angles, continuous through full
+    row to the next: commanded, or ``measured`` by gyros, whose noise gathers over the time ``walked`` (n - 1,) [s] in
+    each step, the step itself if None. ``th`` (n, 3) [rad] gimbal angles, continuous through full
     turns, the first row complete; ``acc`` (n, 3) [m/s^2], the first row not used. ``held``: steps whose rate was not
     recorded (`inercal.selfcal.filters.gaps`). ``temperature``: mean and standard deviation of the recorded one.
+    ``reference`` (n, 4) q_bp by another instrument, or the truth of a simulation.
     """
 
     t: Array
@@ -46,6 +48,8 @@ class Recording:
     sources: tuple[Source, ...] = ()
     held: tuple[int, ...] = ()
     temperature: Quantity | None = None
+    walked: Array | None = None
+    reference: Array | None = None
 
     @property
     def dt(self) -> Array:
@@ -56,6 +60,11 @@ class Recording:
     def steps(self) -> Steps:
         """The n - 1 steps from row to row."""
         return Steps(self.dt, self.rate, self.acc[1:], self.th[1:])
+
+    @property
+    def walking(self) -> Array:
+        """(n - 1,) s, over which angle random walk gathers in each step."""
+        return self.dt if self.walked is None else self.walked
 
     @property
     def scalars(self) -> int:

@@ -91,8 +91,7 @@ def assemble(
         "bounds": {},
         "at_prior": [],
         "goal": {},
-        "step_us": filtered.step_us,
-        "sample_share": 1e-6 * filtered.step_us / interval,
+        "sample_interval": interval,
         "compare": {},
     }
     slope, values = product_slope(filtered.coefficients), to_product(filtered.coefficients)

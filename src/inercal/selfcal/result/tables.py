@@ -13,9 +13,10 @@ from inercal.estimate.rounding import rounded, short
 from inercal.estimate.table import Table, heads
 from inercal.records.places import counted
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
-from inercal.selfcal.filters.filter_result import FilterResult, product_form
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import names, shown_units
 from inercal.selfcal.platform.plan import Plan, Turn
+from inercal.selfcal.result.comparison import attitude_errors, with_stated
 
 if TYPE_CHECKING:
     from inercal.selfcal.before.bounds import PathBounds
@@ -30,20 +31,22 @@ _JOINTS = {"x": "outer", "y": "inner", "z": "platform"}
 
 def side_by_side(
     filters: Mapping[FilterKind, FilterResult],
+    stated: Array,
     truth: Array | None,
     interval: float,
     status: Mapping[str, str],
 ) -> list[Table]:
     """Tables of estimates, of differences or errors, and of verdict and time.
 
-    The filter that counts is the first; ``truth`` (p,) or longer, product form, where known; ``interval`` [s] from
-    sample to sample; ``status`` the verdicts that there are, by name.
+    The filter that counts is the first; ``stated`` (p,) is the variance that what is stated adds to each; ``truth``
+    (p,) or longer, product form, where known; ``interval`` [s] from sample to sample; ``status`` the verdicts that
+    there are, by name.
     """
     (_, first), *_ = filters.items()
     p = len(first.coefficients)
     units, size = shown_units(p)
-    by_filter = {kind: product_form(each) for kind, each in filters.items()}
-    values, u = product_form(first)
+    by_filter = {kind: with_stated(each, stated) for kind, each in filters.items()}
+    values, u = with_stated(first, stated)
     true = None if truth is None else truth[:p]
     rows, costs = [], []
     for k, name in enumerate(names(p)):
@@ -81,6 +84,24 @@ def side_by_side(
             3,
         ),
     ]
+
+
+def of_attitudes(filters: Mapping[FilterKind, FilterResult], reference: Array) -> Table:
+    """Errors of the attitude of each filter against the true one (n, 4)."""
+    rows = []
+    for kind, each in filters.items():
+        if each.history is not None:
+            q, angle = attitude_errors(each.history.attitude, reference).rms
+            arcsec = short(float(np.degrees(angle)) * 3600.0)
+            rows.append((kind, *(f"{float(part):.3g}" for part in q), arcsec))
+    return Table(
+        "Errors of the attitude",
+        "Root mean square over all rows of the estimated less the true components of the unit quaternion q_bp, and of "
+        "the angle between both. A filter knows the rows up to its own, map and lm all; those of lm hold the wander of "
+        "the gyros.",
+        heads("filter", *(f"q{k}" for k in range(4)), "angle [″]"),
+        tuple(rows),
+    )
 
 
 def _apart(

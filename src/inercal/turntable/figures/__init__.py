@@ -1,4 +1,4 @@
-"""Pictures and the page of a calibration on a turntable, by positions or by rates."""
+"""Pictures and the page of a calibration on a turntable, by positions, by rates or by small steps."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from inercal.report.sphere import NUMBERED, hemispheres
 from inercal.report.style import INK, plain_unit
 from inercal.rigs.outputs import gravity_reference
 from inercal.turntable.figures.rates import residuals_by_rate
+from inercal.turntable.figures.steps import response_by_input
 from inercal.turntable.figures.table import rig
 from inercal.turntable.rate.calibration import RateCalibration
 from inercal.turntable.regression import Regression
+from inercal.turntable.steps.calibration import StepCalibration
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -33,23 +35,29 @@ _SCOPES = {
 }
 
 
-def main(calibration: PositionCalibration | RateCalibration) -> Picture:
+def main(calibration: PositionCalibration | RateCalibration | StepCalibration) -> Picture:
     """The picture that answers the question: the residuals, or the positions where these do not identify the terms."""
     return pictures(calibration)[0]
 
 
-def page(calibration: PositionCalibration | RateCalibration) -> str:
+def page(calibration: PositionCalibration | RateCalibration | StepCalibration) -> str:
     """The report of a calibration as one self-contained HTML page."""
     return render(calibration.shown, pictures(calibration), "Calibration on a turntable")
 
 
-def pictures(calibration: PositionCalibration | RateCalibration) -> list[Picture]:
+def pictures(calibration: PositionCalibration | RateCalibration | StepCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first.
 
     Where the positions do not identify the terms there are those of positions and table alone; where no gyro could be
-    fitted by rates there is none.
+    fitted by rates, or no accelerometer by steps, there is none.
     """
     estimate = calibration.shown
+    if isinstance(calibration, StepCalibration):
+        if not estimate.names:
+            return []
+        scale = {f"acc_{each.axis}": float(each.values[1]) for each in calibration.responses}
+        steps = response_by_input(estimate.result["steps"], scale)
+        return [steps, values(estimate), correlation(estimate), budget(estimate)]
     if isinstance(calibration, RateCalibration):
         if not estimate.names:
             return []

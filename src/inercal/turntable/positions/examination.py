@@ -6,12 +6,14 @@ is noise alone, and as nearly as Welch and Satterthwaite's nu says where the sta
 The same risk, divided by the number of faults, holds for each. Candidates come from `inercal.estimate.hypotheses`,
 ranked by their score, which costs no fit.
 
-Of faults that are not significant, one beyond what chance does to most counts in u with the shift that it would be:
-else a fault that is too small for the test, and large for a value, would pass.
+A fault that is not significant may be there all the same. A test whose fault has the chance p supports it by
+``1 / (-e p ln p)`` at most (Sellke, Bayarri and Berger, The American Statistician 55 (2001) 62), so that with the odds
+before the test, the same for all faults, each has a probability; one of them is taken to be there, or none.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -34,34 +36,56 @@ SIMPLER = 0.8
 TINY = 1e-300
 """Least chance that has a logarithm."""
 
+MANY = 1e6
+"""Degrees of freedom from which a variance counts as known."""
+
 SEEN = 0.01
-"""Part of a fault's effect outside the terms below which it counts as no more than this."""
+"""Part of a fault's effect outside the terms below which it does not show."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A fault in the residuals: ``base`` (m, r) its parameters that show, ``columns`` (n c + q, r) what is left of them
-    beside the terms, and ``spread`` (m, m) a root of the covariance of all its parameters."""
+    """A fault in the residuals.
+
+    Attributes
+    ----------
+    base : (m, r)
+        Its parameters that show, of unit covariance.
+    columns : (n c + q, r)
+        What is left of them beside the terms.
+    hidden : (m, m - r)
+        Orthonormal combinations of its parameters that do not show.
+    reach : float
+        Size of a fault, in standard uncertainties, that is named in half of the tests.
+    """
 
     fault: Fault
     base: Array
     columns: Array
-    spread: Array
+    hidden: Array
+    reach: float
 
 
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """A fault that was fitted beside the terms: its ``values`` (m,), and their probability by ``chance``."""
+    """A fault that was fitted beside the terms: its ``values`` (m,), their probability by ``chance`` in a sound test,
+    and the ``probability`` that it is there."""
 
-    fault: Fault
+    seen: Seen
     values: Array
     chance: float
+    probability: float = 1.0
+
+    @property
+    def fault(self) -> Fault:
+        """The fault."""
+        return self.seen.fault
 
 
 @dataclass(frozen=True)
 class Examination:
-    """The faults in the residuals: ``significant`` ones, ``doubtful`` ones of which chance is the likelier cause, and
-    all that were ``asked`` for."""
+    """The faults in the residuals: ``significant`` ones, ``doubtful`` ones that may be there, and all that were
+    ``asked`` for."""
 
     significant: tuple[Tested, ...]
     doubtful: tuple[Tested, ...]
@@ -83,30 +107,30 @@ class _White:
 def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> Examination:
     """Ask a fit of the readings for every fault; ``noise`` (c,) as stated."""
     first_fit = fit
-    first, residuals = _seen(fit, faults(means, fit))
+    table = tuple(faults(means, fit))
+    risk = LIMITS.residual_risk / max(len(table), 1)
+    first, residuals = _seen(fit, table, risk)
     asked, significant = first, list[Tested]()
     while True:
         tested = _likely(fit, noise, asked, residuals)
-        risk = LIMITS.residual_risk / max(len(first), 1)
         if not tested or tested[0].chance > risk or len(significant) == MOST:
             break
         significant.append(tested[0])
-        fit = _refitted(fit, noise, next(each for each in asked if each.fault is tested[0].fault))
+        fit = _refitted(fit, noise, tested[0].seen)
         names = {each.fault.name for each in significant}
-        asked, residuals = _seen(fit, (each for each in faults(means, fit) if each.name not in names))
+        asked, residuals = _seen(fit, (each for each in faults(means, fit) if each.name not in names), risk)
     if not first_fit.effects.free.size + first_fit.effects.random.size:
         significant += _within_dwells(means, first, {each.fault.code for each in significant})
-    named = {_place(each.fault) for each in significant}
-    doubtful: dict[tuple[str, bytes], Tested] = {}
-    for each in tested:
-        if each.chance < LIMITS.doubtful and _place(each.fault) not in named:
-            doubtful.setdefault(_place(each.fault), each)
-    return Examination(tuple(significant), tuple(doubtful.values()), tuple(first))
+    doubtful = [each for each in tested if each.chance < LIMITS.doubtful]
+    return Examination(tuple(significant), tuple(_with_probability(doubtful, len(first))), tuple(first))
 
 
-def _place(fault: Fault) -> tuple[str, bytes]:
-    """Code of a fault with the channels that it acts on."""
-    return fault.code, np.any(fault.columns, axis=(0, 2)).tobytes()
+def _with_probability(doubtful: Sequence[Tested], asked: int) -> Iterator[Tested]:
+    """Doubtful faults, of so many ``asked`` for, with the probability that they are there."""
+    odds = LIMITS.fault_odds / max(asked, 1)
+    support = [odds / (-math.e * each.chance * math.log(each.chance)) for each in doubtful]
+    for each, own in zip(doubtful, support, strict=True):
+        yield replace(each, probability=own / (1.0 + sum(support)))
 
 
 def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> Iterator[Tested]:
@@ -119,10 +143,10 @@ def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> I
 
     slopes = means.slopes * (means.times[-1] - means.times[0])
     tested = []
-    for fault in (
-        each.fault for each in asked if each.fault.within is not None and each.fault.code not in codes
-    ):
-        assert fault.within is not None
+    for seen in asked:
+        fault = seen.fault
+        if fault.within is None or fault.code in codes:
+            continue
         k = int(np.argmax(np.abs(fault.within).max(axis=0)))
         rate, slope = fault.within[:, k], slopes[:, k]
         if np.isfinite(slope).all() and len(slope) > 2:
@@ -130,7 +154,8 @@ def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> I
             left = float(np.square(slope - rate * value).sum()) / (len(slope) - 1)
             chance = float(fdtrc(1, len(slope) - 1, value**2 * (rate @ rate) / left)) if left else 1.0
             what = f"{fault.what.rstrip(',')}, as it drifts within the dwells,"
-            tested.append(Tested(replace(fault, what=what), np.array([value]), chance))
+            seen = replace(seen, fault=replace(fault, what=what))
+            tested.append(Tested(seen, np.array([value]), chance))
     named: set[str] = set()
     for each in sorted(tested, key=lambda each: each.chance):
         if each.chance < LIMITS.dwell_risk / len(tested) and each.fault.code not in named:
@@ -158,8 +183,9 @@ def _likely(
     return tested if simplest is None else [simplest, *(each for each in tested if each is not simplest)]
 
 
-def _seen(fit: Regression, asked: Iterable[Fault]) -> tuple[list[Seen], Array]:
-    """The faults beside the terms, and the whitened residuals, both orthogonal to all that is fitted."""
+def _seen(fit: Regression, asked: Iterable[Fault], risk: float) -> tuple[list[Seen], Array]:
+    """The faults beside the terms, and the whitened residuals, both orthogonal to all that is fitted; ``risk`` of a
+    test."""
     weight = fit.weights(fit.noise)
     n, c, _ = fit.rows.shape
     white = whitened(fit.rows, fit.residuals, weight)
@@ -178,10 +204,29 @@ def _seen(fit: Regression, asked: Iterable[Fault]) -> tuple[list[Seen], Array]:
         left = beside(whole / size)
         _, s, vt = np.linalg.svd(left, full_matrices=False)
         known = s > SEEN
-        spread = vt.T / np.maximum(s, SEEN) / size[:, None]
-        base = spread[:, known]
-        made.append(Seen(fault, base, beside(whole @ base), spread))
+        base = vt[known].T / s[known] / size[:, None]
+        columns = beside(whole @ base)
+        gain = np.einsum("nam,nab->mnb", columns[: n * c].reshape(n, c, -1), white.inverse)
+        parts = np.square(fit.noise) * np.square(gain).sum(axis=(0, 1)) / max(len(gain), 1)
+        hidden = np.linalg.qr(vt[~known].T / size[:, None])[0]
+        made.append(Seen(fault, base, columns, hidden, _reach(len(gain), parts, fit.noise_dof, risk)))
     return made, beside(white.right[:, None])[:, 0]
+
+
+def _reach(m: int, parts: Array, noise_dof: Array, risk: float) -> float:
+    """Size of a fault of ``m`` parameters that show, in standard uncertainties, at which its F-test has this risk."""
+    from scipy.special import chdtri, fdtri
+
+    if not m:
+        return math.inf
+    nu = _dof(parts, noise_dof)
+    return math.sqrt(chdtri(m, risk) if nu > MANY else m * fdtri(m, nu, 1.0 - risk))
+
+
+def _dof(parts: Array, noise_dof: Array) -> float:
+    """Degrees of freedom of a variance, by Welch and Satterthwaite: of each channel's noise, ``parts`` (c,) of the
+    variance, those of ``noise_dof`` (c,)."""
+    return 1.0 / max(float(np.sum(np.square(parts) / noise_dof)), 1.0 / MANY)
 
 
 def _hypothesis(seen: Seen) -> Hypothesis[Array]:
@@ -210,7 +255,7 @@ def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested
     try:
         now = _refitted(fit, noise, seen)
     except np.linalg.LinAlgError:
-        return Tested(seen.fault, np.zeros(seen.base.shape[0]), 1.0)
+        return Tested(seen, np.zeros(seen.base.shape[0]), 1.0)
     values, C = now.effect[before:], now.effect_covariance[before:, before:]
     statistic = float(values @ np.linalg.solve(C, values)) / m
     # share of each channel's noise in the covariance of the fault
@@ -218,6 +263,6 @@ def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested
         np.trace(np.linalg.solve(C, s**2 * g @ g.T)) / m
         for s, g in zip(now.noise, np.moveaxis(now.effect_gain[before:], -1, 0), strict=True)
     ]
-    nu = 1.0 / max(float(np.sum(np.square(parts) / now.noise_dof)), 1e-12)
-    chance = float(fdtrc(m, nu, statistic)) if nu < 1e6 else float(chdtrc(m, m * statistic))
-    return Tested(seen.fault, seen.base @ values, chance)
+    nu = _dof(np.array(parts), now.noise_dof)
+    chance = float(fdtrc(m, nu, statistic)) if nu < MANY else float(chdtrc(m, m * statistic))
+    return Tested(seen, seen.base @ values, chance)

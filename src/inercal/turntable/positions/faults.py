@@ -116,7 +116,7 @@ def _drifts(means: Readings, fit: Regression) -> Iterator[Fault]:
             yield Fault(
                 f"warm-up {tau} {name}", "warm_up", column, what, _of_output, "warm-up", within=within
             )
-        changed = _on(means, k, (s - 0.5) * (fitted[:, k] - fitted[:, k].mean()))
+        changed = _on(means, k, (s - 0.5) * fitted[:, k])
         what = f"a drift of the scale factor of {name} over the test"
         yield Fault(f"scale drift {name}", "trend", changed, what, _of_scale, "scale drift")
 

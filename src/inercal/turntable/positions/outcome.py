@@ -155,7 +155,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         scale = Scale(names, terms.slope, uncertainty.u)
         findings += stated_exact(fit, settings.site, scale)
         findings += findings_of(examination, fit, scale, readings.unit)
-        uncertainty = combine(names, [*stated, *doubts(examination, fit, scale, readings.unit)])
+        uncertainty = combine(names, [*stated, *doubts(examination, fit, scale)])
     findings += of_site(names, uncertainty.budget, [each.source for each in fit.model.references])
     return Estimate.of(
         basis,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,12 @@ from inercal.units import Unit
 
 SHOWN = 4
 """Coefficients and faults named at most in a sentence."""
+
+ROUNDING = 1e-9
+"""Part of what a fault does to the values below which a direction of it does nothing."""
+
+DRIFTS = frozenset({"trend", "warm-up", "scale drift"})
+"""Kinds of faults that are others in each run."""
 
 REMEDY: Mapping[str, str] = {
     "trend": "let it settle, state bias_drift, or take the positions in an order without one",
@@ -49,48 +55,90 @@ def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: U
     shown = (unit.factor, unit.symbol)
     for each in examination.significant:
         shift = scale.shift(fit, each.fault.effect(each.values)[..., None])[:, 0]
-        harm = tuple(
-            name for name, by in zip(scale.names, shift, strict=True) if abs(by) > LIMITS.harmful_shift
-        )
+        most = np.abs(shift) + _hidden(each, fit, scale)
+        harm = tuple(name for name, by in zip(scale.names, most, strict=True) if by > LIMITS.harmful_shift)
         text = (
             f"{each.fault.what} of {each.fault.size(each.values, shown)} (by chance with a probability of "
             f"{each.chance:.1g}): it shifts {_largest(scale.names, shift)}; {REMEDY[each.fault.code]}"
         )
         yield Finding(each.fault.code, text, "", harm)
-    worst: dict[str, tuple[float, str]] = {}
+    worst: dict[str, Blind] = {}
     for seen in examination.asked:
-        blind, text = _blind(seen, fit, scale, shown)
-        if blind > max(LIMITS.blind_shift, worst.get(seen.fault.kind, (0.0, ""))[0]):
-            worst[seen.fault.kind] = (blind, text)
+        blind, kind = _blind(seen, fit, scale, shown), seen.fault.kind
+        if blind.shift > worst.get(kind, Blind(LIMITS.blind_shift, "")).shift:
+            worst[kind] = blind
     if worst:
-        texts = "; ".join(text for _, text in worst.values())
-        yield Finding("weak_test", f"the residuals might not show what shifts a value by 2 u: {texts}")
+        yield Finding("weak_test", _weak(worst.values()))
 
 
-def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) -> tuple[float, str]:
-    """The largest shift of a value, over u, by a fault of one standard uncertainty, and in words the size of the fault
-    that would make it 2 u."""
-    shift = scale.shift(fit, seen.fault.columns) @ seen.spread
-    worst = int(np.argmax(np.linalg.norm(shift, axis=1)))
-    most = float(np.linalg.norm(shift[worst]))
-    if not most:
-        return 0.0, ""
-    values = seen.spread @ (shift[worst] / most) * (2.0 / most)
-    return most, f"{seen.fault.what} of {seen.fault.size(values, shown)} ({scale.names[worst]})"
+@dataclass(frozen=True)
+class Blind:
+    """A fault that the residuals may miss: the largest ``shift`` of a value, over u, by one that is named in half of
+    the tests, infinite where none is, and in ``words`` its size that shifts this value by 2 u."""
+
+    shift: float
+    words: str
 
 
-def doubts(examination: Examination, fit: Regression, scale: Scale, unit: Unit) -> list[TypeB]:
-    """Sources of uncertainty: faults that are not significant, or harmless, and beyond what chance does to most."""
-    tested: Sequence[Tested] = (*examination.significant, *examination.doubtful)
+def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) -> Blind:
+    """The part of a fault that a test may miss: one that does not show, if it shifts any value, or else all of it."""
+    effect = scale.shift(fit, seen.fault.columns)
+    for base, reach in ((seen.hidden, np.inf), (seen.base, seen.reach)):
+        shift = effect @ base
+        size = np.linalg.norm(shift, axis=1)
+        worst = int(np.argmax(size))
+        if size[worst] > ROUNDING * np.linalg.norm(effect):
+            values = base @ shift[worst] * 2.0 / size[worst] ** 2
+            words = f"{seen.fault.what} of {seen.fault.size(values, shown)} ({scale.names[worst]})"
+            return Blind(reach * float(size[worst]), words)
+    return Blind(0.0, "")
+
+
+def _weak(blind: Collection[Blind]) -> str:
+    """Sentence on faults that would shift a value by 2 u, and hardly show, or not at all."""
+    hardly = "; ".join(each.words for each in blind if np.isfinite(each.shift))
+    never = "; ".join(each.words for each in blind if not np.isfinite(each.shift))
+    texts = []
+    if hardly:
+        texts.append(
+            f"the residuals might not show what shifts a value by 2 u: {hardly}: more positions, another order of "
+            "them, or some once more at the end might show it"
+        )
+    if never:
+        texts.append(f"no residual shows what shifts a value by 2 u: {never}")
+    return "; ".join(texts)
+
+
+def _hidden(tested: Tested, fit: Regression, scale: Scale) -> Array:
+    """Shift (p,) of the values, over u, by the part of a fault that does not show, were it as large as the rest."""
+    seen = tested.seen
+    size = float(np.linalg.norm(tested.values)) / np.sqrt(max(seen.base.shape[1], 1))
+    return np.asarray(size * np.linalg.norm(scale.shift(fit, seen.fault.columns) @ seen.hidden, axis=1))
+
+
+def doubts(examination: Examination, fit: Regression, scale: Scale) -> list[TypeB]:
+    """Sources of uncertainty: faults that do no harm, and those that may be there, with their probability.
+
+    With the probability P that a fault is there a value is off by its shift s, known to b, or by none: its mean square
+    error is larger by ``P (s^2 + b^2)``.
+    """
     sources = []
-    for each in tested:
-        shift = scale.shift(fit, each.fault.effect(each.values)[..., None])[:, 0]
-        if each in examination.significant and np.abs(shift).max() > LIMITS.harmful_shift:
-            continue
-        size = each.fault.size(each.values, (unit.factor, unit.symbol))
-        source = f"{each.fault.what} of {size}, not excluded"
-        sources.append(TypeB(source, 1.0, "1", shift * scale.u, redrawn=True))
+    for each in examination.significant:
+        shift = scale.shift(fit, each.fault.effect(each.values)[..., None])
+        if (np.abs(shift[:, 0]) + _hidden(each, fit, scale)).max() <= LIMITS.harmful_shift:
+            sources.append(_source(each, shift * scale.u[:, None]))
+    for each in examination.doubtful:
+        shift = scale.shift(fit, each.fault.effect(each.values)[..., None])
+        spread = scale.shift(fit, each.fault.columns) @ each.seen.base
+        reach = each.seen.reach * np.linalg.norm(spread, axis=1, keepdims=True)
+        part = np.sqrt(each.probability) * LIMITS.blind_shift / np.maximum(reach, LIMITS.blind_shift)
+        sources.append(_source(each, part * np.hstack([shift, spread]) * scale.u[:, None]))
     return sources
+
+
+def _source(tested: Tested, shifts: Array) -> TypeB:
+    """A fault as a source of ``shifts`` (p, q) of the values; the base and the table are the same in repeat runs."""
+    return TypeB(f"{tested.fault.what}, not excluded", 1.0, "1", shifts, redrawn=tested.fault.kind in DRIFTS)
 
 
 def _largest(names: Sequence[str], shift: Array) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import short_repr
 from inercal.errors import StudyError
-from inercal.estimate.identifiability import in_words
+from inercal.estimate.identifiability import Identifiability, in_words
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
 from inercal.geometry.earth import EARTH_RATE
@@ -22,6 +23,7 @@ from inercal.turntable.rate.ends import settled
 from inercal.turntable.rate.fit import RateFit, fit_rates, separable
 from inercal.turntable.rate.linearity import SEED
 from inercal.turntable.rate.outcome import assemble, unobservable
+from inercal.turntable.rate.several_axes import LegStays, fit_axes, left_out, legs_of, unfit
 from inercal.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwells, turning_axis
 from inercal.turntable.settings import TurntableSettings
 
@@ -43,7 +45,7 @@ class RateCalibration:
 
 
 def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibration:
-    """Calibrate gyros by a rate test.
+    """Calibrate gyros by a rate test, about one axis or about several in sequence.
 
     Parameters
     ----------
@@ -68,6 +70,12 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
             f"noise is stated for outputs in {unit.symbol}, and the record's are in {readings.unit.symbol}, expected "
             "the same kind of unit",
         )
+    legs = legs_of(readings, settings)
+    if len({leg.joint for leg in legs}) > 1 or len({leg.about for leg in legs if leg.about}) > 1:
+        return _several_axes(record, readings, settings, legs)
+    if test.joint != legs[0].joint:  # a column of the record says so
+        test = replace(test, joint=legs[0].joint)
+        settings = replace(settings, rate_test=test)
     findings = [*record.findings]
     still = settled(chain, test.joint, readings.angles)
     along = turning_axis(still, test.joint, readings.angles)
@@ -151,6 +159,74 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
         findings += [finding for _, fit in others for finding in excess_across(fit)]
     estimate = assemble(record, readings, settings, findings, inputs, fits, full_scale, identified)
     return RateCalibration(estimate, readings, inputs, fits)
+
+
+def _several_axes(
+    record: Record, readings: RateDwells, settings: TurntableSettings, legs: Sequence[LegStays]
+) -> RateCalibration:
+    """Calibrate gyros by a test in which several axes turn one after the other."""
+    test, noise = settings.rate_test, settings.instrument.noise
+    assert test is not None
+    findings = [*record.findings]
+    if wrong := unfit(legs, readings):
+        findings += left_out(wrong)
+        out = {leg.stays[0] for leg, _ in wrong}
+        kept = [leg.stays for leg in legs if leg.stays[0] not in out]
+        readings = readings.some(np.sort(np.concatenate(kept))) if kept else readings
+        legs = legs_of(readings, settings) if kept else ()
+
+    def nothing(text: str, rank: int = 0, words: Sequence[str] = ()) -> RateCalibration:
+        return RateCalibration(
+            unobservable(record, readings, settings, findings, rank, words, text), readings
+        )
+
+    own = {k: np.concatenate([leg.stays for leg in legs if leg.about == k]) for k in {e.about for e in legs}}
+    taken = []
+    for channel in readings.channels:
+        dead = not np.ptp(readings.y[:, readings.channels.index(channel)])
+        if not dead and channel[-1] in own:
+            taken.append(channel[-1])
+            continue
+        why = "reads the same at all rates: is it dead?" if dead else "has no stays about its own axis"
+        code = "dead_channel" if dead else "weak_term"
+        findings.append(Finding(code, f"{channel} is left out: it {why}", harm=()))
+    if not taken:
+        return nothing("no axis turns along a gyro of the record at two rates or more")
+    asymmetry = True
+    identified = _weakest(readings, own, taken, test.order, asymmetry)
+    if identified.rank < len(identified.names):
+        asymmetry = False
+        identified = _weakest(readings, own, taken, test.order, asymmetry)
+        text = "the rates do not tell the asymmetry from the other terms: take two or more of either sign"
+        findings.append(Finding("weak_term", text))
+    if identified.rank < len(identified.names):
+        words = [in_words(vector / identified.scale, identified.names) for vector in identified.null_vectors]
+        text = f"the rates about one axis do not change along {'; '.join(words)} (by rad/s); add rates"
+        return nothing(text, identified.rank, words)
+    terms = len(identified.names) + len(own) + len(legs) - 2
+    if len(readings.rate) <= terms and noise is None:
+        return nothing(
+            f"found {counted(len(readings.rate), 'stay')} for {terms} terms and no stated noise, expected more",
+            identified.rank,
+        )
+    full_scale = test.full_scale or float(np.abs(readings.rate).max())
+    both = [fit_axes(readings, settings, legs, axis, asymmetry, full_scale) for axis in taken]
+    inputs, fits = tuple(given for given, _ in both), tuple(fit for _, fit in both)
+    findings += [replace(each, harm=fit.names) for fit in fits for each in _excess(fit)]
+    estimate = assemble(record, readings, settings, findings, inputs, fits, full_scale, identified)
+    return RateCalibration(estimate, readings, inputs, fits)
+
+
+def _weakest(
+    readings: RateDwells,
+    own: Mapping[str, NDArray[np.int64]],
+    taken: Sequence[str],
+    order: int,
+    asymmetry: bool,
+) -> Identifiability:
+    """Identifiability of the terms of the gyro whose rates tell least."""
+    each = [separable(readings.rate[own[axis]], axis, order, asymmetry) for axis in taken]
+    return max(each, key=lambda found: (len(found.names) - found.rank, found.condition))
 
 
 def check_rate_test(settings: TurntableSettings) -> None:

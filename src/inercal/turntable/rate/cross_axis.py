@@ -85,6 +85,7 @@ def fit_across(
         float(noise.dof[0]),
         solution.chi2,
         n - 2,
+        np.arange(n),
     )
     return own, fit
 

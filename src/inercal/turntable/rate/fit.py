@@ -52,6 +52,7 @@ class RateFit:
     noise : float
         Standard deviation of a reading beside the table's part; ``noise_dof`` inf where it was stated.
     chi2, dof : weighted sum of squares of the fit, and its degrees of freedom
+    stays : indices of the stays about its own axis; of a gyro across it, all
     """
 
     axis: str
@@ -66,6 +67,26 @@ class RateFit:
     noise_dof: float
     chi2: float
     dof: int
+    stays: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Across:
+    """Stays of a gyro while the table turns about other axes than its own.
+
+    ``own`` (n,) true for those about its own; ``bias`` (n, b) columns of biases beside that of the first attitude;
+    ``names`` (m,) of misalignments with the rates (n, m) about their axes.
+    """
+
+    own: NDArray[np.bool_]
+    bias: Array
+    names: tuple[str, ...]
+    rates: Array
+
+
+def none_across(n: int) -> Across:
+    """All of n stays about the gyro's own axis, at one attitude."""
+    return Across(np.ones(n, dtype=bool), np.zeros((n, 0)), (), np.zeros((n, 0)))
 
 
 def columns(x: Array, order: int, asymmetry: bool) -> Array:
@@ -129,6 +150,7 @@ def fit_rates(
     asymmetry: bool,
     full_scale: float,
     rng: np.random.Generator,
+    across: Across | None = None,
 ) -> RateFit:
     """Fit one gyro.
 
@@ -147,10 +169,14 @@ def fit_rates(
         rad/s
     rng : Generator
         Of the draws behind the bounds of what the straight line leaves.
+    across : Across, optional
+        Stays about other axes, of which there are misalignments.
     """
-    terms = columns(given.x, order, asymmetry)
+    beside = across or none_across(len(rate))
+    own = np.flatnonzero(beside.own)
+    terms = np.column_stack([_columns(given.x, order, asymmetry, beside), beside.rates])
     n, p = terms.shape
-    rows = _with_hysteresis(terms, rate)
+    rows = np.column_stack([_with_hysteresis(terms, rate, beside), beside.bias])
     free = rows.shape[1]
     floor = FLOOR * float(np.sqrt(np.mean(np.square(y))) or 1.0)
     c: Array = np.asarray(np.linalg.lstsq(rows, y, rcond=None)[0], dtype=float)
@@ -161,17 +187,25 @@ def fit_rates(
         sigma = float(noise_fit.std[0])
         solution = weighted(rows, y, weight, sigma)
         c = solution.c
-    line = weighted(terms[:, :2], y, weight, sigma)
-    remainder = np.eye(n) - terms[:, :2] @ line.gain[:, :, 0]
-    residuals = y - terms[:, :2] @ line.c
+    biases = beside.bias[:, beside.bias[own].any(axis=0)]
+    straight = np.column_stack([1.0 - biases.sum(axis=1), given.x, biases])
+    remainder = np.eye(n)
+    line = weighted(straight[own], y[own], _of(weight, own), sigma)
+    remainder[np.ix_(own, own)] -= straight[own] @ line.gain[:, :, 0]
+    residuals = np.where(beside.own, y - straight @ line.c, 0.0)
     values, gain = _relative(c[:p], solution.gain[:p, :, 0])
     span = abs(float(c[1])) * full_scale
-    own = _noise_beside_a_curve(rate, given.x, y, weight, noise, order, asymmetry, floor) or noise_fit
-    errors = drawn_errors(given.effects, float(c[1]), float(own.std[0]), float(own.dof[0]), n, rng)
-    left_over = tuple(largest(each, errors, span) for each in _left_over(axis, rate, residuals, remainder))
+    curve = _noise_beside_a_curve(rate, given.x, y, weight, noise, order, asymmetry, floor, beside)
+    own_noise = curve or noise_fit
+    errors = drawn_errors(
+        given.effects, float(c[1]), float(own_noise.std[0]), float(own_noise.dof[0]), n, rng
+    )
+    left_over = tuple(
+        largest(each, errors, span) for each in _left_over(axis, rate[own], residuals[own], remainder[own])
+    )
     return RateFit(
         axis,
-        (*symbols(axis, order, asymmetry), *(each.name for each in left_over)),
+        (*symbols(axis, order, asymmetry), *beside.names, *(each.name for each in left_over)),
         np.concatenate([values, [each.value for each in left_over]]),
         left_over,
         np.vstack([gain, *(each.gain[None] for each in left_over)]),
@@ -182,17 +216,35 @@ def fit_rates(
         float(noise_fit.dof[0]),
         solution.chi2,
         n - free,
+        own,
     )
 
 
-def _with_hysteresis(terms: Array, rate: Array) -> Array:
+def _of(weight: Weights, stays: NDArray[np.int64]) -> Weights:
+    """The weights of some of the stays."""
+    return Weights(weight.within[stays], weight.common[stays])
+
+
+def _columns(x: Array, order: int, asymmetry: bool, beside: Across) -> Array:
+    """The `columns`, with the bias of the first attitude alone in the first."""
+    made = columns(x, order, asymmetry)
+    made[:, 0] -= beside.bias.sum(axis=1)
+    return made
+
+
+def _with_hysteresis(terms: Array, rate: Array, beside: Across) -> Array:
     """The regressors with one more for the way a rate was reached, where some rate was reached both ways.
 
     Without it hysteresis would pass for curvature: at the ends of a run up and down it does not average out.
     """
-    way = approaches(rate)
-    both = any(np.ptp(way[same]) == 2 for same in levels(rate))
-    return np.column_stack([terms, way]) if both and len(rate) > terms.shape[1] + 1 else terms
+    own = rate[beside.own]
+    way = approaches(own)
+    both = any(np.ptp(way[same]) == 2 for same in levels(own))
+    if not both or len(own) <= terms.shape[1] - len(beside.names) + 1:
+        return terms
+    column = np.zeros(len(rate))
+    column[beside.own] = way
+    return np.column_stack([terms, column])
 
 
 def _relative(c: Array, gain: Array) -> tuple[Array, Array]:
@@ -212,14 +264,16 @@ def _noise_beside_a_curve(
     order: int,
     asymmetry: bool,
     floor: float,
+    beside: Across,
 ) -> ReadingNoise | None:
     """Noise of a reading about a cubic, so that a curve that was not asked for does not count as noise.
 
     None where the noise is stated, the curve was asked for, or the rates leave too little to judge by.
     """
-    if noise is not None or order == 3 or not _full_rank(rate, asymmetry):
+    if noise is not None or order == 3 or not _full_rank(rate[beside.own], asymmetry):
         return None
-    rows = _with_hysteresis(columns(x, 3, asymmetry), rate)
+    rows = np.column_stack([_columns(x, 3, asymmetry, beside), beside.rates])
+    rows = np.column_stack([_with_hysteresis(rows, rate, beside), beside.bias])
     if len(rows) < rows.shape[1] + LIMITS.scatter_dof:
         return None
     return scatter(rows[:, None, :], y[:, None], weight, [None], np.array([floor]))

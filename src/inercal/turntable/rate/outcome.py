@@ -19,7 +19,7 @@ from inercal.turntable.model import FRAME
 from inercal.turntable.positions.outcome import COMMAND, of_site, unit_of_term
 from inercal.turntable.rate.fit import RateFit, approaches
 from inercal.turntable.rate.stays import Input, RateDwells
-from inercal.turntable.settings import RateTest, TurntableSettings
+from inercal.turntable.settings import TurntableSettings
 
 MODEL = (
     "y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3), x the rate about the gyro's axis: the table's rate times the "
@@ -63,8 +63,6 @@ def assemble(
         status = Status.ILL_CONDITIONED
         weak = f"{identified.weakest()} only weakly (condition number {identified.condition:.0f})"
         message = f"the rates fix {weak}: spread them wider"
-    test = settings.rate_test
-    assert test is not None
     return Estimate.of(
         _basis(record, dwells, settings),
         names,
@@ -76,14 +74,16 @@ def assemble(
         statistics={
             "dof": float(min(fit.dof for fit in fits)),
             "condition": identified.condition,
-            "residual_rms": float(np.sqrt(np.mean([np.square(fit.residuals) for fit in fits]))),
+            "residual_rms": float(
+                np.sqrt(np.mean(np.square(np.concatenate([fit.residuals[fit.stays] for fit in fits]))))
+            ),
             "chi2": float(sum(fit.chi2 for fit in fits)),
             "stays": float(len(dwells.rate)),
         },
         result={
             "rank": identified.rank,
             "null_vectors": [],
-            "plan": _plan(dwells, test, full_scale),
+            "plan": _plan(dwells, settings, full_scale),
             "tolerance_shares": _shares(settings, names, found_sources),
             "instrument": settings.instrument.kind,
             "unit": {"gyro": unit},
@@ -122,7 +122,7 @@ def unobservable(
         result={
             "rank": rank,
             "null_vectors": list(words),
-            "plan": _plan(dwells, test, test.full_scale or float(np.abs(dwells.rate).max(initial=0.0))),
+            "plan": _plan(dwells, settings, test.full_scale or float(np.abs(dwells.rate).max(initial=0.0))),
             "tolerance_shares": {},
             "instrument": settings.instrument.kind,
             "linearity": [],
@@ -150,11 +150,15 @@ def sources(
             made.append(TypeA(name, fit.noise, unit, fit.noise**2 * gain @ gain.T, fit.noise_dof))
     everything = {effect.source: effect for given in inputs for effect in given.effects}
     for source, effect in everything.items():
+        own = [next((e.shift for e in given.effects if e.source == source), None) for given in inputs]
+        shifts = np.zeros(
+            (len(own), len(dwells.rate), max(each.shape[1] for each in own if each is not None))
+        )
+        for all_of, each in zip(shifts, own, strict=True):
+            if each is not None:
+                all_of[:, : each.shape[1]] = each
         blocks = []
-        for given, fit in zip(inputs, fits, strict=True):
-            shift = next(
-                (own.shift for own in given.effects if own.source == source), np.zeros_like(effect.shift)
-            )
+        for shift, fit in zip(shifts, fits, strict=True):
             moved = fit.scale * shift / effect.u
             blocks.append(
                 np.einsum("pn,nq->pnq", fit.gain, moved).reshape(len(fit.gain), -1)
@@ -203,16 +207,18 @@ def _rows(dwells: RateDwells, given: Input, fit: RateFit, full_scale: float) -> 
             "u_ppm_of_full_scale": float(u[k] * ppm),
             "reached_from": way[int(direction)],
         }
-        for k, direction in enumerate(approaches(dwells.rate))
+        for k, direction in zip(fit.stays, approaches(dwells.rate[fit.stays]), strict=True)
     ]
 
 
-def _plan(dwells: RateDwells, test: RateTest, full_scale: float) -> dict[str, Any]:
+def _plan(dwells: RateDwells, settings: TurntableSettings, full_scale: float) -> dict[str, Any]:
     """The test in figures."""
+    turning = [settings.chain.joints[k] for k in dict.fromkeys(dwells.joint.tolist())]
+    joint = ", ".join(turning)
     return {
-        "name": f"rates about {test.joint}",
+        "name": f"rates about {joint}",
         "positions": len(dwells.rate),
-        "joint": test.joint,
+        "joint": joint,
         "full_scale_rad_s": full_scale,
         "turns": "assumed whole" if dwells.assumed else "from the angles",
     }

@@ -17,7 +17,7 @@ from inercal.turntable.rate.calibration import check_rate_test
 from inercal.turntable.rate.ends import ends, known_change, settled
 from inercal.turntable.rate.fit import approaches
 from inercal.turntable.rate.stays import arc, over_turn, sensed
-from inercal.turntable.settings import TurntableSettings
+from inercal.turntable.settings import Leg, TurntableSettings
 from inercal.units import parse_unit
 
 
@@ -34,8 +34,8 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
     Returns
     -------
     Record
-        ``position``, ``rate`` [deg/s], angles [deg] (that of the turning joint at the start of the stay) and mean
-        outputs.
+        ``position``, ``joint`` where the test has legs, ``rate`` [deg/s], angles [deg] (that of the turning joint at
+        the start of the stay) and mean outputs.
 
     Raises
     ------
@@ -46,7 +46,6 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
     check_rate_test(settings)
     test, chain, instrument = settings.rate_test, settings.chain, settings.instrument
     assert test is not None
-    assert settings.site.latitude is not None
     if not test.rates:
         raise StudyError("rate_test.rates", 'missing, expected rates such as ["-10 deg/s", "10 deg/s"]')
     if any(symbol.startswith("S_nl") for symbol in instrument.coefficients):
@@ -66,26 +65,26 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
             "instrument.coefficients",
             f"found {squares[0]}, expected no squares of force in a simulated rate test",
         )
-    rate = np.array(test.rates)
-    n = len(rate)
+    legs = test.legs or (Leg(test.joint, test.at),)
+    rate = np.tile(test.rates, len(legs))
+    n, each = len(rate), len(test.rates)
     t = np.asarray(instrument.dwell * (np.arange(n) + 0.5))
-    angles = np.tile([test.at.get(joint, 0.0) for joint in chain.joints], (n, 1))
-    turning = chain.joints.index(test.joint)
+    turning = np.repeat([chain.joints.index(leg.joint) for leg in legs], each)
+    angles = np.repeat([[leg.at.get(joint, 0.0) for joint in chain.joints] for leg in legs], each, axis=0)
     ended = angles.copy()
-    ended[:, turning] += rate * instrument.dwell
+    ended[np.arange(n), turning] += rate * instrument.dwell
     both = (
         chain.draw(rng, np.concatenate([angles, ended])) if any(map(follows_angle, chain.elements)) else None
     )
     errors = chain.draw(rng, n) if both is None else both[:n]
     true_rate = rate * (1.0 + test.rate_u * rng.standard_normal())
-    at_ends = None if both is None else _at_ends(chain, test.joint, angles, true_rate, instrument.dwell, both)
-    chain = settled(chain, test.joint, angles)
-    errors = np.where(chain.std > 0.0, errors, 0.0)
-    turn = arc(angles[:, turning], true_rate * instrument.dwell)
-    w = sensed(chain, test.joint, rate_reference(settings.site.latitude), true_rate, angles, turn, errors)
-    w = w if at_ends is None else w + at_ends
-    f_n = -gravity_reference(settings.site.gravity)
-    f = over_turn(lambda at: f_n @ chain.attitude(at, errors), angles, turning, turn)
+    w, f = np.empty((n, 3)), np.empty((n, 3))
+    way = np.empty(n)
+    for k, leg in enumerate(legs):
+        of = slice(k * each, (k + 1) * each)
+        at_ends = None if both is None else np.concatenate([both[:n][of], both[n:][of]])
+        w[of], f[of] = _felt(settings, chain, leg.joint, angles[of], true_rate[of], errors[of], at_ends)
+        way[of] = approaches(rate[of])
     full_scale = test.full_scale or float(np.abs(rate).max())
     y = []
     channels = channels_of(settings)
@@ -98,7 +97,7 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
             for symbol in ("S_asym", "S2", "S3", "S_hyst")
         )
         bent = 0.5 * asymmetry * np.abs(x) + second * x**2 + third * x**3
-        bent = bent + 0.5 * hysteresis * full_scale * approaches(rate)
+        bent = bent + 0.5 * hysteresis * full_scale * way
         linear = model.linear(values)
         y.append(model.regressors(f, w) @ linear + linear[model.symbols.index(f"S_{axis}")] * bent)
     outputs: Array = np.stack(y, axis=-1)
@@ -107,9 +106,11 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
     if instrument.noise is not None:
         outputs = outputs + rng.normal(0.0, instrument.noise, outputs.shape)
     degrees = parse_unit("deg")
+    one, numbers = parse_unit("1"), np.arange(1.0, n + 1.0)
     return record_of(
         [
-            ("position", parse_unit("1"), np.arange(1.0, n + 1.0)),
+            ("position", one, numbers),
+            *([("joint", one, turning + 1.0)] if test.legs else []),
             ("rate", parse_unit("deg/s"), np.degrees(rate)),
             *((name, degrees, np.degrees(angles[:, k])) for k, name in enumerate(chain.joints)),
             *(
@@ -119,6 +120,32 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
         ],
         t,
     )
+
+
+def _felt(
+    settings: TurntableSettings,
+    chain: Chain,
+    joint: str,
+    angles: Array,
+    rate: Array,
+    errors: Array,
+    both: Array | None,
+) -> tuple[Array, Array]:
+    """Mean rate [rad/s] and specific force [m/s^2] (n, 3) on the instrument's axes while a joint turns.
+
+    ``errors`` (n, k) of the table; ``both`` (2 n, k) those at start and end where some follow the angle.
+    """
+    duration, latitude = settings.instrument.dwell, settings.site.latitude
+    assert latitude is not None
+    at_ends = None if both is None else _at_ends(chain, joint, angles, rate, duration, both)
+    turning = chain.joints.index(joint)
+    chain = settled(chain, joint, angles)
+    errors = np.where(chain.std > 0.0, errors, 0.0)
+    turn = arc(angles[:, turning], rate * duration)
+    w = sensed(chain, joint, rate_reference(latitude), rate, angles, turn, errors)
+    f_n = -gravity_reference(settings.site.gravity)
+    f = over_turn(lambda at: f_n @ chain.attitude(at, errors), angles, turning, turn)
+    return w if at_ends is None else w + at_ends, f
 
 
 def _at_ends(chain: Chain, joint: str, angles: Array, rate: Array, duration: float, both: Array) -> Array:

@@ -41,6 +41,7 @@ class RateDwells:
     unit : Unit
         Of the record.
     y : (n, c) mean outputs, in the SI unit of ``unit``
+    joint : (n,) index of the turning joint
     assumed : bool
         The record does not hold the angle of the turning joint: whole turns are taken for granted.
     """
@@ -51,7 +52,19 @@ class RateDwells:
     channels: tuple[str, ...]
     unit: Unit
     y: Array
+    joint: NDArray[np.int64]
     assumed: bool = False
+
+    def some(self, stays: NDArray[np.int64]) -> RateDwells:
+        """Those of the stays alone."""
+        return replace(
+            self,
+            rate=self.rate[stays],
+            angles=self.angles[stays],
+            turn=self.turn[stays],
+            y=self.y[stays],
+            joint=self.joint[stays],
+        )
 
 
 def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: float) -> RateDwells:
@@ -68,7 +81,7 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
     joints : tuple of str
         Of the table, base first.
     joint : str
-        The one that turns.
+        The one that turns; a column ``joint`` of the record, with 1 for the first, goes first.
     duration : float
         Of a stay [s].
 
@@ -85,8 +98,10 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
             where, f"found {', '.join(record.columns)}, expected one of {', '.join(CHANNELS['gyro'])}"
         )
     unit = record[channels[0]].unit
+    if "rate" not in record:
+        raise RecordError(where, f"found {', '.join(record.columns)}, expected a column rate for a rate test")
     rate = record["rate"].si()
-    has_angle = joint in record
+    has_angle = joint in record or "joint" in record
     still = np.zeros(len(rate))
     angles = [record[name].si() if has_angle or name != joint else still for name in joints]
     for name in channels:
@@ -104,19 +119,22 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
             where, f"row {row} has no number for a rate, an angle, an output or its stay, expected one"
         )
     groups = _groups(record, len(rate))
-    standing = [k for k, name in enumerate(joints) if name != joint]
+    turning = _turning(record, joints, joint, where)
     for rows in groups:
+        standing = [k for k in range(len(joints)) if k != turning[rows[0]]]
         moved = np.abs(np.sin(0.5 * (table[rows][:, standing] - table[rows[0], standing])))
         if np.any(moved > 0.5 * LIMITS.position_angle):
             raise RecordError(
-                where, f"an axis moves within a stay (row {rows[0] + 1}), expected only {joint} to turn"
+                where,
+                f"an axis moves within a stay (row {rows[0] + 1}), expected only "
+                f"{joints[turning[rows[0]]]} to turn",
             )
     means = np.array([rate[rows].mean() for rows in groups])
     turn = np.zeros((len(groups), 3))
     turn[:, 0] = 1.0
     if has_angle:
         for k, rows in enumerate(groups):
-            phi = table[rows, joints.index(joint)]
+            phi = table[rows, turning[rows[0]]]
             span = means[k] * duration
             turn[k] = arc(phi[0], span) if len(rows) == 1 else arc(phi, np.zeros(len(rows))).mean(axis=0)
     return RateDwells(
@@ -126,14 +144,31 @@ def rate_dwells(record: Record, joints: tuple[str, ...], joint: str, duration: f
         channels,
         unit,
         np.array([y[rows].mean(axis=0) for rows in groups]),
+        turning[[rows[0] for rows in groups]],
         not has_angle,
     )
+
+
+def _turning(record: Record, joints: tuple[str, ...], joint: str, where: object) -> NDArray[np.int64]:
+    """Index of the joint that turns (rows,)."""
+    if "joint" not in record:
+        return np.full(len(record["rate"].values), joints.index(joint))
+    number = record["joint"].values
+    wrong = ~np.isin(number, np.arange(1, len(joints) + 1))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise RecordError(
+            where, f"row {row + 1}: joint is {number[row]:g}, expected 1 to {len(joints)}, 1 for {joints[0]}"
+        )
+    return np.asarray(number - 1.0, dtype=np.int64)
 
 
 def _groups(record: Record, rows: int) -> list[NDArray[np.int64]]:
     """Rows of each stay: stretches of one position number, else single rows."""
     every = np.arange(rows)
     breaks = np.diff(record["position"].values) != 0.0 if "position" in record else np.ones(rows - 1, bool)
+    if "joint" in record:
+        breaks = breaks | (np.diff(record["joint"].values) != 0.0)
     return np.split(every, np.flatnonzero(breaks) + 1)
 
 

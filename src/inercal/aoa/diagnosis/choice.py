@@ -1,0 +1,190 @@
+"""Choices of the recording where the study does not: the gyro's delay, the band of the sensors, the snap.
+
+The delay is that of the spectra, and the filter may learn what is left of it. Band and snap are judged by the
+innovations: taken is the widest band, and in it the smallest density of snap, under which innovations are nearly as
+small as those of a still model with the study's noise. So calm recordings keep all of their band and the usual snap.
+Under too small a snap a buffet is taken for errors of positions and scale; under too large a one noise is taken for
+motion, and these errors are learned from it. Vibration that is no rotation fits under no snap: lines and what lies
+above the model's motion are taken out of all sensors alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.aoa.band import Band
+from inercal.aoa.diagnosis.noise_check import misstated
+from inercal.aoa.diagnosis.spectrum import highest_motion, lines, white_noise
+from inercal.aoa.fusion import band as limiting
+from inercal.aoa.fusion.loop import OUTPUTS
+from inercal.aoa.fusion.problem import FilterProblem, problem
+from inercal.aoa.fusion.run import advance, initial
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.paper.delay import relative_delay
+from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.findings import Finding
+
+DENSITIES = (1e9, 1e10, 1e11, 1e12)
+"""Densities [rad^2/s^7] beyond the usual one."""
+
+LOW_PASSES = (100.0, 70.0, 50.0, 35.0)
+"""Corners [Hz] of the low passes that are tried, the widest first."""
+
+
+def decided(recording: Recording, settings: AoaSettings) -> AoaSettings:
+    """The study with the delay, band and snap that the recording shows, each where the study does not state it.
+
+    Looked at are the liveliest stretches of `Limits.snap_time`. Where no band fits there is none, and the usual snap.
+    """
+    settings = limiting.with_rate(settings, recording.t[later(recording.t)])
+    settings = _with_delay(recording, settings)
+    stated = settings.band.low_pass is not None
+    plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
+    if stated and settings.estimator.snap is not None:
+        return settings
+    stretches = [_part(recording, rows) for rows in _liveliest(recording)]
+    if not stretches:
+        return plain
+    usual, fixed = settings.estimator.density, settings.estimator.snap is not None
+    densities = (usual,) if fixed else (usual, *DENSITIES)
+    fair = _fair(stretches[0], settings)
+    for band in (plain.band, *(() if stated else _bands(stretches[0], fair))):
+        banded = replace(fair, band=band)
+        limit = LIMITS.snap_ratio * _still(recording, banded)
+        for density in densities:
+            of = problem(_with_snap(banded, density), recording.spatial)
+            if all(_nis(of, part) < limit for part in stretches):
+                return _with_snap(replace(settings, band=band), density)
+    return plain
+
+
+def of_band(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
+    """``band_limited``: a band that the recording decided, and what to write to keep it."""
+    band = decided.band
+    if settings.band.low_pass is not None or len(band.sections) <= len(settings.band.notch):
+        return []
+    text = (
+        "the sensors feel vibration that is no motion of the model, and the fusion takes what is left of them without "
+        f"it: to have the same band again write {band.words} under [band]"
+    )
+    return [Finding("band_limited", text)]
+
+
+def _fair(part: Recording, settings: AoaSettings) -> AoaSettings:
+    """The study with noise as large as a stretch has it at all frequencies: more noise is no motion, vibration is."""
+    _, loud = misstated(part, settings)
+    noise, found = settings.noise, loud.noise
+    of_acc, of_gyro = white_noise(part)
+    noise = replace(
+        noise,
+        accelerometer=max(noise.accelerometer, min(found.accelerometer, of_acc)),
+        gyro=max(noise.gyro, min(found.gyro, of_gyro)),
+    )
+    return replace(settings, noise=noise)
+
+
+def _with_snap(settings: AoaSettings, density: float) -> AoaSettings:
+    """The study with a density of snap, as it is where that is the usual one."""
+    estimator = settings.estimator
+    return (
+        settings
+        if density == estimator.density
+        else replace(settings, estimator=replace(estimator, snap=density))
+    )
+
+
+def _with_delay(recording: Recording, settings: AoaSettings) -> AoaSettings:
+    """The study with the delay that the spectra show, where it is estimated and as far as its prior goes.
+
+    The filter alone may learn a delay from noise, or a far one that its series does not hold for.
+    """
+    if settings.timing.gyro_delay is not None:
+        return settings
+    delay, prior = relative_delay(recording, settings.layout), settings.prior
+    if delay is None or abs(delay.value) > LIMITS.prior_sigmas * prior.gyro_delay:
+        return settings
+    u = max(LIMITS.spectral_delay_sigmas * delay.u, LIMITS.least_delay_u)
+    if u > prior.gyro_delay:
+        return settings
+    return replace(
+        settings,
+        prior=replace(prior, gyro_delay=u),
+        timing=replace(settings.timing, gyro_delay_about=delay.value),
+    )
+
+
+def _bands(part: Recording, settings: AoaSettings) -> Iterator[Band]:
+    """Bands narrower than the whole: without the lines of the spectrum, then with low passes above the motion too."""
+    motion, rate = highest_motion(part, settings), settings.band.rate
+    stated = settings.band.notch
+    least = max(LIMITS.corner_ratio * motion, LOW_PASSES[-1])
+    for corner in (math.inf, *sorted({max(each, least) for each in LOW_PASSES}, reverse=True)):
+        found = lines(part, motion, min(corner, rate))
+        band = Band(corner, tuple(dict.fromkeys([*stated, *found])), rate)
+        if len(band.sections) > len(stated):
+            yield band
+
+
+def _liveliest(recording: Recording) -> Iterator[NDArray[np.int64]]:
+    """Rows of the stretches in which readings differ most from one row to the next, the liveliest first."""
+    taken = later(recording.t)
+    number = np.floor((recording.t[taken] - recording.t[taken[:1]]) / LIMITS.snap_time)
+    stretches = [
+        rows for rows in np.split(taken, np.flatnonzero(np.diff(number)) + 1) if _enough(recording, rows)
+    ]
+    sizes = [_restless(recording, rows) for rows in stretches]
+    for k in np.argsort(sizes)[::-1][: LIMITS.snap_stretches]:
+        yield stretches[k]
+
+
+def _enough(recording: Recording, rows: NDArray[np.int64]) -> bool:
+    """True for a stretch that goes on for twice the time in which a filter settles."""
+    return bool(len(rows)) and bool(np.ptp(recording.t[rows]) > 2.0 * LIMITS.settling_time)
+
+
+def _restless(recording: Recording, rows: NDArray[np.int64]) -> float:
+    """Root mean square of the second differences of all readings of a stretch, without single wild ones."""
+    second = np.abs(np.diff(np.column_stack([recording.acc[rows], recording.gyro[rows]]), 2, axis=0))
+    finite = second[np.isfinite(second)]
+    return float(np.sqrt(np.mean(np.minimum(finite, np.quantile(finite, 0.99)) ** 2))) if finite.size else 0.0
+
+
+def _part(recording: Recording, rows: NDArray[np.int64]) -> Recording:
+    """A stretch of a recording."""
+    columns = {name: getattr(recording, name)[rows] for name in ("t", "acc", "gyro", "turns", "zero_angle")}
+    return replace(recording, **columns, point=None, trigger=None, reference=None, masked=None)
+
+
+def _nis(of: FilterProblem, part: Recording) -> float:
+    """Mean squared innovation after the filter has settled, each as far as the gate lets it through."""
+    part, of = limiting.fused(part, of)
+    t, rows = part.t, part.rows
+    _, trace = advance(initial(of), of, t, rows, last=True)
+    innovations = trace.out[t[: len(trace.out)] - t[:1] >= LIMITS.settling_time, OUTPUTS:]
+    finite = innovations[np.isfinite(innovations)]
+    lost = np.isnan(trace.out[-1:, 0]).any() or len(trace.starts) > 1
+    return np.inf if lost or not finite.size else float(np.minimum(finite**2, of.constants.gate).mean())
+
+
+def _still(recording: Recording, settings: AoaSettings) -> float:
+    """The same of a still model with the study's noise, sampled as the recording was by the sensors that it has."""
+    step = float(np.median(np.diff(recording.t[later(recording.t)])))
+    t = step * np.arange(round(2.0 * LIMITS.settling_time / step), dtype=float)
+    layout, rng = settings.layout, np.random.default_rng(0)
+    up = settings.site.gravity * settings.attitude.level
+    acc = np.tile(-up * np.sin(layout.angle), (len(t), 1))
+    acc += settings.noise.accelerometer * rng.standard_normal(acc.shape)
+    gyro, *turns = settings.noise.gyro * rng.standard_normal((3, len(t)))
+    acc[:, ~np.isfinite(recording.acc).any(axis=0)] = np.nan
+    if not np.isfinite(recording.gyro).any():
+        gyro[:] = np.nan
+    none = np.full((len(t), 2), np.nan)
+    still = Recording(t, acc, gyro, np.column_stack(turns) if recording.spatial else none, none)
+    return _nis(problem(settings, recording.spatial), still)

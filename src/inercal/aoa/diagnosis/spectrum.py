@@ -1,0 +1,82 @@
+"""The spectra of the sensors: how far up the model's motion goes, and the lines that are no motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+
+
+def powers(t: Array, values: Array) -> tuple[Array, Array]:
+    """Frequencies (k,) [Hz] and the spectral densities (k, c) of columns (n, c), by segments of `Limits.line_segment`;
+    columns with missing samples count with these held, one without a number as zero."""
+    from scipy.signal import welch
+
+    step = float(np.median(np.diff(t)))
+    row = np.arange(len(t))
+    columns = []
+    for column in values.T:
+        finite = np.isfinite(column)
+        columns.append(np.interp(row, row[finite], column[finite]) if finite.any() else np.zeros(len(t)))
+    size = min(len(t), round(LIMITS.line_segment / step))
+    frequency, density = welch(np.column_stack(columns), 1.0 / step, nperseg=size, axis=0)
+    return np.asarray(frequency), np.asarray(density)
+
+
+def highest_motion(recording: Recording, settings: AoaSettings) -> float:
+    """The highest frequency [Hz] at which the gyro shows more than noise over some Hz; 0 where it shows none.
+
+    A narrow line is no motion that a low pass must keep, and a gyro's noise is white: the median over a few Hz is
+    held against that over all.
+    """
+    if not np.isfinite(recording.gyro).any():
+        return 0.0
+    frequency, density = powers(recording.t, recording.gyro[:, None])
+    spectrum = _running_median(density[:, 0], frequency)
+    floor = max(
+        2.0 * settings.noise.gyro**2 * float(np.median(np.diff(recording.t))), float(np.median(spectrum))
+    )
+    above = np.flatnonzero(spectrum > LIMITS.motion_power * floor)
+    return float(frequency[above[-1]]) if len(above) else 0.0
+
+
+def white_noise(recording: Recording) -> tuple[float, float]:
+    """Standard deviations of samples of the accelerometers and the gyro [SI] by the quarter of the spectrum that is
+    lowest: white noise has it at all frequencies, vibration has not. The largest of several sensors; 0 without any."""
+    frequency, density = powers(recording.t, np.column_stack([recording.acc, recording.gyro]))
+    floor = np.quantile(density[1:], LIMITS.floor_quantile, axis=0) / LIMITS.floor_share
+    size = np.sqrt(floor * frequency[-1])
+    return float(size[:-1].max()), float(size[-1])
+
+
+def lines(recording: Recording, motion: float, low_pass: float) -> tuple[float, ...]:
+    """Frequencies [Hz] of lines of the accelerometers beyond twice the ``motion`` [Hz], up to three corners of the
+    ``low_pass`` [Hz], the strongest first; none where there are so many that they are noise in a band."""
+    frequency, density = powers(recording.t, recording.acc)
+    strength = np.max(density / np.maximum(_running_median(density, frequency), 1e-300), axis=1)
+    power = density.max(axis=1)
+    inside = (frequency > max(2.0 * motion, LIMITS.lowest_line)) & (frequency < 3.0 * low_pass)
+    strength[~inside] = 0.0
+    # a line of a window is some bins wide: the highest of these stands for it, between them by their powers
+    peaks = [
+        k
+        for k in range(2, len(frequency) - 2)
+        if strength[k] > LIMITS.line_power and power[k] == power[k - 2 : k + 3].max()
+    ]
+    peaks.sort(key=lambda k: -power[k])
+    found = []
+    for k in peaks if len(peaks) <= LIMITS.most_lines else ():
+        near = slice(k - 2, k + 3)
+        found.append(float(power[near] @ frequency[near] / power[near].sum()))
+    return tuple(found)
+
+
+def _running_median(density: Array, frequency: Array) -> Array:
+    """The median of densities (k,) or (k, c) over some Hz about each frequency."""
+    from scipy.ndimage import median_filter
+
+    width = 2 * max(2, round(0.5 * LIMITS.line_surroundings / frequency[1])) + 1
+    return np.asarray(median_filter(density, size=(width, 1)[: density.ndim], mode="nearest"))
