@@ -156,6 +156,12 @@ class Limits:
     zero_sigmas: float = 3.0
     """Standard deviations by which the angle may change in that stretch."""
 
+    slower_clock: float = 0.95
+    """Samples of a sensor on a clock of its own, over the rows, from which it has a value in every row."""
+
+    joined_correlation: float = 0.8
+    """Correlation of the angle with a column of another table from which the offset of their clocks is believed."""
+
     shaken_gyro: float = 2.0
     """Standard deviation of the gyro, over its stated noise, from which a model shakes in that stretch."""
 

@@ -23,6 +23,7 @@ from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.reference.sensor_fit import Verified, fit
+from inercal.aoa.reference.static_fit import at_rests_alone, static_fit
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.outcome import assemble, assemble_paper
@@ -142,15 +143,15 @@ def measure(
         angles = by_methods(recording, settings, methods)
     compared = _compared(zeroed, settings, angles, progress) if compare else {}
     progress("assembling")
+    at_rest = points(recording, angles, settings)
     judged: dict[str, Errors] = {}
     verified = None
     if recording.reference is not None and np.isfinite(recording.reference).any():
         progress("fitting the sensors to the reference angle")
         judged = {each.method: errors(recording, each) for each in (angles, *compared.values())}
-        verified = _fitted(recording, settings)
+        verified = _fitted(recording, settings, at_rest)
         if filtered is not None:
             findings = [*findings, *late_reference(recording, angles)]
-    at_rest = points(recording, angles, settings)
     behind = (findings, delay, at_rest, judged, compared, verified)
     if filtered is None:
         estimate = assemble_paper(recording, settings, angles, *behind)
@@ -162,9 +163,11 @@ def measure(
     )
 
 
-def _fitted(recording: Recording, settings: AoaSettings) -> Verified | None:
+def _fitted(recording: Recording, settings: AoaSettings, at_rest: tuple[Point, ...]) -> Verified | None:
     """The sensors fitted to the reference angle; None where there is too little of it."""
     try:
+        if at_rests_alone(recording):
+            return static_fit(recording, settings, [(each.start, each.stop) for each in at_rest])
         return fit(recording, settings)
     except RecordError:
         return None

@@ -100,6 +100,12 @@ def aoa(
     *,
     study: StudyFile,
     how: MethodOptions = MethodOptions(),
+    join: Annotated[
+        Path | None,
+        Parameter(
+            help="With --points: table of a balance (CSV) to set beside the points, by number or by time."
+        ),
+    ] = None,
     runs: Annotated[
         Path | None,
         Parameter(
@@ -119,6 +125,8 @@ def aoa(
     """Measure the angle of attack of a wind-tunnel model."""
     keys = [*(overrides or ()), *how.keys]
     how.check(stream)
+    if join is not None and not (how.points and runs is None):
+        raise InputError("--join", "found without --points of one recording, expected them together")
     if runs is not None:
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
@@ -136,7 +144,7 @@ def aoa(
     from inercal.face.study import one_run, read_study
     from inercal.records.write import SUFFIXES
 
-    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
+    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
     the_study = read_study("aoa", study, keys)
     output.spare(the_study.files)
     methods = how.methods(the_study.settings)
@@ -147,7 +155,7 @@ def aoa(
     with compiling(f"aoa{smoothed}", output.say):
         system.prepare(the_study, how.compare, methods)
     with working(output) as progress:
-        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points)
+        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points, join)
     return give(result, output, read_s, "angles")
 
 
