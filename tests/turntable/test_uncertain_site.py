@@ -4,14 +4,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study, table, u_without_doubts
+from scipy import stats
+from turntable_studies import (
+    DEG_H,
+    FULL_RANK,
+    LATITUDE,
+    WHEEL_X,
+    rotated,
+    study,
+    table,
+    u_without_doubts,
+    wheel_output,
+)
 
+from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import GravityInput, Site
+from inercal.records.record import record_of
+from inercal.rigs.distribution import normal
 from inercal.rigs.plans import grid
+from inercal.rigs.tables import turntable
 from inercal.turntable.positions.planning import design
 from inercal.turntable.settings import Design, RateTest
 from inercal.turntable.task import calibrate, simulate
+from inercal.units import parse_unit
 
 NOISE = 0.01 * DEG_H
 
@@ -101,3 +117,47 @@ def test_a_design_says_what_a_better_latitude_would_be_worth():
     assert rms[0] > 2.0 * rms[1]
     assert f"(latitude) that the rms u of the output is {rms[0]:.3g} deg/h" in said
     assert f"with an exact site it would be {rms[1]:.3g} deg/h" in said
+
+
+def covered(kind, u, runs):
+    """Share of verdicts that are ok, and of these the share of each coefficient within U, of tests made by hand.
+
+    The latitude that is stated, or the heading of the table, is off by a normal error of ``u`` [rad].
+    """
+    rng, inside = np.random.default_rng(20261122), []
+    heading = {"dbase_z": normal(u)} if kind == "heading" else {}
+    chain = turntable("two_axis_turntable", None, heading)
+    angles = FULL_RANK.angles
+    for _ in range(runs):
+        off = u * rng.standard_normal()
+        a, w = (0.0, 0.0, -1.0), (EARTH_RATE * np.cos(LATITUDE), 0.0, EARTH_RATE * np.sin(LATITUDE))
+        w = rotated(w, "z", off if kind == "heading" else 0.0)
+        for k, axis in enumerate("yz"):
+            a, w = rotated(a, axis, angles[:, k]), rotated(w, axis, angles[:, k])
+        y = wheel_output("x", WHEEL_X, a, w) + NOISE * rng.standard_normal(len(angles))
+        columns = [(f"phi{k + 1}", parse_unit("rad"), angles[:, k]) for k in range(2)]
+        made = record_of([*columns, ("y_x", parse_unit("rad/s"), y)], 60.0 * np.arange(len(angles)))
+        site = Site(9.8, (), LATITUDE + off, u) if kind == "latitude" else Site(9.8, (), LATITUDE, 0.0)
+        of = study(chain=chain, site=site, coefficients=WHEEL_X, unit="rad/s", noise=NOISE)
+        found = calibrate(made, of).estimate
+        if found.status is Status.OK:
+            inside.append([abs(found[n].value - WHEEL_X.get(n, 0.0)) < found[n].U for n in found.names])
+    return len(inside) / runs, np.mean(inside, axis=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "degrees"), [("latitude", 5.0), ("heading", 5.0)])
+def test_intervals_hold_where_the_site_is_uncertain(kind, degrees):
+    """To second order: "45(5) deg" for the latitude; 12 coefficients, of which at 1e-3 each holds in 20 runs."""
+    ok, share = covered(kind, np.radians(degrees), 20)
+    assert ok >= 0.9
+    assert share.min() * 20 * ok >= stats.binom.ppf(1e-3 / 12, 20, 0.9545)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("kind", "degrees"), [("latitude", 5.0), ("latitude", 11.0), ("heading", 5.0)])
+def test_intervals_hold_in_200_runs(kind, degrees):
+    """From some 12 deg of latitude on second order does not do, and verdicts are suspect."""
+    ok, share = covered(kind, np.radians(degrees), 200)
+    assert (ok < 0.9) == (degrees > 10.0)
+    assert share.min() * 200 * ok >= stats.binom.ppf(1e-3 / 12, round(200 * ok), 0.9545)

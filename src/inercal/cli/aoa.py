@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
     from inercal.cli.streaming import Estimators
     from inercal.records.record import Record
+    from inercal.stream.aoa import Aoa
+    from inercal.stream.lines import Lines
+    from inercal.stream.run import Recursive
 
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
@@ -118,8 +122,13 @@ def aoa(
     if runs is not None:
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
-        stream_study("aoa", _live, files, study, keys, every, map_file, span, streaming, output)
-        return 0
+        made: list[Aoa] = []
+        prepare = partial(_live, made)
+        stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
+        failure = made[-1].failure if made else ""
+        if failure:
+            output.say(failure)
+        return 1 if failure else 0
     paths = recorded("aoa", files, streaming, every)
 
     from inercal._jit import compiling
@@ -185,10 +194,10 @@ def _runs(
     return give(result, output, 0.0, "runs")
 
 
-def _live(settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
-    """Prepare a measurement row by row."""
+def _live(made: list[Aoa], settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
+    """Prepare a measurement row by row; ``made`` receives it."""
     from inercal._jit import compiling
-    from inercal.aoa.fusion.live import load_kernels
+    from inercal.aoa.fusion.live_band import load_kernels
     from inercal.aoa.fusion.problem import problem
     from inercal.stream.aoa import Aoa
 
@@ -198,4 +207,9 @@ def _live(settings: AoaSettings, interval: float, output: ReportOutput) -> Estim
         )
     with compiling("aoa", output.say):
         load_kernels(problem(settings))
-    return lambda lines: Aoa(lines, settings, interval, output.say_finding)
+
+    def make(lines: Lines) -> Recursive[Any]:
+        made.append(Aoa(lines, settings, interval, output.say_finding))
+        return made[-1]
+
+    return make
