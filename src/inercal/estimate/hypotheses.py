@@ -253,15 +253,20 @@ def _without(case: Case, fitted: Sequence[Fitted[Case]]) -> Case:
 def slopes(case: Case, hypothesis: Hypothesis[Case], z: Array, judge: Judge[Case]) -> Array:
     """Derivative (..., m) of the residuals ``z`` (...) of a case by the parameters of a hypothesis."""
     m, step = len(hypothesis.parameters), hypothesis.step
-    out = np.empty((*z.shape, m))  # filled in place: of a long recording one copy is enough
+    # of a long recording one copy, of seven digits, is enough
+    out = np.empty((*z.shape, m), dtype=np.float32 if z.size > _LONG else np.float64)
     for k, values in enumerate(step * np.eye(m)):
-        np.subtract(judge.residuals(hypothesis.without(case, values)), z, out=out[..., k])
-        out[..., k] /= step
+        column = judge.residuals(hypothesis.without(case, values)) - z
+        column /= step
+        out[..., k] = column
     return out
 
 
 _BLOCK = 1 << 18
 """Residuals that are squared at once."""
+
+_LONG = 1 << 20
+"""Residuals from which their derivatives are kept to seven digits."""
 
 
 class LeastSquares(NamedTuple):
@@ -292,7 +297,7 @@ def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquar
     for first in range(0, len(z), _BLOCK):
         some, own = Z[first : first + _BLOCK], z[first : first + _BLOCK]
         used = np.isfinite(own) & np.isfinite(some).all(axis=-1)
-        some, own = some[used], own[used]
+        some, own = some[used].astype(np.float64), own[used]
         normal, right = normal + some.T @ some, right + some.T @ own
         square, count = square + float(own @ own), count + len(own)
     weight = math.sqrt(max(1.0, square / max(count, 1))) / prior

@@ -260,7 +260,10 @@ def _accelerometers(
             return []
         text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
         return [Finding("unit_suspect", text, harm=EVERYTHING)]
-    force = rotate(conjugate(gimbals(recording.th[whole], world)[0]), world.up)
+    force = np.empty_like(acc)
+    for first in range(0, len(acc), _CHUNK):
+        some = slice(first, first + _CHUNK)
+        force[some] = rotate(conjugate(gimbals(recording.th[whole[some]], world)[0]), world.up)
     pair = _Pair(acc, force, 2.0 * settings.noise.accelerometer)
     if pair.misfit < LIMITS.rough_misfit:
         return []
