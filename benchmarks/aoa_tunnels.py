@@ -3,7 +3,7 @@
     python benchmarks/aoa_tunnels.py --seeds 20
 
 15 deg + 10 deg at 1 Hz, polars and rest, 30 s at 500 Hz, all constants drawn from the prior; rms error [deg], rms of
-error over u, coverage of 95 % after 2 s. *Before*: a gyro taken for prompt, the usual snap.
+error over u, coverage of 95 % after 2 s. *Before*: a gyro taken for prompt, the usual snap, no band.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from benchmarks.independent.aoa import AXES, BUFFETS, CASES, DEG, G, R, Tunnel, simulate
+from benchmarks.independent.aoa import AXES, CASES, DEG, DELAYS, G, R, Tunnel, simulate
 
 from inercal.aoa.diagnosis.choice import decided
 from inercal.aoa.fusion.filter_result import estimate
@@ -32,9 +32,7 @@ STUDY = AoaSettings(
 
 def rows(seeds: int) -> Iterator[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
     """Each case with its figures before and after."""
-    kinds = {
-        name: ("sine", "polar", "rest") if name in {**BUFFETS, "quiet": 0} else ("sine",) for name in CASES
-    }
+    kinds = {name: ("sine",) if name in DELAYS else ("sine", "polar", "rest") for name in CASES}
     for name, kind in ((name, kind) for name, each in kinds.items() for kind in each):
         both = np.zeros((2, 3))
         for seed in range(seeds):

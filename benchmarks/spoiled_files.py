@@ -30,11 +30,9 @@ from spoiled import strict, whole
 from spoiled.spoil import spoiled
 
 from inercal.errors import InercalError, RecordError
-from inercal.records.read import arrays, bags, child
+from inercal.records.read import arrays, bags, child, limits
 
 SEED = 20261122
-child._PATIENCE = 100  # times the processor time: a campaign runs beside others
-
 A_CHILD = 40
 """Cases that one process reads."""
 
@@ -214,6 +212,8 @@ def main():
     parser.add_argument("--table", type=Path)
     parser.add_argument("--case", nargs=2, metavar=("FORMAT", "NUMBER"))
     asked = parser.parse_args()
+    limits.seconds = lambda size: 3  # more would only wait longer for what never ends
+    child._PATIENCE = 100  # times that: a campaign runs beside others
     if asked.table:
         print(table(json.loads(asked.table.read_text())))
         return 0

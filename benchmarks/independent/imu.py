@@ -148,8 +148,6 @@ def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.
     if faults.delay:
         t = np.arange(len(w)) * dt
         seen = np.stack([np.interp(t - faults.delay, t, column) for column in seen.T], 1)
-    if faults.clip:
-        seen = np.clip(seen, -faults.clip, faults.clip)
     seen = seen + rng.normal(0, made.gyro_noise * np.sqrt(rate), seen.shape)
     f = attitudes[:, 2, :] * G + kick + shake * faults.tremor_force
     if faults.arm:
@@ -158,7 +156,10 @@ def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.
     f = f + rng.normal(0, made.acc_noise * np.sqrt(rate), f.shape)
     along = f @ (made.A / np.diag(made.A)[:, None]).T
     acc = np.diag(made.A) * (along + made.k2 * along**2) + made.a0
-    return np.arange(len(w)) * dt * (1 + faults.clock), acc, seen @ made.W.T + made.w0
+    gyro = seen @ made.W.T + made.w0
+    if faults.clip:
+        gyro = np.clip(gyro, -faults.clip, faults.clip)
+    return np.arange(len(w)) * dt * (1 + faults.clock), acc, gyro
 
 
 def _hump(m, dt):

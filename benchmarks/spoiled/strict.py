@@ -11,6 +11,7 @@ import json
 import re
 import struct
 import tomllib
+import zipfile
 import zlib
 
 import numpy as np
@@ -72,6 +73,8 @@ def raw(data):
 
 def npz(data):
     found = {}
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        must(archive.testzip() is None)
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         for name in arrays:
             values = arrays[name]

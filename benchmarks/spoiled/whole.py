@@ -126,12 +126,20 @@ def tdms():
 
 
 def daqmx():
-    """Raw counts of DAQmx: three channels of 32 bits, interleaved, without scales."""
+    """Raw counts of DAQmx: three channels of 32 bits, interleaved, each with a linear scale."""
 
     def word(value):
         data = value.encode()
         return struct.pack("<I", len(data)) + data
 
+    own = "NI_Scale[1]_"
+    scale = [
+        word("NI_Number_Of_Scales") + struct.pack("<II", 7, 2),
+        word(f"{own}Scale_Type") + struct.pack("<I", 0x20) + word("Linear"),
+        word(f"{own}Linear_Slope") + struct.pack("<Id", 10, 1e-4),
+        word(f"{own}Linear_Y_Intercept") + struct.pack("<Id", 10, 0.0),
+        word(f"{own}Linear_Input_Source") + struct.pack("<II", 7, 0),
+    ]
     objects = [
         ("/", None),
         ("/'DAQ'", None),
@@ -145,7 +153,9 @@ def daqmx():
         else:
             meta += struct.pack("<IIIQI", 0x1269, 0xFFFFFFFF, 1, 60, 1)
             meta += struct.pack("<IIIII", 5, 0, 4 * place, 0, 0) + struct.pack("<II", 1, 12)
-        meta += struct.pack("<I", 0)
+        meta += struct.pack("<I", 0 if place is None else len(scale)) + b"".join(
+            [] if place is None else scale
+        )
     counts = (1e4 * table()).round().astype("<i4").tobytes()
     lead = b"TDSm" + struct.pack("<IIQQ", 0x2 | 0x4 | 0x8 | 0x80, 4713, len(meta) + len(counts), len(meta))
     return lead + meta + counts

@@ -77,7 +77,7 @@ def _dotted(location: tuple[Any, ...]) -> str:
     Pydantic's name for the branch of a union, where a quantity or a word may stand, is left out.
     """
     keys = (text for part in location if not (text := str(part)).startswith("function-plain["))
-    return ".".join(text if re.fullmatch(r"[\w-]+", text) else shown(text) for text in keys)
+    return ".".join(text if re.fullmatch(r"[\w-]{1,80}", text) else shown(text) for text in keys)
 
 
 def _sentence(model: type[BaseModel], first: Any) -> str:

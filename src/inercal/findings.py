@@ -116,6 +116,7 @@ CODES: dict[str, Code] = {
     "same_recording": Code("two calibrations rest on the same recording", _NEVER),
     "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),
     "flexure": Code("the support of the model shakes its sensors", _ALWAYS),
+    "wide_flexure": Code("the support shakes the model beyond its usual flexure, which u allows for", _NEVER),
     "band_limited": Code("vibration is taken out of the sensors, motion above the band with it", _NEVER),
     "unmodelled": Code("the recording shows errors that the model leaves out", _BY_SIZE, rank=9),
     "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE, rank=10),

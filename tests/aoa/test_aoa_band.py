@@ -8,10 +8,13 @@ from benchmarks.independent.aoa import DEG, Tunnel, simulate
 from sting_study import study
 
 from inercal.aoa.band import Band
+from inercal.aoa.diagnosis.choice import of_delay
 from inercal.aoa.fusion import band
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.paper.delay import relative_delay
 from inercal.aoa.reading.recording import plain
+from inercal.aoa.settings import Estimator
 
 RATE = 500.0
 LIMITED = Band(35.0, (120.0,), RATE)
@@ -83,6 +86,17 @@ def test_a_missing_sample_and_a_gap_leave_nothing_wrong_behind():
     assert np.isfinite(fused.rows[:, 1]).all()
     assert np.nanmax(error) < 0.02  # of the start at a motion
     assert not ((fused.t > 4.0) & (fused.t < 14.0)).any()
+
+
+def test_a_late_gyro_that_a_band_leaves_no_rows_to_learn_is_said():
+    """1 ms at 63 deg/s are 0.06 deg, and 35 Hz leave 100 rows a second; a prompt one is not said."""
+    for late, codes in ((1e-3, ["command_shift"]), (0.0, [])):
+        run = simulate(Tunnel("sine", duration=30.0, gyro_delay=late), 0)
+        recording = plain(run.t, run.acc, run.gyro)
+        stated = replace(study(), band=Band(35.0), estimator=Estimator(snap=1e8))
+        of = problem(band.with_rate(stated, run.t))
+        delay = relative_delay(recording, stated.layout)
+        assert [each.code for each in of_delay(delay, of, estimate(recording, of))] == codes
 
 
 @pytest.mark.parametrize("smoothed", [False, True])

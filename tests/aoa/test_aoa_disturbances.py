@@ -10,7 +10,9 @@ from sting_study import DEG, G, study
 from inercal.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Plunge, Shaking
 from inercal.aoa.settings import MotionPlan, Noise
 from inercal.aoa.simulate import simulate, to_record
+from inercal.aoa.task import measure
 from inercal.errors import InputError
+from inercal.findings import Status
 from inercal.records.read import read
 from inercal.records.write import write_record
 
@@ -152,3 +154,21 @@ def test_sensors_with_rates_of_their_own(tmp_path):
     }
     with pytest.raises(InputError, match="another clock"):
         write_record(record, tmp_path / "slow.csv")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rates", [{"a2": 250.0}, {"gyro": 250.0}, {"a1": 500.0, "a2": 250.0, "gyro": 125.0}])
+def test_the_angle_with_sensors_at_rates_of_their_own(rates):
+    """30 deg + 10 deg at 1 Hz, 1 kHz the fastest: within u, over four draws of the biases."""
+    plan = MotionPlan("sine", mean=0.5, duration=15.0, sample_rate=FS, amplitude=10.0 * DEG, frequency=1.0)
+    of = study(motion=plan, disturbances=Disturbances(sample_rates=rates))
+    squares = []
+    for seed in range(4):
+        told = simulate(of, np.random.default_rng(seed))
+        measured = measure(to_record(told.recording, of), of)
+        assert measured.estimate.status is Status.OK, measured.estimate.message
+        late = told.recording.t > 3.0
+        error = measured.angles.theta - told.theta
+        squares.append(np.nanmean((error / measured.angles.u)[late] ** 2))
+        assert np.isfinite(error[late]).all()
+    assert math.sqrt(np.mean(squares)) < 1.0 + 4.0 / math.sqrt(2.0 * 4.0)

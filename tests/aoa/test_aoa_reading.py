@@ -216,8 +216,22 @@ def test_a_gyro_on_a_clock_of_its_own():
     assert np.isnan(found.gyro[0])
     slow = recording_of(record(gyro=np.sin(2.0 * np.pi * T[::20]), clocks={"gyro": T[::20]}), SHORT)
     np.testing.assert_array_equal(np.flatnonzero(np.isfinite(slow.gyro)), np.arange(0, 2000, 20))
-    with pytest.raises(RecordError, match="a3 has another clock than a1"):
-        recording_of(record(clocks={"a3": late}), SHORT)
+
+
+def test_accelerometers_on_clocks_of_their_own():
+    """Rows are those of the fastest; a slower one has values at the rows nearest to its samples, each once."""
+    late, third = T + 0.4e-3, T[::3]
+    found = recording_of(
+        record(
+            a2=np.sin(2.0 * np.pi * third), a3=np.cos(2.0 * np.pi * late), clocks={"a2": third, "a3": late}
+        ),
+        SHORT,
+    )
+    np.testing.assert_array_equal(found.t, T)
+    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(found.acc[:, 1])), np.arange(0, 2000, 3))
+    np.testing.assert_allclose(found.acc[::3, 1] / G, np.sin(2.0 * np.pi * third), atol=1e-12)
+    np.testing.assert_allclose(found.acc[1:, 2] / G, np.cos(2.0 * np.pi * T[1:]), atol=1e-5)
+    assert codes(found).count("other_clock") == 2
 
 
 @pytest.mark.parametrize("every", [1, 3])

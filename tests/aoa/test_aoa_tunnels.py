@@ -1,14 +1,17 @@
 """The fusion in what tunnels do, on recordings by a simulator that shares no code with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benchmarks.independent.aoa import CASES, DEG, LINES, G, Tunnel, simulate
 from sting_study import study
 
-from inercal.aoa.diagnosis.choice import decided
-from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.diagnosis.choice import decided, of_vibration
+from inercal.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.recording import plain
+from inercal.aoa.result.verification import late_reference
 from inercal.aoa.settings import Estimator
 
 SEEDS = 6
@@ -109,6 +112,41 @@ def test_a_motion_that_is_there_keeps_its_band():
     chosen = decided(plain(run.t, run.acc, run.gyro), study())
     assert chosen.band.low_pass > 2.0 * 38.0
     assert sorted(chosen.band.notch)[0] == pytest.approx(112.0, abs=0.2)
+
+
+def test_a_plunge_is_allowed_for():
+    """0.02 g at 2 Hz: with the usual flexure 0.1 deg and 9 u off; u is half as large again where it is allowed for."""
+    ratios = []
+    for seed in range(3):
+        recording, run = recorded("plunge 0.02 g, 2 Hz", seed, duration=12.0)
+        chosen = decided(recording, study())
+        assert [each.code for each in of_vibration(study(), chosen)] == ["wide_flexure"]
+        filtered = estimate(recording, problem(chosen))
+        error = (filtered.theta - run.theta)[run.t > 2.0]
+        ratios.append(np.mean(np.square(error / filtered.u[run.t > 2.0])))
+        assert np.sqrt(np.mean(error**2)) < 0.04 * DEG
+    assert np.sqrt(np.mean(ratios)) < 1.4
+
+
+def test_single_spikes_do_not_contradict_the_model():
+    """One sample in a thousand off by 0.5 g or 0.5 rad/s: held back, and no reason to give the angle up."""
+    recording, run = recorded("quiet", 0, duration=12.0)
+    rng = np.random.default_rng(0)
+    acc = recording.acc + 0.5 * G * (rng.random(recording.acc.shape) < 1e-3)
+    gyro = recording.gyro + 0.5 * (rng.random(len(run.t)) < 1e-3)
+    filtered = estimate(plain(run.t, acc, gyro), problem(study()))
+    assert filtered.nis_mean < 1.0
+    assert np.sqrt(np.mean((filtered.theta - run.theta)[run.t > 2.0] ** 2)) < 0.03 * DEG
+
+
+def test_a_reference_that_is_late_is_said():
+    """3 ms at 63 deg/s are 13 u of the angle; 0.2 ms are none of its."""
+    recording, run = recorded("quiet", 0, duration=12.0)
+    angles = of_fusion(estimate(recording, problem(study())), 19)
+    for late, words in ((3e-3, "3 ms later"), (-3e-3, "3 ms earlier"), (2e-4, "")):
+        reference = np.interp(run.t - late, run.t, run.theta)
+        said = [each.message for each in late_reference(replace(recording, reference=reference), angles)]
+        assert ("theta_ref comes " + words in said[0]) if words else said == []
 
 
 @pytest.mark.slow

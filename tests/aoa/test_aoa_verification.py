@@ -10,7 +10,7 @@ from sting_study import DEG, G, layout, study
 from inercal.aoa.angles import Angles
 from inercal.aoa.reading.recording import plain
 from inercal.aoa.reference.readings import reference
-from inercal.aoa.reference.sensor_fit import _linearised, _terms, fit
+from inercal.aoa.reference.sensor_fit import _linearised, fit, fit_terms
 from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import MotionPlan
 from inercal.aoa.simulate import simulate
@@ -146,7 +146,7 @@ def test_noise_is_that_of_one_sample(fits):
 
 def test_derivatives_are_those_of_differences():
     recording, settings, _, _ = turned(1, noise=0.0)
-    names, _, usual, start = _terms(settings)
+    names, _, usual, start = fit_terms(settings)
     known = reference(recording)
     x = start + usual * np.random.default_rng(2).standard_normal(len(start))
     at, jacobian = _linearised(recording, settings, known, x)

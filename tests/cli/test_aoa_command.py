@@ -22,7 +22,7 @@ from rows import for_each
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 AOA = ["aoa", "model.csv", "--study", "aoa.toml"]
 SUFFIXES = [".csv", ".npz", ".h5", ".parquet", ".nc"]
-NAMES = ["b_g", "b_1", "b_2", "b_3", "dr_1", "dr_2", "dr_3", "zo_1", "zo_2", "zo_3", "k_g"]
+NAMES = ["b_g", "b_1", "b_2", "b_3", "dr_1", "dr_2", "dr_3", "zo_1", "zo_2", "zo_3", "k_g", "tau_g"]
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_json_is_the_contract_and_holds_the_truth(capsys):
     code, data = told(capsys, *AOA)
     assert (code, data["command"], data["status"]["code"]) == (0, "aoa", "ok")
     assert [p["name"] for p in data["parameters"]] == NAMES == data["covariance"]["names"]
-    assert {p["unit"] for p in data["parameters"]} == {"rad/s", "m/s^2", "m", "1"}
+    assert {p["unit"] for p in data["parameters"]} == {"rad/s", "m/s^2", "m", "1", "s"}
     result = data["result"]
     assert result["method"] == "fusion 19"
     assert 0.1 < result["nis_mean"] == data["statistics"]["nis_mean"] < 2.0
@@ -148,7 +148,7 @@ def test_smoothing_gives_another_and_surer_angle(capsys):
 def test_fewer_states(states, capsys):
     code, data = told(capsys, *AOA, "--states", str(states))
     assert (code, data["result"]["method"]) == (0, f"fusion {states}")
-    assert len(data["parameters"]) == {8: 4, 11: 7, 15: 7}[states]
+    assert len(data["parameters"]) == {8: 5, 11: 8, 15: 8}[states]
 
 
 @pytest.mark.parametrize(
@@ -244,12 +244,17 @@ def test_files_with_distinct_channels_are_one_record(capsys):
 # Live.
 
 
+@pytest.mark.parametrize("low_pass", ["none", "50 Hz"])
 @pytest.mark.parametrize("how", [[], ["--states", "8"], ["--set", "model.roll=5.0(2) deg"]])
-def test_a_stream_gives_the_bytes_of_the_file(how, capsys, monkeypatch):
+def test_a_stream_gives_the_bytes_of_the_file(how, low_pass, capsys, monkeypatch):
+    """Where the study states band and snap; with status and NIS beside."""
+    how = [*how, "--set", f"band.low_pass={low_pass}", "--set", "estimator.snap=1e8 rad^2/s^7"]
     assert run([*AOA, *how, "--out", "angles.csv", "--quiet"]) in (0, 1)
     code, out, err = piped(monkeypatch, capsys, "aoa", "--stream", *AOA[2:], *how, "--quiet")
     assert (code, err) == (0, "")
-    assert out == Path("angles.csv").read_text()
+    lines = [line.rsplit(",", 2) for line in out.splitlines()]
+    assert [line[0] for line in lines] == Path("angles.csv").read_text().splitlines()
+    assert {line[1] for line in lines} <= {"status [1]", "0.0", "3.0"}
 
 
 def test_a_stream_from_a_file_a_line_a_second(capsys):
@@ -261,8 +266,9 @@ def test_a_stream_from_a_file_a_line_a_second(capsys):
 def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     stream = ["aoa", "--stream", *AOA[2:], "--states", "8", "--set", "noise.accelerometer=1e-6 g"]
     code, out, err = piped(monkeypatch, capsys, *stream)
-    assert (code, out.count("\n")) == (0, 1501)
+    assert (code, out.count("\n")) == (1, 1501)
     assert err.count("excess_scatter: NIS is ") == 1
+    assert "the stream contradicts the model: mean NIS" in err
 
 
 @pytest.mark.slow

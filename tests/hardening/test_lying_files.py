@@ -203,6 +203,7 @@ NUMBERS = "".join(f"{k / 100:.2f};{'0,5' if k else '0,25'};7\n" for k in range(4
             "line 10",
         ),
         ("t [s];acc_x [g];acc_y [g]\n" + NUMBERS + "4,00;1.000;7\n4,01;0,5;7\n", "bad_row", "line 402"),
+        ("t [s];acc_x [g];acc_y [g]\n" + NUMBERS + "4,00;\u0661;7\n4,01;0,5;7\n", "bad_row", "line 402"),
         ("t [s];acc_x [g];acc_y [g]\n" + NUMBERS + "4,00;1.000,5;7\n4,01;0,5;7\n", "bad_row", "line 402"),
     ],
 )
@@ -359,13 +360,14 @@ def test_memory_of_a_child(tmp_path, monkeypatch):
         in_child(swell, put(tmp_path, "a.mat", "x"))
 
 
-def test_beside_other_threads_nothing_is_forked():
-    """A lock that another thread holds would never be free in a fork."""
+@pytest.mark.parametrize("daemon", [False, True])
+def test_beside_other_threads_nothing_is_forked(daemon):
+    """A lock that another thread holds would never be free in a fork; a progress bar holds none that is asked for."""
     wait = threading.Event()
-    other = threading.Thread(target=wait.wait)
+    other = threading.Thread(target=wait.wait, daemon=daemon)
     other.start()
     try:
-        assert not child._may_fork()
+        assert child._may_fork() == daemon
     finally:
         wait.set()
         other.join()
@@ -400,3 +402,16 @@ def test_eight_bytes_less_in_a_mat_file(tmp_path):
         path = put(tmp_path, "cut.mat", data[:begin] + data[begin + 8 :])
         with suppress(InputError):
             read(path, mapped)
+
+
+def test_the_page_of_the_contract_has_the_limits():
+    page = (Path(__file__).parents[2] / "docs/reference/reading.md").read_text("utf-8")
+    mib = 1 << 20
+    assert (limits.unpacked(0), limits.unpacked(7)) == (256 * mib, 256 * mib + 700)
+    assert limits.memory(0) == 512 * mib + 4 * limits.unpacked(0)
+    assert (limits.seconds(0), limits.seconds(mib)) == (8, 12)
+    assert (2 * mib, 65_536, 200) == (limits.LINE, limits.HEADER, limits.TITLE)
+    assert (limits.NESTING, limits.FIELDS, child._PATIENCE) == (16, 10_000, 10)
+    for words in ("256 MiB + 100 size", "512 MiB + four times", "8 s + 4 s for each MiB; ten times", "65 536", "2 MiB",
+                  "200 characters", "| 16;", "| 10 000 |", "900 characters", "1 MiB, 50 levels"):  # fmt: skip
+        assert words in page

@@ -1,6 +1,6 @@
 """Files that are spoiled at random, their structure known: benchmarks/spoiled_files.py, 200 of each format.
 
-The test run reads 60 of each, a few dozen in a process, `make campaign` the rest. A crash or a hang of that process, an
+The test run reads 40 of each in a process of their own, `make campaign` the rest. A crash or a hang of it, an
 error that is not one sentence, and a value that differs from a strict parser's without a finding are faults of ours.
 """
 
@@ -13,7 +13,7 @@ from spoiled import strict, whole
 
 from inercal.records.read import limits
 
-CASES, SHORT = 200, 60
+CASES, SHORT = 200, 40
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="many children, which are forks")
 
@@ -27,10 +27,11 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="many children, 
 @pytest.mark.parametrize("name", whole.FORMATS)
 def test_spoiled_files_are_read_or_refused(name, cases, monkeypatch):
     monkeypatch.setattr(limits, "seconds", lambda size: 2)
+    monkeypatch.setattr(spoiled_files.child, "_PATIENCE", 100)
     counts, faults, _ = spoiled_files.campaign(name, cases)
     assert faults == {}
     assert sum(counts.values()) == len(cases)
-    assert counts["refused"] < len(cases) or name in ("checkpoint", "tdms, DAQmx")
+    assert counts["refused"] < len(cases) or name == "checkpoint"
 
 
 @pytest.mark.slow
@@ -48,12 +49,13 @@ def test_whole_files_are_read_as_strictly(tmp_path):
         assert text is None or columns.keys() >= {"acc_x", "gyro_x"}
 
 
+@pytest.mark.slow
 def test_a_fault_is_seen(monkeypatch):
     """A reader that crashes, one that hangs, and one that gives another number."""
 
-    def reads(how):
+    def reads(how, cases=3):
         monkeypatch.setattr(spoiled_files, "read", how)
-        return spoiled_files.campaign("raw binary", range(3))
+        return spoiled_files.campaign("raw binary", range(cases))
 
     def hang(*_):
         while True:
@@ -66,4 +68,4 @@ def test_a_fault_is_seen(monkeypatch):
     assert set(reads(lambda *_: (other, set()))[1].values()) == {"acc_x differs from the strict parser's"}
     assert reads(lambda *_: (other, {"bad_row"}))[0] == {"read with findings": 3}
     assert all("crashed its reader" in text for text in reads(lambda *_: os.abort())[1].values())
-    assert len(reads(hang)[1]) == 3
+    assert len(reads(hang, 1)[1]) == 1

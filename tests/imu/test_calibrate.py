@@ -159,7 +159,8 @@ def test_accelerometers_alone():
     estimate = calibrate(record_of(t, acc), SETTINGS).estimate
     assert estimate.status is Status.OK
     assert estimate.names[-1] == "M_yz"
-    assert [finding.code for finding in estimate.findings] == ["gyro_missing"]
+    assert [finding.code for finding in estimate.findings] == ["gyro_missing", "unmodelled_k2"]
+    assert estimate.findings[1].harm == ()
     assert np.max(np.abs(compare(estimate, truth) / estimate.u)) < 5.0
 
 

@@ -1,22 +1,20 @@
-"""Damaged files end in a record or in one clear sentence: never in another exception, never in a hang."""
+"""Damaged text and maps end in a record or in one clear sentence: never in another exception, never in a hang.
+
+Binary formats are in `tests/hardening/test_spoiled_files.py`.
+"""
 
 import gzip
-import io
 import re
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from nptdms import ChannelObject, TdmsWriter
-from scipy.io import savemat
 
 from inercal.errors import InputError
 from inercal.findings import CODES
 from inercal.records.guess import guess_map
 from inercal.records.maps import read_map
 from inercal.records.read import read
-from inercal.records.write import write_record
 
 ROWS = np.column_stack([np.arange(60) / 100, np.random.default_rng(5).standard_normal((60, 2))])
 TEXT = (
@@ -41,12 +39,6 @@ unit = "deg/s"
 """
 
 many = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-def saved(compressed):
-    file = io.BytesIO()
-    savemat(file, {"data": ROWS}, do_compression=compressed)
-    return file.getvalue()
 
 
 @st.composite
@@ -108,34 +100,6 @@ def test_damaged_text_reads_or_is_refused(tmp_path, content):
 @given(content=damaged(gzip.compress(TEXT)))
 def test_damaged_compressed_text_reads_or_is_refused(tmp_path, content):
     assert is_sound(lambda: read(put(tmp_path / "a.csv.gz", content)))
-
-
-@many
-@given(content=damaged(saved(False)) | damaged(saved(True)))
-def test_damaged_mat_files_read_or_are_refused(tmp_path, content):
-    record_map = put(tmp_path / "map.toml", MAP.partition(b"[file]")[0])
-    assert is_sound(lambda: read(put(tmp_path / "a.mat", content), record_map))
-
-
-def self_named(suffix, folder):
-    """A file of that format, as bytes, with canonical names."""
-    path = folder / f"whole{suffix}"
-    if suffix == ".tdms":
-        with TdmsWriter(path) as file:
-            properties = {"wf_increment": 0.01, "unit_string": "g"}
-            file.write_segment([ChannelObject("IMU", f"acc_{x}", ROWS[:, 1], properties) for x in "xyz"])
-    else:
-        write_record(read(put(folder / "whole.csv", TEXT)), path)
-    return path.read_bytes()
-
-
-@pytest.mark.parametrize("suffix", [".npz", ".nc", ".parquet", ".tdms"])
-@settings(many, max_examples=60)
-@given(data=st.data())
-def test_damaged_binary_files_read_or_are_refused(suffix, tmp_path, data):
-    """The C library of HDF5 may crash on damaged files, which no program in Python can help."""
-    content = data.draw(damaged(self_named(suffix, tmp_path)))
-    assert is_sound(lambda: read(put(tmp_path / f"a{suffix}", content)))
 
 
 @many

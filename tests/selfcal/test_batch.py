@@ -21,7 +21,7 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.batch import _terms, estimate_map, inverse_diagonal
+from inercal.selfcal.filters.batch import estimate_map, inverse_diagonal, terms_at
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.residuals import (
     first_reading,
@@ -76,17 +76,17 @@ def test_jacobians_of_the_exponential(length):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True])
-def test_derivatives_of_all_terms(extended):
+def test_derivatives_of_allterms_at(extended):
     recording, given, _ = recorded(step=10.0, truth=EXTENDED_TRUTH, filter=Filter(extended=extended))
     rng = np.random.default_rng(4)
     p, n = len(given.prior), len(recording.t)
     c = given.prior * rng.standard_normal(p)
     measured, first = readings(recording, given), first_reading(recording, given)
     q = boxplus(np.vstack([first.attitude, measured.attitude]), 0.2 * rng.standard_normal((n, 3)))
-    terms = _terms(q, c, recording, given, measured, first)
+    terms = terms_at(q, c, recording, given, measured, first)
 
     def changed(attitudes, z):
-        return _terms(boxplus(q, attitudes), c + given.prior * z, recording, given, measured, first)
+        return terms_at(boxplus(q, attitudes), c + given.prior * z, recording, given, measured, first)
 
     def check(derivative, residual, move, size):
         # residuals change by minus the derivative; steps differ in size over the rows, hence relative

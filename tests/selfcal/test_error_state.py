@@ -134,7 +134,7 @@ def test_the_kernel_is_its_matrix_twin(short, extended):
     recording = cut(short, np.r_[700:1101])
     recording.acc[5], recording.th[50] = np.nan, np.nan
     recording.acc[80, 1] = np.nan
-    found = estimate(recording, of)
+    found = estimate(recording, of, brief=True)
     q, c, P, nis = twin(recording, of, 400)
     sigma = np.sqrt(np.diag(P))
     assert np.abs((found.coefficients - c) / sigma[3:]).max() < 1e-7

@@ -55,7 +55,7 @@ def test_the_kernel_is_its_numpy_twin(rig, extended):
     settings = study(plan=COARSE, gimbals=Gimbals(*rig), filter=Filter(extended=extended))
     given = problem(settings)
     recording = with_gaps(simulate(experiment(settings), np.random.default_rng(5)).recording)
-    found = estimate(recording, given, "mukf")
+    found = estimate(recording, given, "mukf", brief=True)
     start = np.array(attitude(recording.th[0], given.world.axes, given.world.signs))
     q, c, P, nis = multiplicative(recording, given, start, given.noise.encoder)
     assert in_sigma(found.coefficients, c, P[3:, 3:]) < 1e-7

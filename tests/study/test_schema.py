@@ -94,7 +94,7 @@ def test_a_key_measures_the_same_wherever_it_is():
             measured.setdefault(name.rpartition(".")[2], set()).update(dimensions(schema))
     assert {name for name, of in measured.items() if len(of) > 1} == TWO_DIMENSIONS.keys()
     assert {name for name, of in measured.items() if "frequency" in of} == {
-        *("sample_rate", "frequency", "second_frequency", "low", "high", "bandwidth"),
+        *("sample_rate", "frequency", "second_frequency", "low", "high", "bandwidth", "notch"),
     }
 
 

@@ -149,7 +149,7 @@ def test_the_options_of_a_method_load(method, tmp_path):
     """With the "# " taken from their tables."""
     text = filled("imu", overrides=[f"imu.method={method}"])
     begin = text.index(f"# [imu.{method}]")
-    end = text.index("# [imu.aided]") if method == "ferraris" else text.index("[traceability]")
+    end = text.index("# [imu.aided]" if method == "ferraris" else "# [simulation]")
     text = text[:begin] + re.sub("(?m)^# ", "", text[begin:end]) + text[end:]
     data = tomllib.loads(text)
     Draft202012Validator(SCHEMA).validate(data)

@@ -33,7 +33,7 @@ from inercal.aoa.paper.residuals import error_terms
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.simulate import simulate
 from inercal.arrays import Array
-from inercal.errors import InputError, StudyError
+from inercal.errors import StudyError
 from inercal.estimate.rounding import short
 from inercal.estimate.table import Table, heads
 from inercal.findings import Finding
@@ -60,7 +60,7 @@ _LONGEST = 20.0
 _NO_NOISE = 1e-9
 """Part of the noise that is left in a recording for the bound."""
 
-_FACTORS = (1e-3, 1e3)
+_FACTORS = (1e-2, 1e2)
 """Accelerometers that are looked at: times better and worse than stated."""
 
 _BASE_LINES = (0.25, 0.5, 0.75, 1.0)
@@ -188,6 +188,8 @@ def fusion_bound(settings: AoaSettings, layout: Layout) -> float:
     made = simulate(
         replace(of, noise=quiet, disturbances=type(of.disturbances)()), np.random.default_rng(0), {}
     )
+    # a bound holds nothing back
+    of = replace(of, estimator=replace(of.estimator, gate=math.inf))
     filtered = estimate(made.recording, problem(of), settings.estimator.smooth)
     u = filtered.u[(made.recording.t >= LIMITS.settling_time) & np.isfinite(filtered.u)]
     return math.sqrt(float(np.mean(np.square(u)))) if len(u) else math.inf
@@ -270,7 +272,10 @@ def _designed(
     if wanted is not None:
         factor = _factor(settings, best.layout, wanted)
         if math.isnan(factor):
-            left = fusion_bound(_times(settings, _FACTORS[0]), best.layout)
+            left = min(
+                fusion_bound(_times(settings, float(each)), best.layout)
+                for each in np.geomspace(_FACTORS[0], 1.0, 13)
+            )
             text = (
                 f"no accelerometers reach the wanted {_deg(wanted)} deg: with perfect ones {_deg(left)} deg are "
                 "left, of positions, gyro and motion: state these better under [prior] and [noise]"
@@ -296,16 +301,20 @@ def _designed(
 def _factor(settings: AoaSettings, layout: Layout, wanted: float) -> float:
     """Largest factor on noise and bias of the accelerometers at which the fusion knows the angle as wanted; NaN where
     none does."""
-    low, high = (math.log(factor) for factor in _FACTORS)
-    if fusion_bound(_times(settings, math.exp(low)), layout) > wanted:
+    factors = np.geomspace(*_FACTORS, 25)
+    reached = [fusion_bound(_times(settings, float(each)), layout) <= wanted for each in factors]
+    if not any(reached):
         return math.nan
+    last = int(np.flatnonzero(reached)[-1])
+    if last == len(factors) - 1:
+        return float(factors[-1])
+    low, high = math.log(factors[last]), math.log(factors[last + 1])
     while high - low > 0.02:
         middle = 0.5 * (low + high)
-        try:
-            reached = fusion_bound(_times(settings, math.exp(middle)), layout) <= wanted
-        except InputError:
-            reached = False
-        low, high = (middle, high) if reached else (low, middle)
+        if fusion_bound(_times(settings, math.exp(middle)), layout) <= wanted:
+            low = middle
+        else:
+            high = middle
     return math.exp(low)
 
 

@@ -156,6 +156,12 @@ class Limits:
     zero_sigmas: float = 3.0
     """Standard deviations by which the angle may change in that stretch."""
 
+    slower_clock: float = 0.95
+    """Samples of a sensor on a clock of its own, over the rows, from which it has a value in every row."""
+
+    joined_correlation: float = 0.8
+    """Correlation of the angle with a column of another table from which the offset of their clocks is believed."""
+
     shaken_gyro: float = 2.0
     """Standard deviation of the gyro, over its stated noise, from which a model shakes in that stretch."""
 
@@ -205,6 +211,12 @@ class Limits:
 
     motion_power: float = 10.0
     """Spectral density of the gyro over its noise from which it counts as motion."""
+
+    shaking_frequency: float = 4.0
+    """Frequency [Hz] of flexure in a wide band."""
+
+    shaking_damping: float = 0.9
+    """Relative damping of flexure in a wide band: from one to some tens of Hz."""
 
     line_segment: float = 2.0
     """Length [s] of the segments of a spectrum in which lines are looked for."""
@@ -280,6 +292,9 @@ class Limits:
 
     uneven_share: float = 0.05
     """Share of the usual interval by which another differs so that samples are put on an even grid for a low pass."""
+
+    reference_sigmas: float = 2.0
+    """Standard uncertainties of the angle by which a late reference differs, to be named."""
 
     reference_spans: int = 50
     """Averages of 50 ms that a reference angle has at least for a fit of the sensors."""

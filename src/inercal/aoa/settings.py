@@ -34,6 +34,7 @@ Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
 Tangential = Literal["none", "differentiated", "dual"]
 Per = Literal["1", "V", "count"]
+PointsBy = Literal["auto", "point", "trigger", "pause"]
 AxisName = Literal["+x", "-x", "+z", "-z"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 
@@ -50,6 +51,7 @@ _OF_PLACES = Bounds(
 )
 _ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
 _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg to 45 deg")
+_WAIT = within(0.0, 1e6, "a time of 0 or more")
 _WITHIN = within(-5.0, 5.0, "a position within 5 m of the pivot (mm given as m?)")
 _PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
 
@@ -230,6 +232,25 @@ class Attitude(Flow, ModelAttitude):
 
 
 @dataclass(frozen=True)
+class PointPlan:
+    """Test points of a recording."""
+
+    by: PointsBy = option(
+        "point: stretches of one number in that column; trigger: from that channel; pause: of the angle itself; auto: "
+        "point where there is such a column, else pause", "auto",
+    )  # fmt: skip
+    delay: float = quantity(
+        "with trigger: time left out from where it changes", "time", "0 s", example="0.5 s", bounds=_WAIT
+    )
+    length: float | None = quantity(
+        "with trigger: time averaged; as long as its value holds if absent",
+        "time",
+        example="1 s",
+        bounds=TIME,
+    )
+
+
+@dataclass(frozen=True)
 class Zero:
     """A stretch at rest (wind off) from ``start`` to ``end`` [s] of the record, at a known ``angle`` [rad] with its
     standard uncertainty ``u``."""
@@ -343,6 +364,7 @@ class AoaSettings:
     methods: Methods = field(default_factory=Methods)
     attitude: Attitude = field(default_factory=Attitude)
     zero: Zero | None = None
+    points: PointPlan = field(default_factory=PointPlan)
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
     design: Design = field(default_factory=Design)

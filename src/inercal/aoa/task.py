@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.diagnosis.choice import decided, of_band
+from inercal.aoa.diagnosis.choice import decided, of_delay, of_vibration
 from inercal.aoa.diagnosis.examination import diagnose, implausible
-from inercal.aoa.fusion import filter_result, live, smoother
+from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem, problem
@@ -23,12 +23,13 @@ from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.reference.sensor_fit import Verified, fit
+from inercal.aoa.reference.static_fit import at_rests_alone, static_fit
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.outcome import assemble, assemble_paper
 from inercal.aoa.result.points import Point, points
 from inercal.aoa.result.systematic import by_fusion, by_methods
-from inercal.aoa.result.verification import Errors, errors
+from inercal.aoa.result.verification import Errors, errors, late_reference
 from inercal.aoa.settings import AoaSettings, Methods
 from inercal.arrays import short_repr
 from inercal.errors import InputError, RecordError
@@ -91,7 +92,7 @@ def load_kernels(settings: AoaSettings, methods: Methods | None = None, compare:
     if methods is not None and not compare:
         return
     of = problem(settings)
-    live.load_kernels(of)
+    live_band.load_kernels(of)
     if settings.estimator.smooth or compare:
         smoother.load_kernels(of)
 
@@ -125,7 +126,7 @@ def measure(
     if not recording.spatial:
         settings.attitude.check_pitch_shows()
     stated, settings = settings, decided(recording, settings)
-    findings = [*implausible(*fused_case(recording, settings)), *of_band(stated, settings)]
+    findings = [*implausible(*fused_case(recording, settings)), *of_vibration(stated, settings)]
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior if known is None else known)
     delay = relative_delay(recording, settings.layout)
@@ -136,18 +137,21 @@ def measure(
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
+        findings += of_delay(delay, of, filtered)
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)
     compared = _compared(zeroed, settings, angles, progress) if compare else {}
     progress("assembling")
+    at_rest = points(recording, angles, settings)
     judged: dict[str, Errors] = {}
     verified = None
     if recording.reference is not None and np.isfinite(recording.reference).any():
         progress("fitting the sensors to the reference angle")
         judged = {each.method: errors(recording, each) for each in (angles, *compared.values())}
-        verified = _fitted(recording, settings)
-    at_rest = points(recording, angles, settings)
+        verified = _fitted(recording, settings, at_rest)
+        if filtered is not None:
+            findings = [*findings, *late_reference(recording, angles)]
     behind = (findings, delay, at_rest, judged, compared, verified)
     if filtered is None:
         estimate = assemble_paper(recording, settings, angles, *behind)
@@ -159,9 +163,11 @@ def measure(
     )
 
 
-def _fitted(recording: Recording, settings: AoaSettings) -> Verified | None:
+def _fitted(recording: Recording, settings: AoaSettings, at_rest: tuple[Point, ...]) -> Verified | None:
     """The sensors fitted to the reference angle; None where there is too little of it."""
     try:
+        if at_rests_alone(recording):
+            return static_fit(recording, settings, [(each.start, each.stop) for each in at_rest])
         return fit(recording, settings)
     except RecordError:
         return None

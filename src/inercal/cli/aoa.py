@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
     from inercal.cli.streaming import Estimators
     from inercal.records.record import Record
+    from inercal.stream.aoa import Aoa
+    from inercal.stream.lines import Lines
+    from inercal.stream.run import Recursive
 
 Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
 Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
@@ -96,6 +100,12 @@ def aoa(
     *,
     study: StudyFile,
     how: MethodOptions = MethodOptions(),
+    join: Annotated[
+        Path | None,
+        Parameter(
+            help="With --points: table of a balance (CSV) to set beside the points, by number or by time."
+        ),
+    ] = None,
     runs: Annotated[
         Path | None,
         Parameter(
@@ -115,11 +125,18 @@ def aoa(
     """Measure the angle of attack of a wind-tunnel model."""
     keys = [*(overrides or ()), *how.keys]
     how.check(stream)
+    if join is not None and not (how.points and runs is None):
+        raise InputError("--join", "found without --points of one recording, expected them together")
     if runs is not None:
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
-        stream_study("aoa", _live, files, study, keys, every, map_file, span, streaming, output)
-        return 0
+        made: list[Aoa] = []
+        prepare = partial(_live, made)
+        stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
+        failure = made[-1].failure if made else ""
+        if failure:
+            output.say(failure)
+        return 1 if failure else 0
     paths = recorded("aoa", files, streaming, every)
 
     from inercal._jit import compiling
@@ -127,7 +144,7 @@ def aoa(
     from inercal.face.study import one_run, read_study
     from inercal.records.write import SUFFIXES
 
-    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
+    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
     the_study = read_study("aoa", study, keys)
     output.spare(the_study.files)
     methods = how.methods(the_study.settings)
@@ -138,7 +155,7 @@ def aoa(
     with compiling(f"aoa{smoothed}", output.say):
         system.prepare(the_study, how.compare, methods)
     with working(output) as progress:
-        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points)
+        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points, join)
     return give(result, output, read_s, "angles")
 
 
@@ -185,10 +202,10 @@ def _runs(
     return give(result, output, 0.0, "runs")
 
 
-def _live(settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
-    """Prepare a measurement row by row."""
+def _live(made: list[Aoa], settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
+    """Prepare a measurement row by row; ``made`` receives it."""
     from inercal._jit import compiling
-    from inercal.aoa.fusion.live import load_kernels
+    from inercal.aoa.fusion.live_band import load_kernels
     from inercal.aoa.fusion.problem import problem
     from inercal.stream.aoa import Aoa
 
@@ -198,4 +215,9 @@ def _live(settings: AoaSettings, interval: float, output: ReportOutput) -> Estim
         )
     with compiling("aoa", output.say):
         load_kernels(problem(settings))
-    return lambda lines: Aoa(lines, settings, interval, output.say_finding)
+
+    def make(lines: Lines) -> Recursive[Any]:
+        made.append(Aoa(lines, settings, interval, output.say_finding))
+        return made[-1]
+
+    return make

@@ -91,9 +91,9 @@ COMMANDS = {
         "(.json or .toml, the prior of a next run) or the samples (.csv, .npz, .h5, .parquet or .nc), with --points "
         "the angle of each pause. --report writes a page to hand over. --runs RUNS.csv measures all runs of an entry, "
         "a row each with file and role (wind-off, up, down, run), with the tare of the wind-offs interpolated, and "
-        "sums them up by point and by oscillation. With --stream CSV lines come in, from FILE or "
-        "standard input, and the lines of the samples go out, live; with --checkpoint the same command goes on where "
-        "it was stopped. Exit code 1: done, but the verdict is not ok.",
+        "sums them up by point and by oscillation; --join sets the table of a balance beside the points. With --stream "
+        "CSV lines come in, from FILE or standard input, and the lines of the samples go out, live; with --checkpoint "
+        "the same command goes on where it was stopped. Exit code 1: done, but the verdict is not ok.",
         "inercal aoa model.csv --study aoa.toml --report aoa.html",
     ),
     ("allan", ""): (

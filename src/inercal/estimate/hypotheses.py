@@ -253,8 +253,20 @@ def _without(case: Case, fitted: Sequence[Fitted[Case]]) -> Case:
 def slopes(case: Case, hypothesis: Hypothesis[Case], z: Array, judge: Judge[Case]) -> Array:
     """Derivative (..., m) of the residuals ``z`` (...) of a case by the parameters of a hypothesis."""
     m, step = len(hypothesis.parameters), hypothesis.step
-    columns = [(judge.residuals(hypothesis.without(case, values)) - z) / step for values in step * np.eye(m)]
-    return np.stack(columns, axis=-1) if columns else np.empty((*z.shape, 0))
+    # of a long recording one copy, of seven digits, is enough
+    out = np.empty((*z.shape, m), dtype=np.float32 if z.size > _LONG else np.float64)
+    for k, values in enumerate(step * np.eye(m)):
+        column = judge.residuals(hypothesis.without(case, values)) - z
+        column /= step
+        out[..., k] = column
+    return out
+
+
+_BLOCK = 1 << 18
+"""Residuals that are squared at once."""
+
+_LONG = 1 << 20
+"""Residuals from which their derivatives are kept to seven digits."""
 
 
 class LeastSquares(NamedTuple):
@@ -271,7 +283,7 @@ def _least_squares_of(parts: Sequence[Array], z: Array, fitted: Sequence[Fitted[
     """Least squares of the fitted hypotheses, with their priors."""
     values = np.concatenate([each.values for each in fitted])
     prior = np.concatenate([np.full(len(each.values), each.hypothesis.prior) for each in fitted])
-    return least_squares(np.concatenate(parts, axis=-1), z, values, prior)
+    return least_squares(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1), z, values, prior)
 
 
 def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquares:
@@ -279,21 +291,28 @@ def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquar
 
     ``z`` (...) and ``Z`` (..., m) may hold NaN; combinations without effect stay as they are.
     """
-    used = np.isfinite(z) & np.isfinite(Z).all(axis=-1)
-    scatter = math.sqrt(max(1.0, float(np.mean(np.square(z[used]))))) if used.any() else 1.0
-    weight = scatter / prior
-    columns, goal = np.vstack([Z[used], np.diag(weight)]), np.append(z[used], weight * values)
-    size = np.sqrt(np.square(columns).sum(axis=0))
+    m = Z.shape[-1]
+    Z, z = Z.reshape(z.size, m), z.reshape(-1)
+    normal, right, square, count = np.zeros((m, m)), np.zeros(m), 0.0, 0
+    for first in range(0, len(z), _BLOCK):
+        some, own = Z[first : first + _BLOCK], z[first : first + _BLOCK]
+        used = np.isfinite(own) & np.isfinite(some).all(axis=-1)
+        some, own = some[used].astype(np.float64), own[used]
+        normal, right = normal + some.T @ some, right + some.T @ own
+        square, count = square + float(own @ own), count + len(own)
+    weight = math.sqrt(max(1.0, square / max(count, 1))) / prior
+    normal, right = normal + np.diag(weight**2), right + weight**2 * values
+    square += float(np.square(weight * values).sum())
+    size = np.sqrt(np.diag(normal))
     without = size == 0.0
     size[without] = 1.0
-    columns = columns / size
-    strength, ways = np.linalg.eigh(columns.T @ columns)
+    strength, ways = np.linalg.eigh(normal / np.outer(size, size))
     ways[without] = 0.0  # eigenvectors have them in other combinations by rounding
     inverse = np.where(strength > FLAT, 1.0 / np.maximum(strength, FLAT), 0.0)
-    along = ways.T @ (columns.T @ goal)
+    along = ways.T @ (right / size)
     gained = float(along @ (inverse * along))
     # residuals larger than stated, for whatever reason, must not make errors of the model
-    left = max(1.0, (float(goal @ goal) - gained) / max(int(used.sum()), 1))
+    left = max(1.0, (square - gained) / max(count, 1))
     u = np.sqrt(left * (np.square(ways) @ inverse)) / size
     return LeastSquares(-(ways @ (inverse * along)) / size, u + np.finfo(float).tiny, left, gained)
 

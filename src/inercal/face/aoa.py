@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.aoa import task
+from inercal.aoa.result.balance import Joined, read_balance
+from inercal.aoa.result.balance import join as joining
 from inercal.estimate.result import Estimate
 from inercal.face.result import Result, View
 from inercal.face.study import Progress, Study, calibrations, designed_by, one_run
@@ -39,18 +41,32 @@ def calibrate(
     progress: Progress = lambda _: None,
     methods: Methods | None = None,
     by_point: bool = False,
+    join: str | Path | None = None,
 ) -> Result:
     """Measure the angle of attack; ``evidence`` is the `inercal.aoa.task.Measurement`.
 
     Parameters and errors are those of `inercal.calibrate`. ``methods`` ask for the paper's way; ``by_point`` for a row
-    for each pause in the place of one for each sample.
+    for each point in the place of one for each sample, with the columns of the table ``join`` beside.
     """
     record = one_run(records, ONE_RUN)
 
     def run(given: Record, settings: AoaSettings, say: Progress) -> task.Measurement:
         return task.measure(given, settings, methods, compare, say)
 
-    return _result(calibrations([record], study, progress, run)[0], by_point)
+    other = None if join is None else read_balance(join)
+    (measurement,) = calibrations([record], study, progress, run)
+    if other is None:
+        return _result(measurement, by_point)
+    joined = joining(other, measurement.points, measurement.recording, measurement.angles)
+    estimate = measurement.estimate
+    result = {**estimate.result, "joined": {name: each.tolist() for name, each in joined.columns.items()}}
+    estimate = replace(
+        estimate,
+        findings=(*estimate.findings, *joined.findings),
+        inputs=(*estimate.inputs, other.source),
+        result=result,
+    )
+    return _result(replace(measurement, estimate=estimate), by_point, joined)
 
 
 def runs(
@@ -95,9 +111,9 @@ def runs(
     return Result(estimate, view, done)
 
 
-def _result(measurement: task.Measurement, by_point: bool) -> Result:
-    """A measurement as a result."""
-    from inercal.aoa.result.columns import angles_record, points_record
+def _result(measurement: task.Measurement, by_point: bool, joined: Joined | None = None) -> Result:
+    """A measurement as a result, with what was ``joined`` to its points."""
+    from inercal.aoa.result.columns import angles_record, beside, points_record
     from inercal.aoa.result.tables import answer, delays, displayed, on_terminal, rest_of_fit, use_of_fit
 
     estimate, angles = measurement.estimate, measurement.angles
@@ -117,7 +133,8 @@ def _result(measurement: task.Measurement, by_point: bool) -> Result:
 
     def rows() -> Record:
         if by_point:
-            return points_record(measurement.points, measurement.recording, measurement.settings)
+            own = points_record(measurement.points, measurement.recording, measurement.settings)
+            return own if joined is None else beside(own, joined)
         return angles_record(measurement.recording, angles, measurement.settings)
 
     def picture() -> Picture:

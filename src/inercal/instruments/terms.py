@@ -142,9 +142,13 @@ _SELF_CALIBRATION = (
     Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
     Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
     *(
-        Term(f"{symbol}_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}{way}", "rad")
+        Term(
+            f"{symbol}_{p[0]}",
+            f"misalignment of gyro {p[0]}: rate about {p[0]} per rate about {p[1]}{way}",
+            "rad",
+        )
         for symbol, way, pairs in (("ds", "", ("xy", "yz", "zx")), ("do", ", reversed", ("xz", "yx", "zy")))
-        for i, j in pairs
+        for p in pairs
     ),
     *(
         Term(f"{symbol}_{i}", name.format(i), unit)

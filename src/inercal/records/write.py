@@ -166,7 +166,7 @@ def _parquet(record: Record, axes: Clocks, file: IO[bytes], _: _Progress) -> Non
         fields.append(pyarrow.field("label", pyarrow.string()))
         arrays.append(list(record.labels))
     schema = pyarrow.schema(fields, metadata=_origin(record))
-    parquet.write_table(pyarrow.table(arrays, schema=schema), file)
+    parquet.write_table(pyarrow.table(arrays, schema=schema), file, write_page_checksum=True)
 
 
 def _netcdf(record: Record, axes: Clocks, file: IO[bytes], _: _Progress) -> None:

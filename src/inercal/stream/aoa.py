@@ -5,65 +5,46 @@ answers each row with one line: the first ones, and those after the angle was lo
 (`inercal.aoa.fusion.live`). `inercal.aoa.reading.from_record` calibrates the sensors, and samples at a range are left
 out. A stream does not see faults that only a whole recording shows: sensors that are flat at an extreme below their
 range, or stuck, and a model that moves in the stretch of the study's zero.
+
+Delay, band and snap that the study does not state are decided after `Limits.snap_time`
+(`inercal.aoa.diagnosis.choice`): the fusion begins anew with them, on all rows so far, and from then on the digits are
+those of a study that states them. Each line has a ``status``: 0; 1 until that choice; 2 where the innovations of the
+last seconds contradict the model; 3 without an angle; and ``nis``, the mean squared innovation of these seconds.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from inercal.aoa.fusion.live import Answers, Live, LiveState
+from inercal.aoa.diagnosis.choice import decided, of_vibration
+from inercal.aoa.fusion.band import with_rate
+from inercal.aoa.fusion.live import Answers
+from inercal.aoa.fusion.live_band import LimitedLive
+from inercal.aoa.fusion.loop import BESIDE
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import later as later_rows
 from inercal.aoa.reading.from_record import at_range, check_axes, check_unit, indication, of_sensors
+from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import angle_at
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.columns import columns, rows
 from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
+from inercal.aoa.result.verdict import nis_limit
 from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.column import Column
+from inercal.stream.aoa_state import AoaState, Leaning, choice_of, chosen, kept
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Alarms, Output, Slots
 
 # bits of `AoaState.alarms`; from the last on one for each sensor
 _CONTRADICTION, _SILENCE, _SATURATED = range(3)
-
-
-class Leaning(NamedTuple):
-    """The fusion under a change of a stated input: its state, and theta [rad] of rows not yet answered without it."""
-
-    live: LiveState
-    theta: Array
-
-
-class AoaState(NamedTuple):
-    """State after a row.
-
-    ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by name; ``t`` [s] the
-    latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
-    last row with a number of the gyro. ``nis`` and ``scalars``: sum and number of the squared innovations since
-    ``window`` [s]. ``remarked``: the findings on
-    the sensors were given; ``slots`` that of the last line.
-    """
-
-    live: LiveState
-    beside: Mapping[str, Leaning]
-    t: float
-    begun: float
-    temperature: float
-    heard: float
-    nis: float
-    scalars: int
-    window: float
-    remarked: bool
-    alarms: Alarms
-    slots: Slots
 
 
 class Aoa:
@@ -119,13 +100,14 @@ class Aoa:
                 self._sensors.append((k, places.index(name), record[name]))
         self._temperature = places.index("temperature") if "temperature" in record else -1
         self._has_gyro = GYROS[0] in record
-        self._problem = problem(settings, spatial, posterior)
-        self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(settings.attitude)]]
+        self._posterior, self._spatial = posterior, spatial
+        named = [("t", "s"), *columns(settings.attitude), ("status", "1"), ("nis", "1")]
+        self.columns = [f"{name} [{unit}]" for name, unit in named]
         self._changes = leans(settings, spatial)
-        self._leaning = [leaning(self._problem, each, settings) for each in self._changes]
-        self._live = Live(self._problem, where=lines.where)
-        self._others: list[Live] = []
+        self._pose(settings)
         self._after: AoaState | None = None
+        self.failure = ""
+        """A sentence on angles that are not to be used, once the stream has ended; empty for good ones."""
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -145,24 +127,35 @@ class Aoa:
             "zero": repr(settings.zero),
             "columns": repr([(k, place, column.name) for k, place, column in self._sensors]),
             "every": self._every,
+            "band": repr((settings.band, settings.estimator.snap)),
         }
+
+    def _pose(self, settings: AoaSettings) -> None:
+        """Pose the problem of a study, and those under changes."""
+        self._problem = problem(settings, self._spatial, self._posterior)
+        self._leaning = [leaning(self._problem, each, settings) for each in self._changes]
+        self._live = LimitedLive(self._problem, where=self._where)
+        self._others = [LimitedLive(of, where=self._where) for of in self._leaning]
 
     def initial(self) -> AoaState:
         """The state before the first row."""
+        self._pose(self._settings)
         return AoaState(
-            live=Live(self._problem).state,
+            live=self._live.state,
             beside={
-                each.name: Leaning(Live(of).state, np.empty(0))
-                for each, of in zip(self._changes, self._leaning, strict=True)
+                each.name: Leaning(of.state, np.empty(0))
+                for each, of in zip(self._changes, self._others, strict=True)
             },
-            t=-math.inf, begun=math.nan, temperature=math.nan,
-            heard=math.nan, nis=0.0, scalars=0, window=math.nan, remarked=False, alarms=Alarms(), slots=Slots(),
+            t=-math.inf, begun=math.nan, temperature=math.nan, heard=math.nan, nis=0.0, scalars=0, window=math.nan,
+            mean_nis=math.nan, all_nis=0.0, all_scalars=0, unanswered=0, rows=0,
+            head=np.empty((64, self._problem.count + BESIDE + 1)), seen=0, choice=np.empty(0),
+            remarked=False, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
         """The state after a row, and the lines of this row and of those that were held until now."""
         if state is not self._after:
-            self._live, self._others = self._from(state)
+            self._go_on_from(state)
         if self._temperature >= 0 and math.isfinite(sample.values[self._temperature]):
             state = state._replace(temperature=sample.values[self._temperature])
         state, values = self._measured(self._remarked(state), sample)
@@ -173,29 +166,98 @@ class Aoa:
         if later:
             zero_angle = self._zero(state, sample.t, values[:n])
             state = self._heard(state, sample.t, gyro)
-        read = (sample.t, values[:n], gyro, roll, yaw, *zero_angle)
-        answers = self._live.feed(*read)
-        turned = [each.feed(*read).angles.theta for each in self._others]
         if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
+        read = (sample.t, values[:n], gyro, roll, yaw, *zero_angle)
+        if self._waits(state):
+            state = kept(state, np.array([sample.t, *values[:n], gyro, *zero_angle, roll, yaw]))
+        if self._needs_rate and not state.choice.size:
+            state, answers, turned = self._rated(state)
+        else:
+            answers = self._live.feed(*read)
+            turned = [each.feed(*read).angles.theta for each in self._others]
         state = self._judged(state, answers)._replace(live=self._live.state)
         state, outputs = self._lines(state, answers, self._others, turned)
+        if self._waits(state) and state.t - state.begun >= LIMITS.snap_time:
+            state = self._decided(state)
         self._after = state
         return state, outputs
 
     def finish(self, state: AoaState) -> Sequence[Output]:
         """The lines of rows that were still held."""
-        live, others = self._from(state)
-        return self._lines(state, live.finish(), others, [each.finish().angles.theta for each in others])[1]
+        self._go_on_from(state)
+        self.failure = self._bad(state)
+        outputs: list[Output] = []
+        if self._needs_rate and not state.choice.size:
+            state, answers, turned = self._rated(state, last=True)
+            state, outputs = self._lines(state, answers, self._others, turned)
+        turned = [each.finish().angles.theta for each in self._others]
+        return [*outputs, *self._lines(state, self._live.finish(), self._others, turned)[1]]
 
-    def _from(self, state: AoaState) -> tuple[Live, list[Live]]:
-        """The fusion, and those under changes, as a state left them."""
-        changed = zip(self._leaning, state.beside.values(), strict=True)
-        return (
-            Live(self._problem, state.live, self._where),
-            [Live(of, each.live, self._where) for of, each in changed],
+    def _bad(self, state: AoaState) -> str:
+        """A sentence on a stream whose angles are not to be used, at its end; empty for good ones."""
+        if 2 * state.unanswered >= state.rows:
+            return f"{state.unanswered} rows of {state.rows} have no angle"
+        limit = nis_limit(state.all_scalars)
+        if state.all_scalars and state.all_nis > limit * state.all_scalars:
+            mean = state.all_nis / state.all_scalars
+            return f"the stream contradicts the model: mean NIS {mean:.4g}, expected at most {limit:.3g}"
+        return ""
+
+    @property
+    def _needs_rate(self) -> bool:
+        """True where the study states a band, for which the rate of rows must be known."""
+        band = self._settings.band
+        return band.low_pass not in (None, math.inf) or bool(band.notch)
+
+    def _waits(self, state: AoaState) -> bool:
+        """True as long as rows are kept: the rate is not known, or a choice not made."""
+        stated = self._settings.band.low_pass is not None and self._settings.estimator.snap is not None
+        if stated:
+            return self._needs_rate and not state.choice.size
+        return not (state.choice.size and state.choice[0])
+
+    def _rated(self, state: AoaState, last: bool = False) -> tuple[AoaState, Answers, list[Array]]:
+        """The state once the rate of rows is known, for the study's band, and answers for the rows until then."""
+        head = state.head[: state.seen]
+        stamps = head[later_rows(head[:, 0]), 0]
+        if len(stamps) >= LIMITS.rate_rows or last:
+            settings = with_rate(self._settings, stamps)
+            self._pose(settings)
+            state = state._replace(choice=choice_of(settings, final=False))
+        else:
+            head = head[:0]
+        answers = self._live.feed_rows(head)
+        return state, answers, [each.feed_rows(head).angles.theta for each in self._others]
+
+    def _decided(self, state: AoaState) -> AoaState:
+        """The state once delay, band and snap are decided: the fusion has gone over all rows so far with them."""
+        head, n = state.head[: state.seen], self._problem.count
+        recording = Recording(
+            head[:, 0], head[:, 1 : n + 1], head[:, n + 1], head[:, n + 4 :], head[:, n + 2 : n + 4]
         )
+        settings = decided(recording, self._settings)
+        for finding in of_vibration(self._settings, settings):
+            self._say(finding)
+        self._pose(settings)
+        self._live.feed_rows(head)
+        beside = {}
+        for each, other in zip(self._changes, self._others, strict=True):
+            other.feed_rows(head)
+            beside[each.name] = Leaning(other.state, np.empty(0))
+        none = np.empty((64, head.shape[1]))
+        return state._replace(
+            live=self._live.state, beside=beside, head=none, seen=0, choice=choice_of(settings, final=True),
+            nis=0.0, scalars=0, window=math.nan, mean_nis=math.nan, all_nis=0.0, all_scalars=0,
+        )  # fmt: skip
+
+    def _go_on_from(self, state: AoaState) -> None:
+        """Go on with the fusion, and those under changes, as a state left them."""
+        self._pose(chosen(self._settings, state.choice) if state.choice.size else self._settings)
+        self._live = LimitedLive(self._problem, state.live, self._where)
+        changed = zip(self._leaning, state.beside.values(), strict=True)
+        self._others = [LimitedLive(of, each.live, self._where) for of, each in changed]
 
     def _measured(self, state: AoaState, sample: Sample) -> tuple[AoaState, Array]:
         """Measured values of a row, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
@@ -247,8 +309,12 @@ class Aoa:
             if not squared.size or t - state.begun < LIMITS.settling_time:
                 continue
             window = t if math.isnan(state.window) else state.window
-            nis, scalars = state.nis + float(squared.sum()), state.scalars + squared.size
-            state = state._replace(nis=nis, scalars=scalars, window=window)
+            own = float(squared.sum())
+            nis, scalars = state.nis + own, state.scalars + squared.size
+            state = state._replace(
+                nis=nis, scalars=scalars, window=window,
+                all_nis=state.all_nis + own, all_scalars=state.all_scalars + squared.size,
+            )  # fmt: skip
             if t - window < LIMITS.watched_time:
                 continue
             if scalars >= LIMITS.watched_innovations and nis > LIMITS.mean_nis * scalars:
@@ -257,7 +323,8 @@ class Aoa:
                     "the rows contradict the model or the stated noise"
                 )
                 state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, t)
-            state = state._replace(nis=0.0, scalars=0, window=math.nan)
+            mean = nis / scalars if scalars >= LIMITS.watched_innovations else math.nan
+            state = state._replace(nis=0.0, scalars=0, window=math.nan, mean_nis=mean)
         return state
 
     def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
@@ -265,7 +332,7 @@ class Aoa:
         return state._replace(alarms=state.alarms.give(bit, code, text, t, self._say))
 
     def _lines(
-        self, state: AoaState, answers: Answers, others: Sequence[Live], turned: Sequence[Array]
+        self, state: AoaState, answers: Answers, others: Sequence[LimitedLive], turned: Sequence[Array]
     ) -> tuple[AoaState, list[Output]]:
         """The state with the slots of lines, and the lines that are due; ``turned`` is theta under changes."""
         outputs: list[Output] = []
@@ -284,5 +351,16 @@ class Aoa:
                 if slots is None:
                     continue
                 state = state._replace(slots=slots)
-            outputs.append([t, *row])
-        return state, outputs
+            outputs.append([t, *row, self._status(state, row[0]), state.mean_nis])
+        without = int(np.isnan(answers.angles.theta).sum())
+        return state._replace(
+            unanswered=state.unanswered + without, rows=state.rows + len(answers.t)
+        ), outputs
+
+    def _status(self, state: AoaState, theta: float) -> float:
+        """Status of a line: 3 without an angle, 2 for a contradiction, 1 until all is decided, or 0."""
+        if math.isnan(theta):
+            return 3.0
+        if state.mean_nis > LIMITS.mean_nis:
+            return 2.0
+        return 1.0 if self._waits(state) else 0.0

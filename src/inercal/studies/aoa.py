@@ -23,6 +23,7 @@ from inercal.aoa.settings import (
     Methods,
     ModelAttitude,
     Noise,
+    PointPlan,
     Prior,
     Resonance,
     Timing,
@@ -224,6 +225,9 @@ class AoaStudyFile(Strict):
     )
     flow: Stated[Flow] = Field(default=Flow(), title="Flow", description="angularity of the flow")
     zero: ZeroTable | None = Field(default=None, title="Zero", description="a stretch at a known angle")
+    points: Stated[PointPlan] = Field(
+        default=PointPlan(), title="Points", description="stretches that are test points"
+    )
     design: Stated[Design] = Field(
         default=Design(), title="Design", description="where `inercal design aoa` may put accelerometers"
     )
@@ -255,6 +259,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
         zero=None if file.zero is None else _zero(file.zero),
+        points=file.points,
         motion=motion,
         disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
         design=_design(file.design, path),

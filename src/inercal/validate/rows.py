@@ -49,7 +49,7 @@ def _record(sensor: str, values: Array, t: Array | None = None) -> Record:
 def _less(estimate: Estimate) -> Array:
     """Coefficients less the truth, over the size of their kind."""
     size = np.concatenate([np.full(6, 400.0), np.ones(3)])
-    return (estimate.values[:9] - np.concatenate([_BIAS, _SCALE, _UPPER])) / size
+    return np.asarray((estimate.values[:9] - np.concatenate([_BIAS, _SCALE, _UPPER])) / size)
 
 
 def _means() -> Array:

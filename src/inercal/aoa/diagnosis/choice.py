@@ -21,18 +21,23 @@ from inercal.aoa.band import Band
 from inercal.aoa.diagnosis.noise_check import misstated
 from inercal.aoa.diagnosis.spectrum import highest_motion, lines, white_noise
 from inercal.aoa.fusion import band as limiting
+from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.paper.delay import relative_delay
+from inercal.aoa.paper.delay import Delay, relative_delay
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.settings import AoaSettings
-from inercal.findings import Finding
+from inercal.aoa.settings import AoaSettings, Prior, Resonance
+from inercal.findings import EVERYTHING, Finding
+from inercal.units import STANDARD_GRAVITY
 
 DENSITIES = (1e9, 1e10, 1e11, 1e12)
 """Densities [rad^2/s^7] beyond the usual one."""
+
+SHAKING = (0.03 * STANDARD_GRAVITY, 0.1 * STANDARD_GRAVITY)
+"""Levels [m/s^2] of flexure in a wide band that are tried beyond the usual one."""
 
 LOW_PASSES = (100.0, 70.0, 50.0, 35.0)
 """Corners [Hz] of the low passes that are tried, the widest first."""
@@ -41,40 +46,84 @@ LOW_PASSES = (100.0, 70.0, 50.0, 35.0)
 def decided(recording: Recording, settings: AoaSettings) -> AoaSettings:
     """The study with the delay, band and snap that the recording shows, each where the study does not state it.
 
+    Where it states band and snap it is as it was: a stream, which cannot look ahead, gives the same digits.
+
     Looked at are the liveliest stretches of `Limits.snap_time`. Where no band fits there is none, and the usual snap.
     """
     settings = limiting.with_rate(settings, recording.t[later(recording.t)])
-    settings = _with_delay(recording, settings)
     stated = settings.band.low_pass is not None
-    plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
     if stated and settings.estimator.snap is not None:
         return settings
+    settings = _with_delay(recording, settings)
+    plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
     stretches = [_part(recording, rows) for rows in _liveliest(recording)]
     if not stretches:
         return plain
     usual, fixed = settings.estimator.density, settings.estimator.snap is not None
     densities = (usual,) if fixed else (usual, *DENSITIES)
     fair = _fair(stretches[0], settings)
-    for band in (plain.band, *(() if stated else _bands(stretches[0], fair))):
-        banded = replace(fair, band=band)
-        limit = LIMITS.snap_ratio * _still(recording, banded)
-        for density in densities:
-            of = problem(_with_snap(banded, density), recording.spatial)
-            if all(_nis(of, part) < limit for part in stretches):
-                return _with_snap(replace(settings, band=band), density)
+    bands = (plain.band, *(() if stated else _bands(stretches[0], fair)))
+    # flexure last: what a wide one allows for is much, and u with it
+    for prior in (settings.prior, *_shaken(settings.prior)):
+        for band in bands:
+            tried = replace(fair, band=band, prior=prior)
+            limit = LIMITS.snap_ratio * _still(recording, tried)
+            for density in densities:
+                of = problem(_with_snap(tried, density), recording.spatial)
+                if all(_nis(of, part) < limit for part in stretches):
+                    return _with_snap(replace(settings, band=band, prior=prior), density)
     return plain
 
 
-def of_band(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
-    """``band_limited``: a band that the recording decided, and what to write to keep it."""
-    band = decided.band
-    if settings.band.low_pass is not None or len(band.sections) <= len(settings.band.notch):
+def _shaken(prior: Prior) -> Iterator[Prior]:
+    """Priors by which the support shakes the model more, in a wide band; none where flexure is stated."""
+    usual = Prior()
+    if (prior.heave, prior.axial) == (usual.heave, usual.axial):
+        for level in SHAKING:
+            wide = Resonance(2.0 * math.pi * LIMITS.shaking_frequency, LIMITS.shaking_damping, level)
+            yield replace(prior, heave=wide, axial=wide)
+
+
+def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
+    """``band_limited`` and ``wide_flexure``: a band, and flexure of the sting, that the recording decided, and what to
+    write to keep them."""
+    findings, band, flexure = [], decided.band, decided.prior.heave
+    if settings.band.low_pass is None and len(band.sections) > len(settings.band.notch):
+        text = (
+            "the sensors feel vibration that is no motion of the model, and the fusion takes what is left of them "
+            f"without it: to have the same band again write {band.words} under [band]"
+        )
+        findings.append(Finding("band_limited", text))
+    if flexure != settings.prior.heave:
+        text = (
+            "the support shakes the model beyond its usual flexure, as by a plunge, and u allows for it: to have the "
+            f'same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", damping = '
+            f'"{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g" under [prior.heave] and '
+            "[prior.axial]"
+        )
+        findings.append(Finding("wide_flexure", text))
+    return findings
+
+
+def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:
+    """``command_shift``: a delay of the gyro by the spectra that is not that of the fusion, and costs more than u.
+
+    In a band whose rows are few the fusion alone may not learn it.
+    """
+    k = problem.places.delay
+    if delay is None or k < 0:
         return []
+    off = delay.value - float(filtered.state.x[k])
+    known = np.isfinite(filtered.u) & np.isfinite(filtered.rate)
+    cost = abs(off) * float(np.sqrt(np.mean(np.square(filtered.rate[known])))) if known.any() else 0.0
+    if abs(off) <= LIMITS.delay_sigmas * delay.u or not cost > float(np.median(filtered.u[known])):
+        return []
+    side = "later" if delay.value > 0.0 else "earlier"
     text = (
-        "the sensors feel vibration that is no motion of the model, and the fusion takes what is left of them without "
-        f"it: to have the same band again write {band.words} under [band]"
+        f"gyro comes {1e3 * abs(delay.value):.2g} ms {side} than the accelerometers by the spectra, which the fusion "
+        f'does not learn: write gyro_delay = "{1e3 * delay.value:.3g} ms" under [timing]'
     )
-    return [Finding("band_limited", text)]
+    return [Finding("command_shift", text, harm=EVERYTHING)]
 
 
 def _fair(part: Recording, settings: AoaSettings) -> AoaSettings:

@@ -49,9 +49,10 @@ class FilterResult:
     ``roll`` and ``roll_u`` [rad] of the causal filter where it is estimated. ``innovations`` (n, N + 1) of
     accelerometers and gyro, of the causal filter, each over its standard deviation before the gate. ``states`` (k, m)
     and their standard deviations ``states_u`` at the times ``kept_t`` (k,) [s], in the order of the problem's names.
-    ``state`` of the causal filter at the end. ``nis_mean`` is the mean of ``nis_count`` squared innovations after the
-    first 2 s, or in the later half of less than 4 s. ``starts`` are the rows at which the filter started, more than one
-    where the angle was lost; ``seconds`` the time of the computation alone.
+    ``state`` of the causal filter at the end. ``nis_mean`` is the mean of ``nis_count`` squared innovations, single
+    spikes as far as the gate lets them through, after the first 2 s, or in the later half of less than 4 s. ``starts``
+    are the rows at which the filter started, more than one where the angle was lost; ``seconds`` the time of the
+    computation alone.
     """
 
     theta: Array
@@ -157,7 +158,7 @@ def _estimate(
     seconds = time.perf_counter() - clock
     settled = t - t[:1] >= (min(LIMITS.settling_time, (t[-1] - t[0]) / 2.0) if len(t) else 0.0)
     judged = innovations[taken][settled]
-    squared = np.square(judged[np.isfinite(judged)])
+    squared = _without_spikes(judged, problem.constants.gate)
     m = problem.size
     return FilterResult(
         theta=motion[:, 0],
@@ -178,6 +179,15 @@ def _estimate(
         roll=None if rolls is None else roll[:, 0],
         roll_u=None if rolls is None else roll[:, 1],
     )
+
+
+def _without_spikes(innovations: Array, gate: float) -> Array:
+    """Squared innovations, of single spikes as far as the gate lets them through: they say nothing against the rest."""
+    with np.errstate(invalid="ignore"):
+        squared = np.square(innovations)
+        beyond = np.pad(squared > gate, ((1, 1), (0, 0)))
+    squared[beyond[1:-1] & ~beyond[:-2] & ~beyond[2:]] = gate
+    return np.asarray(squared[np.isfinite(squared)])
 
 
 def roll_of(problem: FilterProblem, kept: Array) -> Array:

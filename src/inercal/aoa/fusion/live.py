@@ -125,6 +125,17 @@ class Live:
         self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held, state.since)
         return Answers(stamp, self._out.copy(), self._roll(self._kept))
 
+    @property
+    def motion(self) -> Array:
+        """(`MOTION`,) from which the angle is carried on (`inercal.aoa.fusion.ahead`), while the filter runs."""
+        out, (x, P, turns, *_) = np.empty(loop.MOTION), self._fusion
+        loop.moving(x, P, turns[0], turns[1], self._problem.model, out)
+        return out
+
+    def feed_rows(self, rows: Array) -> Answers:
+        """Go on by rows (m, N + 6), time first, as `feed` does."""
+        return self._block(rows[:, 0], rows[:, 1:])
+
     def feed_block(self, recording: Recording) -> Answers:
         """Go on by the rows of a recording, any number of them, as `feed` does."""
         return self._block(recording.t, recording.rows)

@@ -29,7 +29,7 @@ _PER = {"voltage": "V", "count": "count"}
 def recording_of(record: Record, settings: AoaSettings) -> Recording:
     """The recording in a record, its sensors calibrated as the study states, with findings on them.
 
-    The record has ``t``, the accelerometers of the study's layout on one clock, and where present ``gyro``,
+    The record has ``t``, the accelerometers of the study's layout, and where present ``gyro``,
     ``gyro_roll`` and ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; columns on other clocks
     are interpolated. There is one row for each of the accelerometers; samples that are missing, saturated (at or beyond
     the stated range, or flat at an extreme) or stuck are NaN, and so are absent sensors; findings name them.
@@ -37,20 +37,15 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     Raises
     ------
     RecordError
-        No accelerometers, or of axes that do not span the plane; accelerometers on different clocks; raw counts or
-        volts without a scale; fewer than 20 rows that go on in time, or a clock that was set back.
+        No accelerometers, or of axes that do not span the plane; raw counts or volts without a scale; fewer
+        than 20 rows that go on in time, or a clock that was set back.
     """
     where = record.sources[0].path if record.sources else "record"
     names = settings.layout.names
     there = [name for name in names if name in record and _speaks(record[name], settings)]
     check_axes(there, record.columns, settings.layout, where)
-    t = record[there[0]].t
-    for name in there[1:]:
-        if record[name].t is not t:
-            raise RecordError(
-                where,
-                f"{name} has another clock than {there[0]}, expected one row for all accelerometers at each time",
-            )
+    # the rows are those of the fastest accelerometer
+    t = max((record[name].t for name in there), key=len)
     taken = later(t, where=where)
     if len(taken) < LIMITS.starting_rows:
         text = (
@@ -128,7 +123,7 @@ class _Rows:
     def on_rows(self, name: str, values: Array) -> Array:
         """(n,) of ``values`` (m,) on the column's own clock, linear between its samples; NaN where these are far.
 
-        A sensor with fewer than half as many samples has values at the rows nearest to them alone.
+        A sensor with fewer samples has values at the rows nearest to them alone: each of them counts once.
         """
         column = self.record[name]
         if column.t is self.t:
@@ -144,7 +139,7 @@ class _Rows:
         out = np.interp(self.t, theirs, values, left=np.nan, right=np.nan)
         apart = theirs[there] - theirs[there - 1] > LIMITS.other_clock_gap * interval
         out[apart | np.isnan(self.t)] = np.nan
-        if 2 * len(taken) < len(self.t):
+        if len(taken) < LIMITS.slower_clock * len(self.t):
             mine = later(self.t, where=self.where)
             nearest = np.searchsorted(self.t[mine], theirs).clip(1, len(mine) - 1)
             nearest -= theirs - self.t[mine[nearest - 1]] < self.t[mine[nearest]] - theirs

@@ -85,7 +85,7 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
     Raises `RecordError` where there is no reference angle, too little of it, or none that a sensor follows.
     """
     truth = reference(recording)
-    names, units, usual, start = _terms(settings)
+    names, units, usual, start = fit_terms(settings)
     wide = np.where([name == "tau" for name in names], usual, LIMITS.widened_prior * usual)
     x, weights = start.copy(), np.full(len(settings.layout.names) + 1, np.nan)
     converged = False
@@ -121,7 +121,7 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
     return Verified(names, units, x, covariance, more, unseen, noise, truth.noise, len(truth.rows), converged)
 
 
-def _terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+def fit_terms(settings: AoaSettings) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
     """Names, units, usual sizes and first values of the parameters."""
     noise, prior = settings.noise, settings.prior
     n = len(settings.layout.names)

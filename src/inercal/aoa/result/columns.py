@@ -18,12 +18,15 @@ import numpy as np
 
 from inercal.aoa.angles import Angles, gives_alpha, stated_roll
 from inercal.aoa.reading.recording import Recording
+from inercal.aoa.result.balance import Joined
 from inercal.aoa.result.points import Point
 from inercal.aoa.settings import AoaSettings, Attitude
 from inercal.arrays import Array
 from inercal.inputs import Source
+from inercal.records.column import Column
 from inercal.records.record import Record, record_of
-from inercal.units import parse_unit
+from inercal.records.titles import name_and_unit
+from inercal.units import Unit, parse_unit
 
 _PITCH = (("theta", "deg"), ("u_theta", "deg"), ("rate", "deg/s"))
 _FLOW = (("alpha", "deg"), ("u_alpha", "deg"), ("beta", "deg"), ("u_beta", "deg"))
@@ -65,6 +68,17 @@ def points_record(points: Iterable[Point], recording: Recording, settings: AoaSe
     values = np.array(lines, dtype=float).reshape(len(lines), len(names))
     middle = 0.5 * (values[:, 3] + values[:, 4])
     return _record(names, values, middle, recording, Source("points", ""))
+
+
+def beside(points: Record, joined: Joined) -> Record:
+    """Points with the means of another table beside, in the units of its titles."""
+    columns = dict(points.columns)
+    first = next(iter(columns.values()))
+    for title, values in joined.columns.items():
+        name, unit = name_and_unit(title)
+        name = name if name not in columns else f"joined_{name}"
+        columns[name] = Column(name, Unit(unit or "1", "", 1.0), values, first.t, first.source)
+    return replace(points, columns=columns)
 
 
 def _record(

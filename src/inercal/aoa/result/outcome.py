@@ -125,7 +125,8 @@ def assemble(
         slopes = dict(zip(names, split.by_gravity.tolist(), strict=True))
         result["gravity"] = {"value": settings.site.gravity, "u": gravity_u(settings), "slopes": slopes}
     # numbers that are not to be used need no such finding
-    at_prior = verdict.left_at_prior(names, np.sqrt(np.diag(P)) / before) if status is Status.OK else None
+    ratio = np.sqrt(np.diag(P)) / before
+    at_prior = verdict.left_at_prior(names, ratio, settings) if status is Status.OK else None
     return Estimate.of(
         basis,
         names,

@@ -18,8 +18,10 @@ from inercal.aoa.angles import Angles, alpha_beta
 from inercal.aoa.reading.means import mean_u
 from inercal.aoa.reading.pauses import pauses
 from inercal.aoa.reading.recording import Recording
+from inercal.aoa.reading.triggers import triggered
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
+from inercal.errors import RecordError
 
 Indices = NDArray[np.int64]
 
@@ -62,16 +64,28 @@ def points(recording: Recording, angles: Angles, settings: AoaSettings) -> tuple
     """The test points of a recording.
 
     A point is a stretch with one number in the record's ``point`` column; the same number later is another point.
-    Without that column a point is a pause of the angle itself (`inercal.aoa.reading.pauses`). Rows without an angle
-    are left out, and end no point.
+    Without that column a point is a pause of the angle itself (`inercal.aoa.reading.pauses`). The study may ask for one
+    of these, or for those of the ``trigger`` (`inercal.aoa.reading.triggers`). Rows without an angle are left out, and
+    end no point. Raises `RecordError` where the column that is asked for is missing.
     """
+    by = settings.points.by
+    if by == "auto":
+        by = "pause" if recording.point is None else "point"
     answered = np.flatnonzero(np.isfinite(angles.theta) & np.isfinite(recording.t))
     theta = np.unwrap(angles.theta[answered])
-    if recording.point is None:
+    if by == "pause":
         dwells = pauses(recording.t[answered], theta, angles.known_u[answered])
         stretches = [(float(k), each.start, each.stop) for k, each in enumerate(dwells, start=1)]
     else:
-        stretches = _numbered(recording.point[answered])
+        column = recording.point if by == "point" else recording.trigger
+        if column is None:
+            raise RecordError(by, f'missing, expected the column that [points] by = "{by}" asks for')
+        numbers = column[answered]
+        stretches = (
+            _numbered(numbers)
+            if by == "point"
+            else triggered(recording.t[answered], numbers, settings.points)
+        )
     return tuple(
         _point(number, answered[a:b], theta[a:b], recording, angles, settings) for number, a, b in stretches
     )

@@ -95,9 +95,13 @@ def _missing(answered: NDArray[np.bool_]) -> str:
     return f"{counted(int((~answered).sum()), 'row')} of {len(answered)} have no angle"
 
 
-def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
-    """``at_prior``: coefficients that the recording does not show, by the ``ratio`` (p,) of their u to the prior's."""
-    left = [name for name, each in zip(names, ratio, strict=True) if each > UNSEEN]
+def left_at_prior(names: Sequence[str], ratio: Array, settings: AoaSettings) -> Finding | None:
+    """``at_prior``: coefficients that the recording does not show, by the ``ratio`` (p,) of their u to the prior's.
+
+    A delay that the spectra have shown is known, however little the filter adds.
+    """
+    known = {"tau_g"} if settings.timing.gyro_delay_about != 0.0 else set()
+    left = [name for name, each in zip(names, ratio, strict=True) if each > UNSEEN and name not in known]
     if not left:
         return None
     text = (
@@ -110,6 +114,8 @@ def left_at_prior(names: Sequence[str], ratio: Array) -> Finding | None:
 def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings) -> Finding | None:
     """``flexure``: a sting that shakes the model; None where it does not."""
     at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
+    if settings.prior.heave.damping == LIMITS.shaking_damping:  # as the recording asked for: u has it
+        return None
     if not at or not len(filtered.kept_t):
         return None
     rows = filtered.states[filtered.kept_t - filtered.kept_t[0] >= LIMITS.settling_time][:, at]

@@ -13,6 +13,7 @@ from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 from inercal.errors import RecordError
+from inercal.findings import Finding
 from inercal.geometry.rotations import principal
 
 
@@ -54,6 +55,34 @@ def errors(recording: Recording, angles: Angles, after: float = LIMITS.settling_
     taken = np.isfinite(off) & (t >= t[0] + after)
     parts = (_error(off[chosen], u[chosen]) for chosen in (taken, taken & still, taken & ~still))
     return Errors(angles.method, *parts)
+
+
+def late_reference(recording: Recording, angles: Angles) -> list[Finding]:
+    """``contradiction``: a reference that comes later, or earlier, than the angles, which their error shows as its
+    product with the rate."""
+    if recording.reference is None:
+        return []
+    rows = np.flatnonzero(
+        np.isfinite(recording.reference) & np.isfinite(angles.theta) & np.isfinite(angles.rate)
+        & (recording.t >= recording.t[0] + LIMITS.settling_time)
+    )  # fmt: skip
+    if len(rows) < LIMITS.compared_rows:
+        return []
+    off = principal(angles.theta[rows] - np.unwrap(recording.reference[rows]))
+    rate, u = angles.rate[rows] - angles.rate[rows].mean(), angles.u[rows]
+    off = off - off.mean()
+    power = float(rate @ rate)
+    delay = float(rate @ off) / power if power > 0.0 else 0.0
+    explained = delay**2 * power
+    small = explained <= LIMITS.reference_sigmas**2 * float(np.square(u[np.isfinite(u)]).sum())
+    if small or explained < LIMITS.explained_share * float(off @ off):
+        return []
+    side = "later" if delay > 0.0 else "earlier"
+    text = (
+        f"theta_ref comes {1e3 * abs(delay):.2g} ms {side} than the angle: correct its clock, or state under [timing] "
+        f"the common_delay of the sensors where it is they that are {'early' if delay > 0.0 else 'late'}"
+    )
+    return [Finding("contradiction", text, harm=("theta",))]
 
 
 def _error(off: Array, u: Array) -> AngleError:

@@ -72,10 +72,10 @@ class LinearFit:
         from scipy.linalg import solve_triangular
 
         V = self.known + np.diag(np.repeat(variance * self.growth, self.residuals.shape[1]))
-        L = np.linalg.cholesky(V)
+        L = np.asarray(np.linalg.cholesky(V), dtype=np.float64)
         rows = np.column_stack([self.jacobian.reshape(len(V), -1), self.residuals.ravel()])
-        white = solve_triangular(L, rows, lower=True)
-        return np.asarray(L), np.asarray(white[:, :-1]), np.asarray(white[:, -1])
+        white = np.asarray(solve_triangular(L, rows, lower=True), dtype=np.float64)
+        return L, white[:, :-1], white[:, -1]
 
     def _inverse(self, J: Array) -> Array:
         """(P, P) ``(J^T J + information)^-1``, zero where nothing tells."""

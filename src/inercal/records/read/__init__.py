@@ -16,6 +16,7 @@ from inercal.findings import Finding
 from inercal.inputs import Source
 from inercal.records.checks import check
 from inercal.records.read.join import FileTable, joined
+from inercal.records.read.limits import size_of
 from inercal.records.read.table import Format, Part, Reader
 from inercal.records.record import Record
 from inercal.units import Unit
@@ -149,7 +150,7 @@ def _tables(
     if not jobs:
         raise RecordError("record", "found no file to read, expected one at least")
     formats = [_form(path, part) for path, part in jobs]
-    sizes = [sum(file.stat().st_size for file in _files(path)) for path, _ in jobs]
+    sizes = [size_of(path) for path, _ in jobs]
     tables: list[FileTable] = []
     for index, (path, part) in enumerate(jobs):
         share = partial(_tell, progress, sum(sizes[:index]), sum(sizes))

@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import time
+import traceback
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,7 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-from inercal.errors import RecordError
+from inercal.errors import InercalError, RecordError
 from inercal.records.read import limits
 
 T = TypeVar("T")
@@ -82,8 +83,12 @@ def in_child(work: Work[T], path: Path, progress: Tell = lambda _: None) -> T:
 
 
 def _may_fork() -> bool:
-    """True where a fork is safe: a lock that another thread holds would never be free in it."""
-    return hasattr(os, "fork") and sys.platform != "darwin" and threading.active_count() == 1
+    """True where a fork is safe: a lock that another thread holds would never be free in it.
+
+    Daemons, such as those of a progress bar or a notebook, hold none of those that readers take.
+    """
+    others = [each for each in threading.enumerate() if each is not threading.current_thread()]
+    return hasattr(os, "fork") and sys.platform != "darwin" and all(each.daemon for each in others)
 
 
 def _words(ended: _Ended, size: int) -> str:
@@ -222,6 +227,8 @@ def _answer(work: Work[Any], answer: IO[bytes], telling: int, size: int) -> None
         result = work(lambda done: _tell(telling, done))
         head = pickle.dumps((result, None), protocol=5, buffer_callback=buffers.append)
     except Exception as error:
+        if not isinstance(error, InercalError):
+            error.add_note(traceback.format_exc())
         buffers = []
         head = _pickled(error)
     parts: list[memoryview] = [memoryview(head), *(buffer.raw() for buffer in buffers)]

@@ -174,7 +174,7 @@ def parse_number(text: str) -> float | None:
     """The number of a text, NaN where it is empty, says so or is beyond `LARGEST`; None if it is no number."""
     text = text.strip()
     try:
-        value = None if "_" in text else float(text)
+        value = float(text) if text.isascii() and "_" not in text else None
     except ValueError:
         value = math.nan if text.lower() in _MISSING else None
     return value if value is None or abs(value) < LARGEST else math.nan

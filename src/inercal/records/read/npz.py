@@ -36,7 +36,10 @@ def _arrays(archive: ZipFile, name: str) -> Iterator[tuple[str, NamedArray]]:
     @cache
     def whole() -> NDArray[Any]:
         with archive.open(name) as member:
-            return npy.read_array(member, allow_pickle=False)
+            array = npy.read_array(member, allow_pickle=False)
+            if member.read(1):  # at the end the checksum is compared, too
+                raise ValueError("more bytes than the array has")
+            return array
 
     key = name.removesuffix(".npy")
     fields: Mapping[str, Any] = dtype.fields or {}

@@ -27,7 +27,7 @@ def _library(_: Path) -> Any:
 def _opened(path: Path) -> Iterator[Contents]:
     """The columns, with the units in the metadata of their fields; members of structures are ``imu.acc_x``."""
     parquet = _library(path)
-    with parquet.ParquetFile(path) as file:
+    with parquet.ParquetFile(path, page_checksum_verification=True) as file:
         rows = file.metadata.num_rows
         columns = [leaf for field in file.schema_arrow for leaf in _leaves(field)]
         yield Contents(

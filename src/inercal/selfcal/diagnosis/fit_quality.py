@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis, surprising, whiteness
@@ -23,7 +24,9 @@ class ErrorState:
 
     def residuals(self, case: Case) -> Array:
         """(n - 1, 6) normalised innovations."""
-        return regular(case[0], filtered(case))
+        innovations = filtered(case).innovations  # its own, and large
+        innovations[_near_lock(case[0])] = np.nan
+        return innovations
 
     def misfit(self, case: Case) -> float:
         """Sum of the normalised innovations squared."""
@@ -35,15 +38,20 @@ JUDGE = ErrorState()
 
 def filtered(case: Case) -> FilterResult:
     """Result of the error-state filter for a case."""
-    return estimate(*case, "error-state", twice=False)
+    return estimate(*case, "error-state", brief=True)
 
 
 def regular(recording: Recording, result: FilterResult) -> Array:
     """Normalised innovations (n - 1, 6), NaN near gimbal lock."""
-    near = ~(np.abs(np.cos(recording.th[1:, 1])) >= LIMITS.lock_cosine)
     innovations = result.innovations.copy()
-    innovations[near & np.isfinite(recording.th[1:, 1])] = np.nan
+    innovations[_near_lock(recording)] = np.nan
     return innovations
+
+
+def _near_lock(recording: Recording) -> NDArray[np.bool_]:
+    """Steps (n - 1,) that end near gimbal lock."""
+    angle = recording.th[1:, 1]
+    return np.asarray(~(np.abs(np.cos(angle)) >= LIMITS.lock_cosine) & np.isfinite(angle))
 
 
 def sum_of_squares(result: FilterResult) -> float:

@@ -49,6 +49,10 @@ _EXCHANGED = {
 }
 
 
+_CHUNK = 1 << 16
+"""Rows whose joints are held at once."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Stretches:
     """Motion in each of m steps between rows whose angles are known: ``th`` (m + 1, 3) [rad] at the rows, ``dt`` (m,)
@@ -63,9 +67,13 @@ class _Stretches:
 
     def turned(self, world: World) -> Array:
         """Turns (s, 3) [rad] of the stretches against inertial space, in p, by the angles of a rig."""
-        q, _ = gimbals(self.th, world)
-        of_earth = rotate(conjugate(q[:-1]), world.earth) * self.dt[:, None]
-        return self.summed(log(multiply(conjugate(q[:-1]), q[1:])) + of_earth)
+        steps = np.empty((len(self.dt), 3))
+        for first in range(0, len(steps), _CHUNK):
+            some = slice(first, first + _CHUNK)
+            q, _ = gimbals(self.th[first : first + _CHUNK + 1], world)
+            of_earth = rotate(conjugate(q[:-1]), world.earth) * self.dt[some, None]
+            steps[some] = log(multiply(conjugate(q[:-1]), q[1:])) + of_earth
+        return self.summed(steps)
 
     def summed(self, steps: Array) -> Array:
         """Sums (s, 3) over each stretch, without steps whose rates are a guess."""
@@ -252,7 +260,10 @@ def _accelerometers(
             return []
         text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
         return [Finding("unit_suspect", text, harm=EVERYTHING)]
-    force = rotate(conjugate(gimbals(recording.th[whole], world)[0]), world.up)
+    force = np.empty_like(acc)
+    for first in range(0, len(acc), _CHUNK):
+        some = slice(first, first + _CHUNK)
+        force[some] = rotate(conjugate(gimbals(recording.th[whole[some]], world)[0]), world.up)
     pair = _Pair(acc, force, 2.0 * settings.noise.accelerometer)
     if pair.misfit < LIMITS.rough_misfit:
         return []
@@ -335,8 +346,11 @@ def off_the_path(
     then = plan.step * np.arange(len(nominal))
     expected = np.stack([np.interp(t, then, nominal[:, k]) for k in range(3)], axis=-1)
     away = np.abs(np.remainder(recording.th - expected + math.pi, 2.0 * math.pi) - math.pi)
-    there, planned = (gimbals(np.nan_to_num(th), world)[0] for th in (recording.th, expected))
-    turned = attitude_difference(planned, there)[:, None]
+    turned = np.empty((len(t), 1))
+    for begin in range(0, len(t), _CHUNK):
+        some = slice(begin, begin + _CHUNK)
+        there, meant = (gimbals(np.nan_to_num(th[some]), world)[0] for th in (recording.th, expected))
+        turned[some, 0] = attitude_difference(meant, there)
     away = np.where(
         np.isfinite(recording.th).all(axis=1, keepdims=True) & (turned > LIMITS.off_the_path), away, 0.0
     )

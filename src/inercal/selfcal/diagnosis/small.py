@@ -28,6 +28,9 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
 
+_CHUNK = 1 << 16
+"""Rows whose joints are held at once."""
+
 Stated = Hypothesis[Case] | None
 """Errors of the systematic inputs of a study, None where all are exact."""
 
@@ -184,29 +187,35 @@ def _other_scale(case: Case, values: Array) -> Case:
 
 def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     """Errors periodic in the angle of a joint: for each joint the order that its innovations show most."""
-    angles, joints = _found_angles(case, now)
-    orders_tried, z = np.arange(1, LIMITS.harmonic_orders + 1), regular(case[0], now)
+    orders_tried = np.arange(1, LIMITS.harmonic_orders + 1)
+    angles, by_joint = _found_angles(case, now)
     th = angles[1:]
-    size = np.sqrt(np.square(joints[1:]).sum(axis=2))
-    by_joint = np.einsum("kij,kj->ki", np.linalg.pinv(joints[1:], rcond=1e-3), z[:, 3:] * size)
     for joint in range(3):
         used = np.isfinite(by_joint[:, joint] + th[:, joint])
         angle, missed = th[used, joint], by_joint[used, joint]
         # half a period is the least from which an order is told from a constant
         orders = orders_tried[orders_tried * np.ptp(angle) > math.pi] if used.any() else orders_tried[:0]
         if len(orders):
-            powers = np.abs(np.exp(1j * orders[:, None] * angle) @ missed)
+            powers = np.array([np.abs(np.exp(1j * order * angle) @ missed) for order in orders])
             yield _harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint])
 
 
 def _found_angles(case: Case, now: FilterResult) -> tuple[Array, Array]:
-    """Gimbal angles (n, 3) [rad] that the filter found, and the axes (n, 3, 3) of the joints. At rest angles as read
-    change with their noise alone, and would explain it."""
+    """Gimbal angles (n, 3) [rad] that the filter found, and innovations (n - 1, 3) of the encoders about the joints. At
+    rest angles as read change with their noise alone, and would explain it."""
     recording, problem = case
     assert now.history is not None
-    read, joints = gimbals(np.nan_to_num(recording.th), problem.world)
-    off = boxminus(read, now.history.attitude)
-    return recording.th - np.einsum("kij,kj->ki", np.linalg.pinv(joints, rcond=1e-3), off), joints
+    angles, missed = recording.th.copy(), regular(recording, now)[:, 3:]
+    for first in range(0, len(angles), _CHUNK):
+        some = slice(first, first + _CHUNK)
+        read, joints = gimbals(np.nan_to_num(recording.th[some]), problem.world)
+        inverse = np.linalg.pinv(joints, rcond=1e-3)
+        angles[some] -= np.einsum("kij,kj->ki", inverse, boxminus(read, now.history.attitude[some]))
+        later = slice(1 if first == 0 else 0, None)  # innovations begin with the second row
+        size = np.sqrt(np.square(joints[later]).sum(axis=2))
+        rows = slice(max(first - 1, 0), first + _CHUNK - 1)
+        missed[rows] = np.einsum("kij,kj->ki", inverse[later], missed[rows] * size)
+    return angles, missed
 
 
 def _harmonic(joint: int, order: int, angle: Array) -> Hypothesis[Case]:

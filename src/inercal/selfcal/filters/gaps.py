@@ -152,7 +152,7 @@ def advance(
         parts.append(trace)
         done = k + 1
     state, trace = module.advance(state, problem, steps.part(slice(done, None)), history)
-    return state, _joined([*parts, trace])._replace(restarts=tuple(restarts))
+    return state, joined([*parts, trace])._replace(restarts=tuple(restarts))
 
 
 def initial(
@@ -239,7 +239,7 @@ def _anew(
     return state, Trace(out, gimbal_cosine=abs(math.cos(on_turn[1])))
 
 
-def _joined(parts: Sequence[Trace]) -> Trace:
+def joined(parts: Sequence[Trace]) -> Trace:
     """Traces one after the other as one."""
     lowest = [part.lowest_eigenvalue for part in parts if not math.isnan(part.lowest_eigenvalue)]
     return Trace(

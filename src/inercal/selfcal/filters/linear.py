@@ -73,7 +73,7 @@ def estimate_linear(
         -to_next @ terms.by_last,
         -to_next @ terms.by_coefficients,
         np.einsum("kij,kj->ki", to_next, terms.process),
-        to_next @ np.swapaxes(to_next, 1, 2),
+        np.asarray(to_next @ np.swapaxes(to_next, 1, 2)),
         np.concatenate([terms.sensed.by_attitude, terms.sensed.by_coefficients], axis=2),
         terms.sensed.residual,
     )

@@ -16,11 +16,13 @@ from inercal.selfcal.filters.batch import estimate_map
 from inercal.selfcal.filters.filter_result import (
     FilterResult,
     History,
+    State,
     Trace,
     attitude_of,
+    empty_estimates,
     estimate_of,
 )
-from inercal.selfcal.filters.gaps import advance, initial
+from inercal.selfcal.filters.gaps import advance, initial, joined
 from inercal.selfcal.filters.linear import estimate_linear
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.second_pass import is_due, second_pass
@@ -46,13 +48,14 @@ def estimate(
     kind: FilterKind | None = None,
     start: Start | None = None,
     history: bool = True,
-    twice: bool = True,
+    brief: bool = False,
 ) -> FilterResult:
     """Estimate the coefficients from a recording, by the estimator of the problem or another ``kind``.
 
     ``start`` of the attitude is the first encoder reading if absent; with ``history`` the estimates after each row are
-    kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`), if ``twice``; history
-    but its last row, innovations and NIS are those of the first pass.
+    kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`); history but its last
+    row, innovations and NIS are those of the first pass. A ``brief`` one, for a judge of the innovations, takes one
+    pass, and its history has attitudes alone.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
@@ -62,14 +65,12 @@ def estimate(
     load_kernels(kind, problem)
     began = time.perf_counter()
     state = initial(module, problem, recording.th[0], recording.rate[0], start)
-    first = estimate_of(state, problem)
-    motion = recording.steps, recording.held
-    state, trace = advance(module, state, problem, *motion, history, recording.walked)
-    last = None
-    if twice and is_due(kind, problem):
+    state, trace, rows = _passed(module, state, problem, recording, history, brief)
+    if not brief and is_due(kind, problem):
         begun = initial(module, problem, recording.th[0], recording.rate[0], start)
-        state = second_pass(module, begun, state, problem, *motion, recording.walked)
-        last = estimate_of(state, problem)
+        state = second_pass(module, begun, state, problem, recording.steps, recording.held, recording.walked)
+        for name, row in vars(estimate_of(state, problem)).items() if rows is not None else ():
+            getattr(rows, name)[-1:] = row
     seconds = time.perf_counter() - began
     size = len(problem.prior)
     result = FilterResult(
@@ -81,7 +82,7 @@ def estimate(
         nis=trace.estimates.nis,
         dims=trace.estimates.dims,
         innovations=trace.estimates.innovations,
-        history=_history(first, trace, last) if history else None,
+        history=rows,
         seconds=seconds,
         lowest_eigenvalue=trace.lowest_eigenvalue,
         fallbacks=trace.fallbacks,
@@ -93,6 +94,48 @@ def estimate(
     return replace(result, converged=False, message=message) if message else result
 
 
+_CHUNK = 1 << 16
+"""Steps whose estimates a filter hands over at once: of a long recording there is room for one copy."""
+
+
+def _passed(
+    module: ModuleType,
+    state: State,
+    problem: FilterProblem,
+    recording: Recording,
+    history: bool,
+    brief: bool,
+) -> tuple[State, Trace, History | None]:
+    """The state after all steps, innovations and health, and estimates of the rows, of a ``brief`` one attitudes."""
+    steps, m, p = recording.steps, len(recording.dt), len(problem.prior)
+    seen = np.all(np.isfinite(steps.th), axis=1)
+    out = empty_estimates(0, p, history)._replace(nis=np.empty(m), dims=np.empty(m, dtype=np.int64))
+    rows = vars(estimate_of(state, problem)) if history else {}
+    kept = [name for name in rows if name == "attitude" or not brief]
+    if history:
+        out = out._replace(innovations=np.empty((m, 6)))
+        more = {name: np.empty((m, rows[name].shape[1])) for name in kept}
+        rows |= {name: np.concatenate([rows[name], each]) for name, each in more.items()}
+    health, restarts, first = list[Trace](), list[int](), 0
+    while first < m or not health:
+        last = min(first + _CHUNK, m)
+        while last < m and not seen[last - 1]:  # what is in doubt stays together
+            last += 1
+        held = [k - first for k in recording.held if first <= k < last]
+        walked = None if recording.walked is None else recording.walked[first:last]
+        part = steps.part(slice(first, last))
+        state, trace = advance(module, state, problem, part, held, history, walked)
+        for name in ("nis", "dims", *(["innovations"] if history else [])):
+            getattr(out, name)[first:last] = getattr(trace.estimates, name)
+        for name in kept:
+            rows[name][first + 1 : last + 1] = getattr(trace.estimates, name)
+        health.append(trace._replace(estimates=empty_estimates(0, p, history)))
+        restarts += [first + k for k in trace.restarts]
+        first = last
+    trace = joined(health)._replace(estimates=out, restarts=tuple(restarts))
+    return state, trace, History(**rows) if history else None
+
+
 def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
     """Load, or compile, the kernels of a recursive filter; nothing to do for the others."""
     module = recursive(kind)
@@ -102,16 +145,6 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
             module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none, none)
         )
         _LOADED.add(kind)
-
-
-def _history(first: History, trace: Trace, last: History | None) -> History:
-    """The estimates of the start and of all steps; with another one of the last."""
-    of_steps = trace.estimates._asdict()
-    whole = {name: np.concatenate([row, of_steps[name]]) for name, row in vars(first).items()}
-    if last is not None:
-        for name, row in vars(last).items():
-            whole[name][-1:] = row
-    return History(**whole)
 
 
 def _fault(result: FilterResult) -> str:

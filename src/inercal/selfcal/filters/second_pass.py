@@ -72,12 +72,12 @@ def second_pass(
 
 
 class Kept(NamedTuple):
-    """Rows that a stream keeps for further passes: of ``rows`` (m, 15) the first ``count``, the first angles and then
+    """Rows that a stream keeps for further passes: of ``rows`` (m, 15) the first ``used``, the first angles and then
     steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked, later. None of a filter
     that needs no second pass, or once there are `LIMITS.kept_rows`."""
 
     rows: Array = np.empty((0, 15))
-    count: int = 0
+    used: int = 0
 
     @staticmethod
     def of(kind: FilterKind, problem: FilterProblem, th: Array) -> Kept:
@@ -90,32 +90,28 @@ class Kept(NamedTuple):
 
     def after(self, step: Steps, held: bool, walked: float) -> Kept:
         """The rows with one step more."""
-        if not self.count:
+        if not self.used:
             return self
         rows = self.rows
-        rows[self.count] = np.hstack(
+        rows[self.used] = np.hstack(
             [step.dt, step.rate[0], step.acc[0], step.th[0], held, walked, step.later[0]]
         )
-        return Kept(rows, self.count + 1)
+        return Kept(rows, self.used + 1)
 
     @property
     def full(self) -> bool:
         """True where another pass is due."""
-        return 0 < len(self.rows) == self.count
+        return 0 < len(self.rows) == self.used
 
     def passed(self, module: ModuleType, problem: FilterProblem, found: State) -> tuple[State, Kept]:
         """The state after another pass through all rows kept, and the rows with room for as many more."""
         first, steps = self.rows[0, 7:10], self.rows[1:]
         held = np.flatnonzero(steps[:, 10]).tolist()
-        taken = Steps(
-            *(
-                np.ascontiguousarray(steps[:, part])
-                for part in (0, *map(slice, (1, 4, 7, 12), (4, 7, 10, 15)))
-            )
-        )
+        rate, acc, th, later = (np.ascontiguousarray(steps[:, k : k + 3]) for k in (1, 4, 7, 12))
+        taken = Steps(np.ascontiguousarray(steps[:, 0]), rate, acc, th, later)
         begun = initial(module, problem, first, steps[0, 1:4])
         state = second_pass(module, begun, found, problem, taken, held, steps[:, 11])
-        more = Kept() if self.count >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.count)
+        more = Kept() if self.used >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.used)
         return state, more
 
 

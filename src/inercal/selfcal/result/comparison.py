@@ -19,7 +19,7 @@ def stated_variance(filtered: FilterResult, u: Array) -> Array:
     """Variance (p,) that what is stated with an uncertainty adds to that of the estimator that counts, by the
     uncertainties ``u`` (p,) of the result; product form."""
     _, own = product_form(filtered)
-    return np.maximum(np.square(u) - np.square(own), 0.0)
+    return np.asarray(np.maximum(np.square(u) - np.square(own), 0.0))
 
 
 def with_stated(other: FilterResult, stated: Array) -> tuple[Array, Array]:

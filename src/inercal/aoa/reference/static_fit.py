@@ -1,0 +1,171 @@
+"""Calibration of the sensors against reference angles that are known at rests alone, as of an inclinometer or a sector.
+
+The means of the readings at K rests are fitted, of each accelerometer its scale, bias and axis:
+
+    A_i = S_i (f_x cos lambda_i - f_z sin lambda_i + b_i),   f_x = g sin theta, f_z = c g cos theta
+
+The error of a reading of the reference is one and the same for all rows of a rest and for all sensors: it enters the
+covariance of the readings of a rest as sigma^2 s s^T, s their slopes by the angle, beside their own means' scatter.
+sigma is that of the largest restricted likelihood (Patterson and Thompson 1971, Biometrika 58), and where chi-square
+is still above its degrees of freedom the covariance grows with it. What rests do not show stays at ten times the
+study's prior, as in `inercal.aoa.reference.sensor_fit`; the zero of the reference is taken as true.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.means import mean_u
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.reference.sensor_fit import Verified, fit_terms
+from inercal.aoa.settings import AoaSettings
+from inercal.arrays import Array
+from inercal.errors import RecordError
+from inercal.estimate.identifiability import learned
+
+Stretch = tuple[int, int]
+
+_LEAST = 4
+"""Rests from which three coefficients of an accelerometer are fitted."""
+
+_SIGMAS = (0.0, *np.geomspace(1e-7, 0.1, 32).tolist())
+"""Standard deviations [rad] of a reading of the reference that are tried; the last is of no use."""
+
+_ITERATIONS = 3
+
+_FLOOR = 1e-6
+"""Standard uncertainty [m/s^2] of a mean, a tenth of a millionth of gravity, below which none is believed."""
+
+
+def at_rests_alone(recording: Recording) -> list[Stretch]:
+    """Stretches of rows, first and one after the last, over each of which one reference angle is given; empty where the
+    reference moves or is there all the time."""
+    if recording.reference is None:
+        return []
+    given = np.flatnonzero(np.isfinite(recording.reference))
+    if not len(given) or len(given) == len(recording.t):
+        return []
+    parts = np.split(given, np.flatnonzero(np.diff(given) > 1) + 1)
+    if len(parts) < 2 or any(np.ptp(recording.reference[part]) > LIMITS.reference_creep for part in parts):
+        return []
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts]
+
+
+def static_fit(recording: Recording, settings: AoaSettings, points: Sequence[Stretch]) -> Verified:
+    """Fit the accelerometers to the reference angles of a recording that has them at rests alone.
+
+    A rest is the one of the ``points`` in which a reference angle lies, else the rows that have it. Raises
+    `RecordError` where there are fewer than four rests with readings, or no sensor follows them.
+    """
+    assert recording.reference is not None
+    theta, means, u, rates = _rests(recording, points)
+    n, count = len(settings.layout.names), len(theta)
+    if count < _LEAST:
+        raise RecordError(
+            "theta_ref", f"found {count} rests with a reference angle, expected {_LEAST} or more"
+        )
+    names, units, usual, start = fit_terms(settings)
+    wide = LIMITS.widened_prior * usual
+    # of all rests together, for those of one are known by eight cosines
+    pooled = np.sqrt(np.nanmean(np.square(u), axis=0))
+    x = start.copy()
+
+    def solved(sigma: float) -> _Solved:
+        return _solve(sigma, x - start, _linear(settings, theta, means, x), pooled, wide)
+
+    for _ in range(_ITERATIONS):
+        sigma = max(_SIGMAS, key=lambda each: solved(each).likelihood)
+        found = solved(sigma)
+        x = start + found.x
+    if sigma >= _SIGMAS[-1]:
+        raise RecordError("theta_ref", "found angles that no sensor follows, expected those of the model")
+    P = found.P * max(found.chi2 / found.dof, 1.0)
+    at = names.index("b_g")
+    good = rates[np.isfinite(rates)]
+    if len(good) > 1:
+        x[at], P[at, at] = float(good.mean()), float(good.var(ddof=1)) / len(good)
+    more = learned(P, wide, names)
+    unseen = more.at_prior(1.0 / LIMITS.widened_prior)
+    rows = int(np.isfinite(recording.reference).sum())
+    return Verified(names, units, x, P, more, unseen, np.full(n + 1, np.nan), sigma, rows, True)
+
+
+def _rests(recording: Recording, points: Sequence[Stretch]) -> tuple[Array, Array, Array, Array]:
+    """Reference angles (K,), means of the accelerometers (K, N), their u, and means of the gyro (K,)."""
+    assert recording.reference is not None
+    inside: dict[Stretch, list[float]] = {}
+    for start, stop in at_rests_alone(recording):
+        around = next((each for each in points if each[0] <= start and stop <= each[1]), (start, stop))
+        if around[1] - around[0] >= LIMITS.starting_rows:
+            inside.setdefault(around, []).append(float(recording.reference[start:stop].mean()))
+    theta, means, u, rates = [], [], [], []
+    for (start, stop), angles in inside.items():
+        rows = recording.acc[start:stop]
+        theta.append(float(np.mean(angles)))
+        columns = [column[np.isfinite(column)] for column in rows.T]
+        enough = [len(column) >= LIMITS.starting_rows for column in columns]
+        means.append([float(c.mean()) if good else math.nan for c, good in zip(columns, enough, strict=True)])
+        u.append(
+            [max(mean_u(c), _FLOOR) if good else math.nan for c, good in zip(columns, enough, strict=True)]
+        )
+        gyro = recording.gyro[start:stop]
+        rates.append(float(np.nanmean(gyro)) if np.isfinite(gyro).any() else math.nan)
+    n = recording.acc.shape[1]
+    shape = (len(theta), n)
+    return np.array(theta), np.reshape(means, shape), np.reshape(u, shape), np.array(rates)
+
+
+class _Solved(NamedTuple):
+    """Coefficients less their first values ``x`` (p,), covariance ``P`` (p, p), ``chi2`` with its degrees of freedom
+    ``dof``, and the logarithm of the restricted ``likelihood``, but for a constant."""
+
+    x: Array
+    P: Array
+    chi2: float
+    dof: float
+    likelihood: float
+
+
+def _solve(sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array, wide: Array) -> _Solved:
+    """One step of weighted least squares about ``x``, with readings of the reference off by ``sigma`` [rad]."""
+    jacobian, residual, slopes = linear
+    information, pull, whole, determinant = np.diag(wide**-2.0), np.zeros(len(wide)), 0.0, 0.0
+    count = 0
+    for J, r, s in zip(jacobian, residual + jacobian @ x, slopes, strict=True):
+        seen = np.isfinite(r) & np.isfinite(u)
+        C = np.diag(u[seen] ** 2) + sigma**2 * np.outer(s[seen], s[seen])
+        weighted = np.linalg.solve(C, np.column_stack([J[seen], r[seen]]))
+        information += J[seen].T @ weighted[:, :-1]
+        pull += J[seen].T @ weighted[:, -1]
+        whole += float(r[seen] @ weighted[:, -1])
+        determinant += float(np.linalg.slogdet(C)[1])
+        count += int(seen.sum())
+    scale = np.outer(wide, wide)
+    P = np.linalg.inv(information * scale) * scale
+    solution = P @ pull
+    chi2 = whole - float(solution @ pull)
+    used = len(wide) - float(np.trace(P / scale))
+    likelihood = -0.5 * (determinant + float(np.linalg.slogdet(information * scale)[1]) + chi2)
+    return _Solved(solution, P, chi2, max(count - used, 1.0), likelihood)
+
+
+def _linear(settings: AoaSettings, theta: Array, means: Array, x: Array) -> tuple[Array, Array, Array]:
+    """Derivatives (K, N, p) of the readings at coefficients ``x`` (p,), residuals (K, N) and slopes by the angle."""
+    layout, g, c = settings.layout, settings.site.gravity, settings.attitude.level
+    n = len(layout.names)
+    S, b, turned = x[:n], x[n : 2 * n], x[2 * n : 3 * n]
+    ca, sa = np.cos(layout.angle + turned), np.sin(layout.angle + turned)
+    fx, fz = g * np.sin(theta), c * g * np.cos(theta)
+    force = np.outer(fx, ca) - np.outer(fz, sa)
+    jacobian = np.zeros((len(theta), n, len(x)))
+    each = np.arange(n)
+    jacobian[:, each, each] = force + b
+    jacobian[:, each, n + each] = S
+    jacobian[:, each, 2 * n + each] = -S * (np.outer(fx, sa) + np.outer(fz, ca))
+    slopes = np.outer(g * np.cos(theta), ca) + np.outer(c * g * np.sin(theta), sa)
+    return jacobian, means - S * (force + b), slopes

@@ -1,0 +1,92 @@
+"""State of a stream of angles of attack between two rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.aoa.band import Band
+from inercal.aoa.fusion.live_band import LimitedState
+from inercal.aoa.settings import AoaSettings, Resonance
+from inercal.arrays import Array
+from inercal.stream.run import Alarms, Slots
+
+
+class Leaning(NamedTuple):
+    """The fusion under a change of a stated input: its state, and theta [rad] of rows not yet answered without it."""
+
+    live: LimitedState
+    theta: Array
+
+
+class AoaState(NamedTuple):
+    """State after a row.
+
+    ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by name; ``t`` [s] the
+    latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
+    last row with a number of the gyro. ``nis`` and ``scalars``: sum and number of the squared innovations since
+    ``window`` [s]; ``mean_nis`` of the last window; ``all_nis``, ``all_scalars`` of all rows, and of these the
+    ``unanswered``. ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is
+    decided; ``choice`` is that (`choice_of`), empty before. ``remarked``: the findings on the sensors were given;
+    ``slots`` that of the last line.
+    """
+
+    live: LimitedState
+    beside: Mapping[str, Leaning]
+    t: float
+    begun: float
+    temperature: float
+    heard: float
+    nis: float
+    scalars: int
+    window: float
+    mean_nis: float
+    all_nis: float
+    all_scalars: int
+    unanswered: int
+    rows: int
+    head: Array
+    seen: int
+    choice: Array
+    remarked: bool
+    alarms: Alarms
+    slots: Slots
+
+
+def kept(state: AoaState, row: Array) -> AoaState:
+    """The state with a row more in its head, whose array is used up."""
+    head, seen = state.head, state.seen
+    if seen == len(head):
+        head = np.vstack([head, np.empty_like(head)])
+    head[seen] = row
+    return state._replace(head=head, seen=seen + 1)
+
+
+def choice_of(settings: AoaSettings, final: bool) -> Array:
+    """All that was decided, as numbers of a state: 1 where ``final``, 0 for the rate alone; rate, low pass, snap (0 for
+    the usual one), delay and the prior of its rest, flexure, notches."""
+    band, snap = settings.band, settings.estimator.snap or 0.0
+    low = math.nan if band.low_pass is None else band.low_pass
+    delay = settings.timing.gyro_delay_about, settings.prior.gyro_delay
+    flexure = settings.prior.heave
+    shaken = flexure.frequency, flexure.damping, flexure.level
+    return np.array([float(final), band.rate, low, snap, *delay, *shaken, *band.notch])
+
+
+def chosen(settings: AoaSettings, choice: Array) -> AoaSettings:
+    """The study with what was decided."""
+    _, rate, low, snap, about, rest, frequency, damping, level, *notch = choice.tolist()
+    prior, heave = replace(settings.prior, gyro_delay=rest), Resonance(frequency, damping, level)
+    if heave != prior.heave:
+        prior = replace(prior, heave=heave, axial=heave)
+    return replace(
+        settings,
+        band=Band(None if math.isnan(low) else low, tuple(notch), rate),
+        estimator=replace(settings.estimator, snap=snap or None),
+        timing=replace(settings.timing, gyro_delay_about=about),
+        prior=prior,
+    )

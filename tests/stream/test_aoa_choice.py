@@ -1,0 +1,88 @@
+"""A stream that decides on band, snap and delay: its lines until then and after, and what it says of itself."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.independent.aoa import CASES, DEG, Tunnel, simulate
+from sting_study import study
+from streams_that_break import lines_out
+
+from inercal.aoa.band import Band
+from inercal.aoa.fusion.band import with_rate
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import problem
+from inercal.aoa.reading.recording import plain
+from inercal.aoa.settings import Estimator
+from inercal.records.write import number
+from inercal.stream.aoa import Aoa
+from inercal.stream.lines import Lines
+from inercal.stream.run import Saving
+
+LINES_OF_TUNNEL = "lines 0.05 g, 47, 112, 230 Hz"
+
+
+def text_of(run):
+    """A run as a file."""
+    rows = np.column_stack([run.t, run.acc, run.gyro])
+    lines = [",".join(number(x) for x in row) for row in rows.tolist()]
+    return "\n".join(["t [s],a1 [m/s^2],a2 [m/s^2],a3 [m/s^2],gyro [rad/s]", *lines]) + "\n"
+
+
+def streamed(text, settings, saving=None, kill=None):
+    """Columns of the lines out, the estimator, and its findings."""
+    said = []
+    lines = Lines(io.BytesIO(text.encode()), "log", None, lambda finding: None)
+    of = Aoa(lines, settings, 0.0, said.append)
+    return lines_out(of, lines, saving, kill), of, said
+
+
+def table(out):
+    return np.genfromtxt(out[1:], delimiter=",")
+
+
+@pytest.mark.parametrize("low_pass", [35.0, np.inf])
+def test_where_band_and_snap_are_stated_the_digits_are_those_of_the_file(low_pass):
+    """Of each row, from the first: nothing is decided, and no status is 1."""
+    run = simulate(Tunnel(duration=3.0, **CASES[LINES_OF_TUNNEL]), 0)
+    settings = study(band=Band(low_pass, (47.0,)), estimator=Estimator(snap=2e8))
+    out = table(streamed(text_of(run), settings)[0])
+    filtered = estimate(plain(run.t, run.acc, run.gyro), problem(with_rate(settings, run.t)))
+    shown = np.degrees(np.column_stack([filtered.theta, filtered.u, filtered.rate]))
+    assert np.array_equal(out[:, 1:4], shown, equal_nan=True)
+    assert np.isfinite(shown[200:]).all()
+    assert not (out[:, 4] == 1.0).any()
+
+
+@pytest.mark.slow
+def test_a_stream_decides_within_15_s_and_says_until_when(tmp_path):
+    """Lines of a tunnel: after the choice the digits of a file that states it, also where the stream was killed."""
+    run = simulate(Tunnel(duration=20.0, fs=300.0, **CASES[LINES_OF_TUNNEL]), 1)
+    text = text_of(run)
+    whole, of, said = streamed(text, study())
+    out = table(whole)
+    after = run.t > 15.0
+    assert set(out[~after, 4]) <= {1.0, 2.0, 3.0}
+    assert set(out[after, 4]) == {0.0}
+    error, u = out[after, 1] - run.theta[after] / DEG, out[after, 2]
+    assert np.sqrt(np.mean(error**2)) < 0.05
+    assert np.sqrt(np.mean((error / u) ** 2)) < 2.0
+    assert "band_limited" in [each.code for each in said]
+    assert of.failure == ""
+    problem_ = of._problem
+    filtered = estimate(plain(run.t, run.acc, run.gyro), problem_)
+    assert np.array_equal(out[after, 1], np.degrees(filtered.theta[after]))
+    saving, given = Saving(tmp_path / "state", 100), []
+    for kill in (2000, 4450, 4600, 5500, None):
+        given += streamed(text, study(), saving, kill)[0]
+    assert set(given) == set(whole)
+
+
+def test_a_stream_that_contradicts_the_model_ends_with_that():
+    run = simulate(Tunnel(duration=6.0), 0)
+    run = replace(run, gyro=-run.gyro)
+    out, of, _ = streamed(text_of(run), study())
+    assert table(out)[-1, 4] == 2.0
+    assert "contradicts the model: mean NIS" in of.failure
+    assert table(out)[-1, 5] > 2.0
