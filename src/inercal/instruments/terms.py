@@ -78,11 +78,7 @@ _RATE_TEST = tuple(
         ("S2", "second-order coefficient, of the square of the rate", "1/(rad/s)"),
         ("S3", "third-order coefficient, of the cube of the rate", "1/(rad/s)^2"),
         ("S_nl", "non-linearity: largest residual from the best straight line, over full scale", "1"),
-        (
-            "S_hyst",
-            "hysteresis: largest difference at a rate reached from below and above, over full scale",
-            "1",
-        ),
+        ("S_hyst", "hysteresis: largest difference at a rate reached both ways, over full scale", "1"),
     )
 )
 
@@ -147,8 +143,8 @@ _SELF_CALIBRATION = (
             f"misalignment of gyro {p[0]}: rate about {p[0]} per rate about {p[1]}{way}",
             "rad",
         )
-        for symbol, way, pairs in (("ds", "", ("xy", "yz", "zx")), ("do", ", reversed", ("xz", "yx", "zy")))
-        for p in pairs
+        for symbol, way, pairs in (("ds", "", "xy yz zx"), ("do", ", reversed", "xz yx zy"))
+        for p in pairs.split()
     ),
     *(
         Term(f"{symbol}_{i}", name.format(i), unit)
