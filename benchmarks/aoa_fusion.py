@@ -26,6 +26,7 @@ from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.live import Live
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.limits import LIMITS
+from inercal.aoa.settings import Timing
 from inercal.aoa.simulate import simulate
 
 #: states -> microseconds a row that are promised of the filter, and of filter and smoother
@@ -54,7 +55,7 @@ def live(of, recording, rows: int) -> list[float]:
 
 def of_states(states: int, recording, few: int, rounds: int) -> list[Row]:
     """All rows with so many states; the peers on the first ``few`` samples."""
-    settings = study(states)
+    settings = study(states, timing=Timing(0.0))
     of, n = problem(settings), len(recording.t)
     told, x, P = plain(of, settings, recording)
     _, trace = fusion.advance(fusion.initial(of), of, recording.t, recording.rows, last=True)

@@ -28,6 +28,7 @@ import sensitivity
 from inercal.aoa.fusion import run as fusion
 from inercal.aoa.fusion import smoother
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.settings import Timing
 from inercal.aoa.simulate import simulate
 from inercal.geometry.site import Site
 from inercal.imu.multiposition.calibration import calibrate_multiposition
@@ -144,7 +145,7 @@ def of_states(quick: bool) -> list[Curve]:
     names = ("inercal, filter", "inercal, smoother", "NumPy, filter", named("filterpy"))
     works: dict[str, list] = {name: [] for name in names}
     for states in (8, 11, 15, 19):
-        settings = study(states)
+        settings = study(states, timing=Timing(0.0))
         of = problem(settings)
         _, trace = fusion.advance(fusion.initial(of), of, t, rows, last=True)
         works[names[0]].append(
@@ -161,7 +162,7 @@ def of_states(quick: bool) -> list[Curve]:
 def of_rows(quick: bool) -> list[Curve]:
     """The whole fusion of 19 states against the length of the record."""
     works: dict[str, list] = {"inercal, filter": [], "inercal, smoother": []}
-    of = problem(study(19))
+    of = problem(study(19, timing=Timing(0.0)))
     for n in (500, 1000) if quick else (1000, 6000, 36_000, 216_000):
         recording = simulate(
             study(motion=replace(BASE, duration=1e-3 * n)), np.random.default_rng(1)
