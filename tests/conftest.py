@@ -14,8 +14,10 @@ LIMIT = 2.0
 YARDSTICK = 0.05
 """Processor time of `yardstick` where the marks were set [s]."""
 
-# A shell that starts the tests behind its back (&) has them ignore interrupts, and all programs they start, too.
+# A shell that starts the tests behind its back (&, nohup) has them ignore interrupts, and all programs they start, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")

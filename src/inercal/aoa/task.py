@@ -137,7 +137,9 @@ def measure(
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
-        findings += of_delay(delay, of, filtered)
+        # between the samples of a slower sensor there are no spectra of both
+        if not any(each.code == "other_clock" for each in recording.findings):
+            findings += of_delay(delay, of, filtered)
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)

@@ -194,8 +194,11 @@ def _liveliest(recording: Recording) -> Iterator[NDArray[np.int64]]:
 
 
 def _enough(recording: Recording, rows: NDArray[np.int64]) -> bool:
-    """True for a stretch that goes on for twice the time in which a filter settles."""
-    return bool(len(rows)) and bool(np.ptp(recording.t[rows]) > 2.0 * LIMITS.settling_time)
+    """True for a stretch that goes on for twice the time in which a filter settles, in rows near enough for spectra."""
+    t = recording.t[rows]
+    if len(rows) < 4 or not np.ptp(t) > 2.0 * LIMITS.settling_time:
+        return False
+    return bool(4.0 * np.median(np.diff(t)) <= LIMITS.line_segment)
 
 
 def _restless(recording: Recording, rows: NDArray[np.int64]) -> float:
