@@ -85,7 +85,10 @@ def test_a_long_command_is_killed(name, signum, folder):
         others = descendants(process.pid)
         assert process.poll() is None
         process.send_signal(signum)
-        out, err = process.communicate(timeout=120)
+        try:
+            out, err = process.communicate(timeout=120)
+        finally:
+            process.kill()
     assert process.returncode == (-signal.SIGKILL if signum == signal.SIGKILL else 130), err
     assert out == b""
     deadline = time.monotonic() + 30
