@@ -15,18 +15,16 @@ from inercal.units import Quantity
 
 class Steps(NamedTuple):
     """Rates and measurements of m steps, as kernels take them: ``dt`` (m,) [s]; ``rate`` (m, 3) [rad/s], held over each
-    step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not; ``later`` (m, 3)
-    [rad/s] the rate of the step after it."""
+    step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not."""
 
     dt: Array
     rate: Array
     acc: Array
     th: Array
-    later: Array
 
     def part(self, steps: slice) -> Steps:
         """Some of the steps."""
-        return Steps(*(each[steps] for each in self))
+        return Steps(self.dt[steps], self.rate[steps], self.acc[steps], self.th[steps])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +59,7 @@ class Recording:
     @property
     def steps(self) -> Steps:
         """The n - 1 steps from row to row."""
-        rate = self.rate
-        return Steps(self.dt, rate, self.acc[1:], self.th[1:], np.vstack([rate[1:], rate[-1:]]))
+        return Steps(self.dt, self.rate, self.acc[1:], self.th[1:])
 
     @property
     def walking(self) -> Array:
