@@ -128,7 +128,8 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
 def _with_probability(doubtful: Sequence[Tested], asked: int) -> Iterator[Tested]:
     """Doubtful faults, of so many ``asked`` for, with the probability that they are there."""
     odds = LIMITS.fault_odds / max(asked, 1)
-    support = [odds / (-math.e * each.chance * math.log(each.chance)) for each in doubtful]
+    chances = [max(each.chance, 1e-300) for each in doubtful]  # 0.0 of a number too small to be told
+    support = [odds / (-math.e * chance * math.log(chance)) for chance in chances]
     for each, own in zip(doubtful, support, strict=True):
         yield replace(each, probability=own / (1.0 + sum(support)))
 
