@@ -80,6 +80,7 @@ def assemble(
         TERMS[name].unit_for(symbols["gyro" if name.startswith(("D_", "S_", "T_", "G_")) else "acc"])
         for name in names
     ]
+    geometry = tuple(name for name in names if name.startswith(("r_", "tau_")))
     return Estimate.of(
         _basis(record, settings, _conditions(record, fit, settings)),
         names,
@@ -91,7 +92,7 @@ def assemble(
             *settled(record.findings, *MASKED),
             *earlier,
             *motion.findings,
-            *findings(fit, lag, faulty, judged[0] is Status.OK),
+            *findings(fit, lag, faulty, judged[0] is Status.OK, geometry),
         ),
         statistics=_statistics(fit, rests),
         result={

@@ -161,8 +161,13 @@ def _unit_words(fit: Fit, triad: str) -> str:
     )
 
 
-def findings(fit: Fit, lag: float, faults: Sequence[Misfit], sound: bool) -> Iterator[Finding]:
-    """Findings about clocks, biases, saturation, and faults in the residuals of a result, ``sound`` or not."""
+def findings(
+    fit: Fit, lag: float, faults: Sequence[Misfit], sound: bool, geometry: tuple[str, ...]
+) -> Iterator[Finding]:
+    """Findings about clocks, biases, saturation, and faults in the residuals of a result, ``sound`` or not.
+
+    ``geometry`` names its lever arms and delays, which shifts with each turn move by more than their u.
+    """
     for fault in faults:
         # where u allows for a fault, sensors and table do not contradict each other
         code = "unmodelled" if sound and fault.code == "contradiction" else fault.code
@@ -186,8 +191,8 @@ def findings(fit: Fit, lag: float, faults: Sequence[Misfit], sound: bool) -> Ite
         yield Finding(
             "excess_scatter",
             f"outputs shift with each turn of the table, and not at rest, by some {', '.join(moved)}: errors of the "
-            "table that are not stated, or hysteresis; the uncertainties use it",
-            harm=(),
+            "table that are not stated, or hysteresis; the uncertainties use it, but for lever arms and delays",
+            harm=geometry,
         )
     for triad in fit.identified:
         group = f"time shift of {triad}"
