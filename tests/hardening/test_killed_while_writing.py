@@ -202,7 +202,9 @@ def test_no_command_that_writes_is_forgotten(capsys):
         for option, listed in (("--out", COMMANDS), ("--checkpoint", STREAMS)):
             there = any(line.split()[: len(words)] == words for line in listed.values())
             if (*words, option) == ("simulate", "selfcal", "--checkpoint"):
-                there = True  # a folder of one file a run, of which test_killed_while_working stops the writing
+                there = (
+                    True  # a folder of one file a run, of which test_killed_while_working stops the writing
+                )
             assert (f"{option} PATH:" in text) == there, (words, option)
 
 
