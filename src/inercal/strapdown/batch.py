@@ -1,0 +1,163 @@
+"""The batch estimator: all of a recording in one least-squares problem, by Gauss-Newton and multiple shooting.
+
+Unknowns are attitude and velocity at every node (and the deviations of walking biases from the first node's), a
+reference attitude for each rest where it is held, and the coefficients. From each node's present state the solution is
+carried to the next; what is left between the two is weighted by the noise gained on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.arrays import Array, short_repr
+from inercal.geometry.earth import EARTH_RATE
+from inercal.geometry.rotations import conjugate, exp, log, multiply
+from inercal.strapdown.arrow import Chain, backward, forward
+from inercal.strapdown.coefficients import GRAVITY, LATITUDE, SIZE, free_places
+from inercal.strapdown.kernels import Shot, World, shoot
+from inercal.strapdown.limits import LIMITS
+from inercal.strapdown.rests import Nodes
+from inercal.strapdown.samples import Samples, freed, gains
+from inercal.strapdown.settings import Noise, StrapdownSettings
+from inercal.strapdown.start import Beginning, beginning, carried_through
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fit: coefficients ``c`` (51,), their places ``free`` (p,) that were estimated with ``covariance`` (p, p) and
+    ``prior`` (p,) standard deviations, attitudes ``q_nb`` (k + 1, 4) and velocities (k + 1, 3) of the nodes.
+
+    ``chi2`` with ``dof`` degrees of freedom, ``squares`` (k,) of it by interval; ``passes`` until it ``converged``.
+    """
+
+    c: Array
+    free: Array
+    covariance: Array
+    prior: Array
+    q_nb: Array
+    velocity: Array
+    nodes: Nodes
+    chi2: float
+    dof: int
+    squares: Array
+    passes: int
+    converged: bool
+
+
+def world_of(settings: StrapdownSettings, c: Array, ts: float) -> World:
+    """Earth rate and gravity at the site, as corrected by ``c`` (51,)."""
+    latitude = settings.latitude + c[LATITUDE]
+    earth = EARTH_RATE * np.array([0.0, np.cos(latitude), np.sin(latitude)])
+    return World(earth, settings.site.gravity + float(c[GRAVITY]), ts)
+
+
+def _variances(noise: Noise) -> Array:
+    """Variances (4,) [per s] of attitude, velocity, and the biases of gyros and accelerometers, of which one that does
+    not walk beside one that does is given so little that it does not matter."""
+    white = np.array([noise.angle_random_walk, noise.velocity_random_walk])
+    walks = np.array([noise.gyro_walk, noise.accelerometer_walk])
+    return np.square(np.concatenate([white, np.maximum(walks, 1e-5 * white)]))
+
+
+def _empty_shot(count: int, m: int) -> Shot:
+    """Room for a solution of so many intervals with ``m`` errors each."""
+    return Shot(
+        np.empty((count, 4)),
+        np.empty((count, 3)),
+        np.empty((count, m, m)),
+        np.empty((count, 6, SIZE)),
+        np.empty((count, m, m)),
+    )
+
+
+def fit(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
+    """Fit the model to a recording with nodes in its rests."""
+    noise, m = settings.noise, 12 if settings.noise.walks else 6
+    variances = _variances(noise)
+    deviations = settings.deviations()
+    free = free_places(settings.terms, settings.gravity_u > 0.0, settings.site.latitude_u > 0.0)
+    prior, c = deviations[free], np.zeros(SIZE)
+    motion = freed(samples, c)
+    begin = beginning(motion, nodes, settings)
+    q = carried_through(motion, nodes, begin)
+    count = len(nodes.sample)
+    v, shot = np.zeros((count, 3)), _empty_shot(count - 1, m)
+    reference = q[np.unique(nodes.rest, return_index=True)[1]][nodes.rest]
+    n = 2 * m + 3 + len(free)
+    H, g = np.empty((n, n)), np.empty(n)
+    rows, right = np.empty((count, m + 3, n)), np.empty((count, m + 3))
+    x, angles = np.empty((count, m)), np.empty((count, 3))
+    held = settings.rests.attitude
+    passes, converged = 0, False
+    while True:
+        world, by = world_of(settings, c, samples.ts), gains(c)
+        shoot(motion, nodes.cuts, nodes.first, q[:-1], v[:-1], by, world, variances, shot)
+        e = np.zeros((count - 1, m))
+        e[:, :3], e[:, 3:6] = log(multiply(shot.q, conjugate(q[1:]))), shot.v - v[1:]
+        chain = Chain(
+            shot.F,
+            _wide(shot.G[:, :, free], m),
+            e,
+            np.linalg.inv(shot.Q),
+            nodes.rest,
+            v,
+            settings.rests.velocity**-2,
+            log(multiply(q, conjugate(reference))),
+            0.0 if held is None else held**-2,
+            _start_information(begin, variances, m),
+            np.concatenate([log(multiply(q[0], conjugate(begin.q_nb))), np.zeros(m - 3)]),
+            prior**-2,
+            c[free].copy(),
+        )
+        forward(chain, H, g, rows, right)
+        information = np.triu(H[-len(free) :, -len(free) :])
+        covariance = _inverse(information + np.triu(information, 1).T, prior)
+        step = covariance @ g[-len(free) :]
+        backward(nodes.rest, rows, right, step, x, angles)
+        passes += 1
+        size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
+        if size < LIMITS.step or passes >= LIMITS.iterations or not np.isfinite(size):
+            converged = size < LIMITS.step
+            break
+        c[free] += step
+        q, v = multiply(exp(x[:, :3]), q), v + x[:, 3:6]
+        reference = multiply(exp(angles), reference) if held is not None else reference
+        motion = freed(samples, c)
+    c[free] += step
+    chi2, squares = _chi2(chain, step, x, angles)
+    dof = 3 * count - 3 + (0 if held is None else 3 * (count - len(np.unique(nodes.rest))))
+    q, v = multiply(exp(x[:, :3]), q), v + x[:, 3:6]
+    return Fit(c, free, covariance, prior, q, v, nodes, chi2, dof, squares, passes, converged)
+
+
+def _wide(G: Array, m: int) -> Array:
+    """Derivatives (k, 6, p) with rows of zeros for biases that walk."""
+    return np.ascontiguousarray(np.pad(G, ((0, 0), (0, m - 6), (0, 0))))
+
+
+def _start_information(begin: Beginning, variances: Array, m: int) -> Array:
+    """Information (m,) of the state of the first node: of its attitude, none of its velocity; biases do not deviate
+    there."""
+    held = 1e6 / np.repeat(variances[2:], 3)
+    return np.concatenate([begin.u**-2, np.zeros(3), held])[:m]
+
+
+def _inverse(information: Array, prior: Array) -> Array:
+    """Inverse (p, p) of an information matrix, by Cholesky in units of the prior."""
+    scaled = information * np.outer(prior, prior)
+    root = np.linalg.inv(np.linalg.cholesky(scaled))
+    return np.asarray(root.T @ root * np.outer(prior, prior))
+
+
+def _chi2(chain: Chain, step: Array, x: Array, angles: Array) -> tuple[float, Array]:
+    """Sum of squares at the solution, and its parts (k,) by interval."""
+    left = chain.e + np.einsum("kij,kj->ki", chain.F, x[:-1]) + chain.G @ step - x[1:]
+    squares = np.einsum("ki,kij,kj->k", left, chain.W, left)
+    velocity = chain.velocity * np.sum((chain.v + x[:, 3:6]) ** 2)
+    attitude = chain.attitude * np.sum((chain.angles + x[:, :3] - angles) ** 2)
+    begin = np.sum(chain.start * (chain.begin + x[0]) ** 2)
+    prior = np.sum(chain.prior * (chain.c + step) ** 2)
+    return float(squares.sum() + velocity + attitude + begin + prior), np.asarray(squares)
