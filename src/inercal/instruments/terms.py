@@ -46,7 +46,7 @@ _ON_A_TABLE = (
     *(
         Term(
             f"r_{i}{j}",
-            f"lever arm: place of accelerometer {i} along {j} beside the crossing of the axes",
+            f"lever arm: place of accelerometer {i} along {j} from the origin of b",
             "m",
         )
         for i in _AXES

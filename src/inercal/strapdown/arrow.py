@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.arrays import Array
@@ -19,8 +20,8 @@ class Chain(NamedTuple):
     """The rows of a chain, linearised: x_k+1 - F x_k - G c = e + noise of information W, and at the nodes.
 
     ``F`` (k, m, m), ``G`` (k, m, p), ``e`` (k, m), ``W`` (k, m, m) of intervals; ``rest`` (k + 1,) number of the rest
-    of each node; velocity ``v`` (k + 1, 3), which is 0 with information ``velocity``; ``angles`` (k + 1, 3) [rad] of the
-    attitude against the reference of its rest with information ``attitude``, 0 for none; ``start`` (m,) information
+    of each node; velocity ``v`` (k + 1, 3), which is 0 with information ``velocity``; ``angles`` (k + 1, 3) [rad] of
+    the attitude against the reference of its rest with information ``attitude``, 0 for none; ``start`` (m,) information
     and ``begin`` (m,) deviation of the first node; ``prior`` (p,) information and ``c`` (p,) deviation of coefficients.
     """
 
@@ -28,7 +29,7 @@ class Chain(NamedTuple):
     G: Array
     e: Array
     W: Array
-    rest: Array
+    rest: NDArray[np.int64]
     v: Array
     velocity: float
     angles: Array
@@ -168,7 +169,7 @@ def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None
 
 
 @kernel
-def backward(rest: Array, rows: Array, right: Array, c: Array, x: Array, angles: Array) -> None:
+def backward(rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Array, angles: Array) -> None:
     """Errors ``x`` (k + 1, m) of the nodes, and ``angles`` (k + 1, 3) of the references, of those of the coefficients
     ``c`` (p,)."""
     m = x.shape[1]
@@ -194,3 +195,63 @@ def backward(rest: Array, rows: Array, right: Array, c: Array, x: Array, angles:
             x[k, i] = z[i]
         for i in range(3):
             angles[k, i] = z[m + i]
+
+
+@kernel
+def completed(row: Array, i: int, Z: Array) -> None:
+    """Covariances ``Z`` (n, n) of unknown i with those behind it, of its ``row`` (n,) at elimination."""
+    n = len(row)
+    for j in range(i + 1, n):
+        total = 0.0
+        for k in range(i + 1, n):
+            total -= row[k] * Z[k, j]
+        Z[i, j] = Z[j, i] = total / row[i]
+    total = 1.0
+    for k in range(i + 1, n):
+        total -= row[k] * Z[i, k]
+    Z[i, i] = total / row[i]
+
+
+@kernel
+def explained(chain: Chain, k: int, m: int, Z: Array, row: Array) -> float:
+    """Part of the m rows of interval k that the unknowns of covariance ``Z`` (n, n) follow: the trace of W A Z A^T."""
+    n, total = len(Z), 0.0
+    for b in range(m):
+        for j in range(n):
+            # column j of A Z, row b
+            value = Z[m + 3 + b, j]
+            for i in range(m):
+                value -= chain.F[k, b, i] * Z[i, j]
+            for i in range(n - 2 * m - 3):
+                value -= chain.G[k, b, i] * Z[2 * m + 3 + i, j]
+            row[j] = value
+        for a in range(m):
+            value = row[m + 3 + a]
+            for i in range(m):
+                value -= chain.F[k, a, i] * row[i]
+            for i in range(n - 2 * m - 3):
+                value -= chain.G[k, a, i] * row[2 * m + 3 + i]
+            total += chain.W[k, a, b] * value
+    return total
+
+
+@kernel
+def followed(chain: Chain, rows: Array, Z: Array, out: Array) -> None:
+    """Numbers ``out`` (k,) of degrees of freedom of each interval that the solution follows; ``Z`` (n, n) begins with
+    the covariance (p, p) of the coefficients at its end and zeros before."""
+    m, n = chain.F.shape[1], len(Z)
+    row = np.zeros(n)
+    for k in range(len(chain.rest) - 1, -1, -1):
+        last = k == len(chain.rest) - 1
+        ends = last or chain.rest[k + 1] != chain.rest[k]
+        first = m + 2 if ends and chain.attitude > 0.0 else m - 1
+        for i in range(first, -1, -1):
+            completed(rows[k, i], i, Z)
+        if not last:
+            out[k] = explained(chain, k, m, Z, row)
+        for i in range(m):
+            for j in range(m, n):
+                if j < m + 3 or j >= 2 * m + 3:
+                    Z[m + 3 + i, j] = Z[j, m + 3 + i] = Z[i, j]
+            for j in range(m):
+                Z[m + 3 + i, m + 3 + j] = Z[i, j]

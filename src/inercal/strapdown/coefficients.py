@@ -99,7 +99,9 @@ def group_of(name: str) -> str:
     }[symbol]  # fmt: skip
 
 
-def stated(c: Array, terms: tuple[str, ...], frame: Frame, outputs: tuple[float, float] = (1.0, 1.0)) -> Array:
+def stated(
+    c: Array, terms: tuple[str, ...], frame: Frame, outputs: tuple[float, float] = (1.0, 1.0)
+) -> Array:
     """Values of `names` for an array (51,).
 
     ``outputs`` are the units of accelerometers and gyros in SI: K0, K1, D_F, S and G are in these.
@@ -129,6 +131,31 @@ def _turn_to_lower(ka: Array) -> Array:
     b of the frame ``lower`` in components of ``upper``."""
     q, r = np.linalg.qr(ka.T)
     return np.asarray(q * np.sign(np.diag(r)))
+
+
+def array_of(values: Mapping[str, float], frame: Frame) -> Array:
+    """The array (51,) of coefficients by symbol, in SI; those of a perfect unit where there is none: the inverse of
+    `stated`."""
+    from scipy.linalg import rq
+
+    c, of = np.zeros(SIZE), values.get
+    k1, s = ([of(f"{symbol}_{i}", 1.0) for i in "xyz"] for symbol in ("K1", "S"))
+    own, other = (
+        [of(f"{symbol}_{pair}", float(pair[0] == pair[1])) for pair in _PAIRS] for symbol in ("M", "T")
+    )
+    ka, kg = (
+        np.reshape(matrix, (3, 3)) * np.reshape(size, (3, 1)) for matrix, size in ((own, k1), (other, s))
+    )
+    r, g = (np.reshape([of(f"{symbol}_{pair}", 0.0) for pair in _PAIRS], (3, 3)) for symbol in ("r", "G"))
+    if frame == "lower":
+        _, turned = rq(ka)
+        turn = turned.T * np.sign(np.diag(ka @ turned.T))
+        ka, kg, r, g = ka @ turn, kg @ turn, r @ turn, g @ turn
+    c[KA], c[KG], c[R], c[G] = (x.ravel() for x in (ka - np.eye(3), kg - np.eye(3), r, g))
+    for places, symbol in ((D, "D_F"), (K0, "K0"), (K2, "K2"), (A, "S_asym")):
+        c[places] = [of(f"{symbol}_{i}", 0.0) for i in "xyz"]
+    c[K2], c[A], c[TAU] = c[K2] * k1, 0.5 * c[A] * s, of("tau_a", 0.0)
+    return c
 
 
 def slope(function: Callable[[Array], Array], c: Array, step: float = 1e-5) -> Array:

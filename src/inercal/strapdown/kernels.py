@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.arrays import Array
@@ -22,6 +23,8 @@ from inercal.strapdown.coefficients import SIZE
 
 SUMS = 27
 """Sums over a block: w (3), |w| (3), f (3), fs (3), fs^2 (3), W (9), w x f (3), each times the interval."""
+
+Whole: TypeAlias = NDArray[np.int64]
 
 Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -71,8 +74,16 @@ def cross(a: Vector, b: Vector) -> Vector:
 def lever(w: Vector | Array, wd: Vector | Array, ts: float) -> Nine:
     """Mean W over a sample, by rows, of the mean rate and its derivative."""
     s = ts * ts / 12.0  # the rate changes within a sample
-    xx, yy, zz = w[0] * w[0] + s * wd[0] * wd[0], w[1] * w[1] + s * wd[1] * wd[1], w[2] * w[2] + s * wd[2] * wd[2]
-    xy, xz, yz = w[0] * w[1] + s * wd[0] * wd[1], w[0] * w[2] + s * wd[0] * wd[2], w[1] * w[2] + s * wd[1] * wd[2]
+    xx, yy, zz = (
+        w[0] * w[0] + s * wd[0] * wd[0],
+        w[1] * w[1] + s * wd[1] * wd[1],
+        w[2] * w[2] + s * wd[2] * wd[2],
+    )
+    xy, xz, yz = (
+        w[0] * w[1] + s * wd[0] * wd[1],
+        w[0] * w[2] + s * wd[0] * wd[2],
+        w[1] * w[2] + s * wd[1] * wd[2],
+    )
     return (
         -yy - zz, xy - wd[2], xz + wd[1],
         xy + wd[2], -xx - zz, yz - wd[0],
@@ -118,9 +129,7 @@ def force_at_origin(w: Array, fs: Array, c: Gains, ts: float, wd: Array, f: Arra
             wd[k, i] = (8.0 * (w[d, i] - w[b, i]) - (w[e, i] - w[a, i])) / (12.0 * ts)
         m = lever(w[k], wd[k], ts)
         for i in range(3):
-            f[k, i] = fs[k, i] - (
-                m[3 * i] * c.r[i, 0] + m[3 * i + 1] * c.r[i, 1] + m[3 * i + 2] * c.r[i, 2]
-            )
+            f[k, i] = fs[k, i] - (m[3 * i] * c.r[i, 0] + m[3 * i + 1] * c.r[i, 1] + m[3 * i + 2] * c.r[i, 2])
 
 
 @kernel
@@ -166,7 +175,24 @@ def matrix(q: Quaternion, C: Array) -> None:
 
 
 @kernel
-def carried(q: Quaternion, v: Vector, turn: Array, gain: Array, world: World) -> tuple[Quaternion, Vector]:
+def applied(M: Array, x: Array, at: int) -> Vector:
+    """M (3, 3) times the three numbers of x that begin ``at``."""
+    u, v, w = x[at], x[at + 1], x[at + 2]
+    return (
+        M[0, 0] * u + M[0, 1] * v + M[0, 2] * w,
+        M[1, 0] * u + M[1, 1] * v + M[1, 2] * w,
+        M[2, 0] * u + M[2, 1] * v + M[2, 2] * w,
+    )
+
+
+@kernel
+def without(x: Array, bias: Vector, ts: float) -> Vector:
+    """An increment without what a bias adds to it."""
+    return x[0] - bias[0] * ts, x[1] - bias[1] * ts, x[2] - bias[2] * ts
+
+
+@kernel
+def carried(q: Quaternion, v: Vector, turn: Vector, gain: Vector, world: World) -> tuple[Quaternion, Vector]:
     """Attitude and velocity after a sample."""
     ts = world.ts
     e = (world.earth[0] * ts, world.earth[1] * ts, world.earth[2] * ts)
@@ -177,7 +203,7 @@ def carried(q: Quaternion, v: Vector, turn: Array, gain: Array, world: World) ->
 
 
 @kernel
-def turned(turn: Array, sample: Array, q: Array) -> None:
+def turned(turn: Array, sample: Whole, q: Array) -> None:
     """Rotations ``q`` (k, 4) from each node to the next, of the rotation vectors ``turn`` (n, 3) of samples."""
     for node in range(len(sample) - 1):
         of = (1.0, 0.0, 0.0, 0.0)
@@ -304,6 +330,15 @@ def spread(F: Array, Q: Array, out: Array) -> None:
     product(F, Q, out)
 
 
+class State(NamedTuple):
+    """A solution at the nodes: attitude ``q`` (k, 4) C_nb, velocity ``v`` (k, 3), and ``bias`` (k, 6), the deviation of
+    the biases of gyros and accelerometers [output] from those of the coefficients."""
+
+    q: Array
+    v: Array
+    bias: Array
+
+
 class Shot(NamedTuple):
     """A solution carried from each node to the next: attitude ``q`` (k, 4) and velocity ``v`` (k, 3) there, transition
     ``F`` (k, m, m) of errors, their derivatives ``G`` (k, 6, 51) by coefficients, and the covariance ``Q`` (k, m, m) of
@@ -318,9 +353,9 @@ class Shot(NamedTuple):
 
 @kernel
 def shoot(
-    motion: Motion, cuts: Array, first: Array, q0: Array, v0: Array, c: Gains, world: World, noise: Array, shot: Shot
+    motion: Motion, cuts: Whole, first: Whole, state: State, c: Gains, world: World, noise: Array, shot: Shot
 ) -> None:
-    """Carry the solution from each node, at attitude ``q0`` (k, 4) and velocity ``v0`` (k, 3), to the next.
+    """Carry the solution from the ``state`` at each node to the next.
 
     ``cuts`` are the samples at which blocks begin, and ``first`` (k + 1,) the block that begins at each node.
     """
@@ -328,8 +363,9 @@ def shoot(
     C, F, square = np.empty((3, 3)), np.empty((m, m)), np.empty((6, m))
     S, wide, sums = np.empty((6, SIZE)), np.empty((6, SIZE)), np.empty(SUMS)
     for node in range(len(first) - 1):
-        q = (q0[node, 0], q0[node, 1], q0[node, 2], q0[node, 3])
-        v = (v0[node, 0], v0[node, 1], v0[node, 2])
+        q = (state.q[node, 0], state.q[node, 1], state.q[node, 2], state.q[node, 3])
+        v = (state.v[node, 0], state.v[node, 1], state.v[node, 2])
+        drift, bias = applied(c.gyro, state.bias[node], 0), applied(c.accelerometer, state.bias[node], 3)
         Phi, G, Q = shot.F[node], shot.G[node], shot.Q[node]
         Phi[:], G[:], Q[:] = 0.0, 0.0, 0.0
         for i in range(m):
@@ -339,7 +375,8 @@ def shoot(
             before, dt = q, (cuts[block + 1] - cuts[block]) * world.ts
             for k in range(cuts[block], cuts[block + 1]):
                 add_sample(motion, k, world.ts, sums)
-                q, v = carried(q, v, motion.turn[k], motion.gain[k], world)
+                turn, gain = without(motion.turn[k], drift, world.ts), without(motion.gain[k], bias, world.ts)
+                q, v = carried(q, v, turn, gain, world)
             middle = normalize((before[0] + q[0], before[1] + q[1], before[2] + q[2], before[3] + q[3]))
             matrix(middle, C)
             sources(C, sums, dt, c, world.earth[1], world.earth[2], S)

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 class Limits:
     """Thresholds, in SI where nothing else is said."""
 
+    uneven: float = 0.5
+    """Part of the sample interval by which a step of time may differ from it."""
+
     window: float = 0.5
     """Window [s] in which rate and force must be still at a rest."""
 
@@ -50,7 +53,10 @@ class Limits:
     step: float = 0.02
     """Largest step, over the standard uncertainties of the coefficients, at which the iteration ends."""
 
-    iterations: int = 20
+    near: float = 30.0
+    """Length of a step, over the standard uncertainties, from which on steps that follow each other are summed."""
+
+    iterations: int = 30
     """Steps at most."""
 
     risk: float = 1e-4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,7 +43,9 @@ def _moving(x: Array, window: int) -> tuple[Array, Array]:
     """Mean (n, 3) and standard deviation (n,), its three axes together, in a window about each sample."""
     middle = np.median(x, axis=0)
     padded = np.pad(x - middle, ((window // 2, window - 1 - window // 2), (0, 0)), mode="edge")
-    sums, squares = (np.concatenate([np.zeros((1, 3)), np.cumsum(each, axis=0)]) for each in (padded, padded**2))
+    sums, squares = (
+        np.concatenate([np.zeros((1, 3)), np.cumsum(each, axis=0)]) for each in (padded, padded**2)
+    )
     mean = (sums[window:] - sums[:-window]) / window
     variance = (squares[window:] - squares[:-window]) / window - mean**2
     return mean + middle, np.sqrt(np.maximum(variance.sum(axis=1), 0.0))
@@ -93,7 +96,7 @@ def nodes_of(samples: Samples, rests: tuple[Dwell, ...], every: float) -> Nodes:
         rest += [number] * (pieces + 1)
     size = np.linalg.norm(samples.rate, axis=1) * samples.ts + 1e-12
     cuts, first = list[int](), list[int]()
-    for begin, end in zip(sample[:-1], sample[1:], strict=True):
+    for begin, end in itertools.pairwise(sample):
         first.append(len(cuts))
         length = int(np.clip(LIMITS.block_angle / size[begin:end].max(), 1, LIMITS.block_samples))
         cuts += range(begin, end, length)

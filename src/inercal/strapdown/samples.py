@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from inercal.arrays import Array, short_repr
-from inercal.strapdown.coefficients import KA, KG, TAU, A, D, G, K0, K2, R
+from inercal.strapdown.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
 from inercal.strapdown.kernels import Gains, Motion, force_at_origin, increments, true_force, true_rate
 
 
@@ -74,8 +74,8 @@ def delayed(x: Array, samples: float) -> Array:
 def gains(c: Array) -> Gains:
     """An array of coefficients (51,) as kernels take it."""
     return Gains(
-        np.linalg.inv(np.eye(3) + c[KG].reshape(3, 3)),
-        np.linalg.inv(np.eye(3) + c[KA].reshape(3, 3)),
+        np.asarray(np.linalg.inv(np.eye(3) + c[KG].reshape(3, 3)), dtype=float),
+        np.asarray(np.linalg.inv(np.eye(3) + c[KA].reshape(3, 3)), dtype=float),
         c[D].copy(),
         c[A].copy(),
         np.ascontiguousarray(c[G].reshape(3, 3)),

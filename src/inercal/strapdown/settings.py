@@ -11,7 +11,18 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
-from inercal.keys import DEVIATION, FREQUENCY, RELATIVE_U, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
+from inercal.keys import (
+    DEVIATION,
+    FREQUENCY,
+    RELATIVE_U,
+    REQUIRED,
+    TIME,
+    Bounds,
+    above_zero,
+    option,
+    quantity,
+    within,
+)
 from inercal.strapdown.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, Frame
 from inercal.units import Quantity
 
@@ -102,8 +113,10 @@ class Prior:
 
 @dataclass(frozen=True)
 class Start:
-    """Attitude at the first rest: its ``heading`` [rad] with standard uncertainty, None for the gyrocompass."""
+    """Attitude at the first rest: its ``heading`` [rad] with standard uncertainty; where it is None by the gyrocompass
+    or not, None as the prior of the gyro bias has it."""
 
+    compass: bool | None = None
     heading: float | None = None
     heading_u: float = math.radians(100.0)
 
@@ -134,8 +147,8 @@ class Motion:
 class StrapdownSettings:
     """A study of a strapdown unit, in SI.
 
-    ``site`` has a latitude; ``traceability``, ``temperature``, ``given`` as in
-    `inercal.imu.settings.ImuSettings`.
+    ``site`` has a latitude; ``truth`` are coefficients of a simulation [SI] by symbol, those of a perfect unit where it
+    has none; ``traceability``, ``temperature``, ``given`` as in `inercal.imu.settings.ImuSettings`.
     """
 
     site: Site
@@ -169,7 +182,9 @@ class StrapdownSettings:
     @property
     def gravity_u(self) -> float:
         """Standard uncertainty of gravity [m/s^2], without what latitude does to it."""
-        return math.hypot(*(each.u * each.sensitivity for each in self.site.inputs if each.source != "latitude"))
+        return math.hypot(
+            *(each.u * each.sensitivity for each in self.site.inputs if each.source != "latitude")
+        )
 
     def deviations(self) -> Array:
         """Prior standard deviations (51,) of the array of coefficients."""

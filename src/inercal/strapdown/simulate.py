@@ -8,19 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.rotations import elementary
+from inercal.geometry.rotations import Axis, elementary
 from inercal.records.record import Record, record_of
-from inercal.strapdown.coefficients import KA, KG, TAU, A, D, G, K0, K2, R, free_places
+from inercal.strapdown.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
 from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import Motion, Noise, Plan, StrapdownSettings
 from inercal.units import parse_unit
+
+_AXES: Final[tuple[Axis, Axis, Axis]] = ("x", "y", "z")
+_ORDER: Final[tuple[Axis, Axis, Axis]] = ("z", "x", "y")
 
 _POINTS, _WEIGHTS = (each / 2.0 for each in np.polynomial.legendre.leggauss(5))
 """Places within a sample, from its middle in its length, and their weights."""
@@ -28,8 +31,8 @@ _POINTS, _WEIGHTS = (each / 2.0 for each in np.polynomial.legendre.leggauss(5))
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What the sensors meet at times (n,): rate ``w`` and its derivative ``wd`` in b, specific force ``f`` of the origin
-    in b, all (n, 3), and the attitude ``C_nb`` (n, 3, 3)."""
+    """Motion that the sensors meet at times (n,): rate ``w`` and its derivative ``wd`` in b, specific force ``f`` of
+    the origin in b, all (n, 3), and the attitude ``C_nb`` (n, 3, 3)."""
 
     w: Array
     wd: Array
@@ -55,7 +58,7 @@ def _turns(plan: Plan, motion: Motion, rng: np.random.Generator) -> Iterator[_Tu
         time = plan.turn_time * abs(angle) / (0.5 * np.pi)
         direction = rng.standard_normal(3)
         yield _Turn(begin, time, C, axis, angle, motion.translation * direction / np.linalg.norm(direction))
-        C = C @ elementary("xyz"[axis], angle)
+        C = np.asarray(C @ elementary(_AXES[axis], angle))
         begin += time + plan.dwell
 
 
@@ -63,7 +66,7 @@ def start_attitude(plan: Plan) -> Array:
     """C_nb (3, 3) of the first rest: from x east, y north, z up turned about z by yaw, then x by pitch, then y by
     roll."""
     pitch, roll, yaw = plan.start
-    z, x, y = (elementary(axis, angle) for axis, angle in (("z", yaw), ("x", pitch), ("y", roll)))
+    z, x, y = (elementary(axis, angle) for axis, angle in zip(_ORDER, (yaw, pitch, roll), strict=True))
     return np.asarray(z @ x @ y)
 
 
@@ -79,7 +82,7 @@ def _bump(s: Array, size: float, rate: float, time: float) -> tuple[Array, Array
 
 
 def truth(turn: _Turn, t: Array, motion: Motion, earth: Array, gravity: float) -> Truth:
-    """What the sensors meet at times (n,) within a turn, or before or after it."""
+    """Motion that the sensors meet at times (n,) within a turn, or before or after it."""
     s = np.clip((t - turn.begin) / turn.time, 0.0, 1.0)
     two_pi = 2.0 * np.pi
     smooth = s - np.sin(two_pi * s) / two_pi, 1.0 - np.cos(two_pi * s), two_pi * np.sin(two_pi * s)
@@ -93,7 +96,7 @@ def truth(turn: _Turn, t: Array, motion: Motion, earth: Array, gravity: float) -
     C = np.broadcast_to(turn.C_nb, (len(t), 3, 3))
     w, wd = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for axis, (angle, first, second) in zip([turn.axis, *others], [main, *swings], strict=True):
-        step, unit = elementary("xyz"[axis], angle), np.eye(3)[axis]
+        step, unit = elementary(_AXES[axis], angle), np.eye(3)[axis]
         w, wd = np.einsum("nji,nj->ni", step, w), np.einsum("nji,nj->ni", step, wd)
         wd = wd - np.cross(first[:, None] * unit, w) + second[:, None] * unit
         w = w + first[:, None] * unit
@@ -133,9 +136,7 @@ def _means(turn: _Turn, stamps: Array, settings: StrapdownSettings, c: Array, ts
         turning = np.cross(wd[:, None], r) + np.cross(w[:, None], np.cross(w[:, None], r))
         fs = at_acc.f + np.einsum("nii->ni", turning)
         each = _Means(at_gyro.w, np.abs(at_gyro.w), at_gyro.f, fs, fs**2, at_gyro.C_nb)
-        total = [
-            weight * x + (0.0 if total is None else total[k]) for k, x in enumerate(each)
-        ]
+        total = [weight * x + (0.0 if total is None else total[k]) for k, x in enumerate(each)]
     assert total is not None
     return _Means(*total)
 
@@ -145,22 +146,28 @@ def simulated(settings: StrapdownSettings, c: Array, rng: np.random.Generator, n
     stand as the study states it, or none."""
     plan = settings.plan
     if plan is None:
-        raise StudyError("plan", "missing, expected turns, such as turns = [[\"y\", \"90 deg\"], [\"z\", \"90 deg\"]]")
+        raise StudyError(
+            "plan", 'missing, expected turns, such as turns = [["y", "90 deg"], ["z", "90 deg"]]'
+        )
     ts, turns = 1.0 / plan.sample_rate, list(_turns(plan, settings.motion, rng))
     last = turns[-1]
     count = round((last.begin + last.time + plan.dwell) / ts)
-    stamps = ts * np.arange(1, count + 1)
+    stamps = ts * np.arange(1.0, count + 1.0)
     edges = [0] + [round((each.begin - 0.5 * plan.dwell) / ts) for each in turns[1:]] + [count]
     parts = list[_Means]()
     for turn, first, end in zip(turns, edges[:-1], edges[1:], strict=True):
-        begin, done = (round(each / ts) for each in (turn.begin - abs(c[TAU]), turn.begin + turn.time + abs(c[TAU])))
+        begin, done = (
+            round(each / ts) for each in (turn.begin - abs(c[TAU]), turn.begin + turn.time + abs(c[TAU]))
+        )
         for low, high in ((first, begin - 1), (begin - 1, done + 2), (done + 2, end)):
             # nothing changes before and after the turn
             at = stamps[low:high] if low == begin - 1 else stamps[low : low + 1]
             means = _means(turn, at, settings, c, ts)
             parts.append(_Means(*(np.resize(each, (high - low, *each.shape[1:])) for each in means)))
     mean = _Means(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-    rate = mean.w @ (np.eye(3) + c[KG].reshape(3, 3)).T + c[A] * mean.size + mean.f @ c[G].reshape(3, 3).T + c[D]
+    rate = (
+        mean.w @ (np.eye(3) + c[KG].reshape(3, 3)).T + c[A] * mean.size + mean.f @ c[G].reshape(3, 3).T + c[D]
+    )
     force = mean.fs @ (np.eye(3) + c[KA].reshape(3, 3)).T + c[K2] * mean.square + c[K0]
     if noise:
         sway, shake = _disturbed(mean, settings, rng, ts)
@@ -169,7 +176,9 @@ def simulated(settings: StrapdownSettings, c: Array, rng: np.random.Generator, n
     return Samples(rate, force, ts)
 
 
-def _sensor_noise(noise: Noise, count: int, rng: np.random.Generator, ts: float) -> tuple[list[Array], list[Array]]:
+def _sensor_noise(
+    noise: Noise, count: int, rng: np.random.Generator, ts: float
+) -> tuple[list[Array], list[Array]]:
     """White noise and walks of biases of gyros and accelerometers, (count, 3) each."""
     densities = noise.angle_random_walk, noise.velocity_random_walk
     white = [rng.standard_normal((count, 3)) * density / np.sqrt(ts) for density in densities]
@@ -199,16 +208,9 @@ def _smooth(rng: np.random.Generator, count: int, ts: float) -> Array:
     return np.asarray(smoothed / np.linalg.norm(weights))
 
 
-def drawn(settings: StrapdownSettings, rng: np.random.Generator) -> Array:
-    """True coefficients (51,): as stated, and those that are not stated drawn from the prior."""
-    c, places = np.zeros(len(settings.deviations())), free_places(settings.terms, False, False)
-    c[places] = settings.deviations()[places] * rng.standard_normal(len(places))
-    return c
-
-
 def to_record(samples: Samples) -> Record:
     """The recording as a record: t, gyro_x..z [rad/s], acc_x..z [m/s^2]."""
     columns = []
     for sensor, unit, values in (("gyro", "rad/s", samples.rate), ("acc", "m/s^2", samples.force)):
         columns += [(f"{sensor}_{axis}", parse_unit(unit), values[:, k]) for k, axis in enumerate("xyz")]
-    return record_of(columns, samples.ts * np.arange(1, len(samples.rate) + 1))
+    return record_of(columns, samples.ts * np.arange(1.0, len(samples.rate) + 1.0))

@@ -24,15 +24,17 @@ class Beginning(NamedTuple):
 
 def beginning(motion: Motion, nodes: Nodes, settings: StrapdownSettings) -> Beginning:
     """Attitude of the first rest: level by gravity; its heading as stated, by earth rate where the gyros are good
-    enough for that, else 0."""
+    enough for that or the study says so, else 0."""
     last = nodes.sample[np.flatnonzero(nodes.rest == 0)[-1]]
     force, rate = (np.mean(x[nodes.sample[0] : last], axis=0) for x in (motion.f, motion.w))
     up = force / np.linalg.norm(force)
     start = settings.start
-    compass = start.heading is None and settings.prior.gyro_bias < EARTH_RATE * np.cos(settings.latitude)
+    compass = start.compass
+    if compass is None:
+        compass = start.heading is None and settings.prior.gyro_bias < EARTH_RATE * np.cos(settings.latitude)
     tilt = LIMITS.start_tilt
-    if compass:
-        east = np.cross(rate, up)
+    east = np.cross(rate, up)
+    if compass and np.linalg.norm(east) > 0.0:
         east /= np.linalg.norm(east)
         u = np.array([tilt, tilt, LIMITS.start_heading])
         return Beginning(from_matrix(np.stack([east, np.cross(up, east), up])), u)
