@@ -89,6 +89,7 @@ def assemble(
             'state it with its uncertainty, such as gravity = "9.79649(2) m/s^2"'
         )
         findings.append(Finding("stated_exact", text))
+    findings += _too_quiet(fit)
     turns, still = fit.nodes.turns, np.ones(len(fit.squares), dtype=bool)
     still[turns] = False
     statistics = {
@@ -191,6 +192,19 @@ def _conditions(record: Record, samples: Samples, settings: StrapdownSettings) -
         "rate_hz": 1.0 / samples.ts,
     }
     return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAMES[settings.frame])
+
+
+def _too_quiet(fit: Fit) -> list[Finding]:
+    """``low_scatter`` where the noise is stated too large, as of a simulation without any."""
+    from scipy.special import chdtri
+
+    if fit.chi2 >= chdtri(fit.dof, 1.0 - LIMITS.risk):
+        return []
+    text = (
+        f"chi-square {fit.chi2:.4g} is far below the {fit.dof} expected: the noise is stated too large, and so is every "
+        "u"
+    )
+    return [Finding("low_scatter", text)]
 
 
 def _verdict(

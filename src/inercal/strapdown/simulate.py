@@ -170,7 +170,7 @@ def simulated(settings: StrapdownSettings, c: Array, rng: np.random.Generator, n
     )
     force = mean.fs @ (np.eye(3) + c[KA].reshape(3, 3)).T + c[K2] * mean.square + c[K0]
     if noise:
-        sway, shake = _disturbed(mean, settings, rng, ts)
+        sway, shake = _disturbed(mean, settings, c[R].reshape(3, 3), rng, ts)
         white, walk = _sensor_noise(settings.noise, count, rng, ts)
         rate, force = rate + sway + white[0] + walk[0], force + shake + white[1] + walk[1]
     return Samples(rate, force, ts)
@@ -187,16 +187,20 @@ def _sensor_noise(
 
 
 def _disturbed(
-    mean: _Means, settings: StrapdownSettings, rng: np.random.Generator, ts: float
+    mean: _Means, settings: StrapdownSettings, r: Array, rng: np.random.Generator, ts: float
 ) -> tuple[Array, Array]:
-    """Rates and forces (n, 3) that the stand adds by vibration and, where the attitude within a rest is held, sway."""
+    """Rates and forces (n, 3) that the stand adds by vibration and, where the attitude within a rest is held, by sway,
+    which accelerometers at ``r`` (3, 3) feel, too."""
     count = len(mean.w)
     velocity = settings.rests.velocity * _smooth(rng, count + 1, ts)
     force = np.einsum("nji,nj->ni", mean.C_nb, np.diff(velocity, axis=0)) / ts
     if settings.rests.attitude is None:
         return np.zeros((count, 3)), force
-    angle = settings.rests.attitude * _smooth(rng, count + 1, ts)
-    return np.diff(angle, axis=0) / ts, force - np.cross(0.5 * (angle[1:] + angle[:-1]), mean.f)
+    angle = settings.rests.attitude * _smooth(rng, count + 3, ts)
+    sway = 0.5 * (angle[2:] - angle[:-2]) / ts  # at the stamps, and before the first sample
+    at_levers = np.einsum("nii->ni", np.cross((np.diff(sway, axis=0) / ts)[:, None], r))
+    angle = angle[1:-1]
+    return np.diff(angle, axis=0) / ts, force + at_levers - np.cross(0.5 * (angle[1:] + angle[:-1]), mean.f)
 
 
 def _smooth(rng: np.random.Generator, count: int, ts: float) -> Array:
