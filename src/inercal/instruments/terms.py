@@ -154,11 +154,12 @@ _SELF_CALIBRATION = (
             ("kg1", "gyro {} scale error", "1", _AXES),
             ("beta", "zero of the encoders: turn of their frame about {} of the base", "rad", _AXES),
             ("gamma", "turn of the sensors about {} of the platform, against the last gimbal", "rad", _AXES),
-            ("nonorth", "non-orthogonality of the joints {}: turn of the later axis", "rad", ("xy", "yz")),
             ("zero", "reading of the encoder {} at zero", "rad", "y"),
         )
         for i in ends
     ),
+    Term("nonorth_xy", "non-orthogonality of the joints: turn of axis y against axis x", "rad"),
+    Term("nonorth_yz", "non-orthogonality of the joints: turn of axis z against axis y", "rad"),
     Term("tau_enc", "delay of the encoders", "s"),
 )
 

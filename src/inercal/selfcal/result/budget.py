@@ -72,12 +72,12 @@ def considered(
             sources.append(TypeB(name, stated_u, UNIT_OF[name], slope))
             continue
         worst, kind = int(np.argmax(np.abs(slope) / u)), KIND_OF[name]
-        unit, size = shown_unit(UNIT_OF[name])
-        error = u[worst] / abs(slope[worst]) if slope[worst] else np.inf
         usual = parse_quantity(STATES[kind].prior, STATES[kind].dimension, kind).value
-        if error / usual < exact.get(kind, (np.inf, ""))[0]:
-            exact[kind] = error / usual, f"{error / size:.2g} {unit} of {name} ({of.names[worst]})"
-    return sources, {kind: text for kind, (ratio, text) in exact.items() if ratio < 1.0}
+        shift = abs(slope[worst]) * usual / u[worst]
+        if shift > exact.get(kind, (1.0, ""))[0]:
+            unit, size = shown_unit(UNIT_OF[name])
+            exact[kind] = shift, f"{usual / shift / size:.2g} {unit} of {name} ({of.names[worst]})"
+    return sources, {kind: text for kind, (_, text) in exact.items()}
 
 
 def systematic(

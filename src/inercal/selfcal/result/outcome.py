@@ -108,7 +108,7 @@ def assemble(
     of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site, *of_rig]
     uncertainty = combine(filtered.names, sources)
-    if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
+    if blurred := [each.source for each in (*of_site, *of_rig) if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
         return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
     if (unusable := singular(bounds.prior, uncertainty.covariance)) is not None:
