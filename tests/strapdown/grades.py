@@ -24,7 +24,9 @@ POSITIONS_19 = "y y y -y -y -y z x x x -x -x -x z z -z -z -z"
 
 def plan(text=POSITIONS_19, **times):
     """A plan of turns by 90 deg, with the start attitude of the path of 19 positions."""
-    turns = tuple(("xyz".index(turn[-1]), np.radians(-90.0 if turn[0] == "-" else 90.0)) for turn in text.split())
+    turns = tuple(
+        ("xyz".index(turn[-1]), np.radians(-90.0 if turn[0] == "-" else 90.0)) for turn in text.split()
+    )
     return Plan(turns, tuple(np.radians([0.0, -90.0, 0.0])), **times)
 
 
@@ -101,7 +103,9 @@ def drawn(settings, rng):
 def fitted(settings, c, rng, noise=True):
     """The fit of a simulated run of a unit with the coefficients ``c`` (51,)."""
     samples = simulated(settings, c, rng, noise)
-    return fit(samples, nodes_of(samples, found_rests(samples, settings.rests), settings.rests.node), settings)
+    return fit(
+        samples, nodes_of(samples, found_rests(samples, settings.rests), settings.rests.node), settings
+    )
 
 
 def u_by_kind(fit):
