@@ -109,8 +109,7 @@ def fitted(settings, c, rng, noise=True):
 
 
 def u_by_kind(fit):
-    """Largest u of each kind of coefficient, in the units of the specification: deg/h, ppm, urad, ug, ppm, urad, ug/g^2,
-    cm, ms."""
+    """Largest u of each kind of coefficient, in deg/h, ppm, urad, ug, ppm, urad, ug/g^2, cm, ms."""
     u = np.zeros(SIZE)
     u[fit.free] = np.sqrt(np.diag(fit.covariance))
     g = 9.80665

@@ -11,7 +11,7 @@ from inercal.strapdown.settings import Motion
 
 RISK = 1e-3
 
-#: largest u of each kind that the specification expects, within 15 %: deg/h, ppm, urad, ug, ppm, urad, ug/g^2, cm, ms
+#: largest u of each kind that another program has for the same tests, in the units of `u_by_kind`
 EXPECTED = {
     "nav": (0.0029, 0.55, 1.35, 0.83, 0.47, 1.2, 0.96, 0.036, 0.0031),
     "tactical": (0.155, 13.5, 27.0, 16.6, 4.7, 21.0, 17.5, 0.094, 0.019),
@@ -19,9 +19,9 @@ EXPECTED = {
 }
 
 
-def campaign(grade, runs, seed):
-    """Errors (runs, 31) over u, NEES (runs,), chi-square (runs,) and its degrees of freedom; the last fit."""
-    settings, errors, nees, squares, fit = GRADES[grade], [], [], [], None
+def campaign(settings, runs, seed):
+    """Errors (runs, 31) over u, NEES (runs,), chi-square (runs,); the last fit."""
+    errors, nees, squares, fit = [], [], [], None
     for number in range(runs):
         rng = np.random.default_rng([seed, number])
         c = drawn(settings, rng)
@@ -34,9 +34,9 @@ def campaign(grade, runs, seed):
     return np.array(errors), np.array(nees), np.array(squares), fit
 
 
-def judge(grade, runs, seed):
+def judge(settings, runs, seed):
     """Assert that errors, their squares and chi-square are as stated, within limits for ``runs``."""
-    z, nees, squares, fit = campaign(grade, runs, seed)
+    z, nees, squares, fit = campaign(settings, runs, seed)
     p, sigmas = z.shape[1], norm.isf(RISK / 2.0)
     assert abs(nees.mean() - p) < sigmas * np.sqrt(2.0 * p / runs)
     low, high = chi2.ppf([RISK / (2.0 * p), 1.0 - RISK / (2.0 * p)], runs)
@@ -48,28 +48,28 @@ def judge(grade, runs, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("grade", GRADES)
 def test_errors_are_as_large_as_stated(grade):
-    judge(grade, 20, 20261123)
+    settings = GRADES[grade]
+    judge(replace(settings, plan=replace(settings.plan, sample_rate=50.0)), 20, 20261123)
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("grade", GRADES)
 def test_errors_are_as_large_as_stated_in_a_hundred_runs(grade):
-    z, fit = judge(grade, 100, 21)
+    z, _ = judge(GRADES[grade], 100, 21)
     assert 0.935 < np.mean(np.abs(z) < norm.isf(0.025)) < 0.965
     lengths = np.sum(z**2, axis=0) / len(z)
     assert 0.95 < np.exp(0.5 * np.mean(np.log(lengths))) < 1.05
     assert np.all((np.sqrt(lengths) > 0.65) & (np.sqrt(lengths) < 1.35))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("grade", GRADES)
 def test_uncertainties_are_those_expected_of_the_grade(grade):
+    """Those of another program; that turned at an even rate, which tells places of accelerometers less well."""
     found = u_by_kind(fitted(GRADES[grade], np.zeros(51), np.random.default_rng(5)))
-    ratio = dict(zip(found, np.array(list(found.values())) / EXPECTED[grade], strict=True))
-    print(ratio)
+    for (kind, u), expected in zip(found.items(), EXPECTED[grade], strict=True):
+        assert 0.8 < u / expected < 1.2, kind
 
 
-@pytest.mark.slow
 def test_without_noise_only_the_integration_is_left():
     settings = replace(NAV, motion=Motion(np.radians(3.0), 1.5, 0.3))
     rng = np.random.default_rng(1)

@@ -77,8 +77,18 @@ def _empty_shot(count: int, m: int) -> Shot:
     )
 
 
-def fit(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
-    """Fit the model to a recording with nodes in its rests."""
+def fit(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit | None:
+    """Fit the model to a recording with nodes in its rests; None where the solution runs off to no numbers."""
+    with np.errstate(all="ignore"):
+        try:
+            found = _fitted(samples, nodes, settings)
+        except np.linalg.LinAlgError:
+            return None
+    return found if np.isfinite(found.chi2) and np.isfinite(found.covariance).all() else None
+
+
+def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
+    """The fit; raises `numpy.linalg.LinAlgError` where a matrix is singular or no matrix of numbers."""
     noise, m = settings.noise, 12 if settings.noise.walks else 6
     variances = _variances(noise)
     deviations = settings.deviations()

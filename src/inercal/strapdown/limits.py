@@ -38,6 +38,9 @@ class Limits:
     fewest_rests: int = 5
     """Rests at least."""
 
+    off_gravity: float = 0.5
+    """Part of gravity by which the size of the force at rest may differ from it: beyond, units are wrong."""
+
     block_samples: int = 10
     """Samples at most in a block over which sensitivities are taken at once."""
 

@@ -114,12 +114,27 @@ def assemble(
             "estimator": "batch",
             "passes": fit.passes,
             "frame": settings.frame,
+            "unit": {sensor: record[f"{sensor}_x"].unit.symbol for sensor in ("acc", "gyro")},
             "rests": _times(rests, samples),
             "turns": _turns(fit),
             "bounds": dict(zip(found, by_fit.tolist(), strict=True)),
             "at_prior": at_prior,
             "nuisances": _nuisances(fit),
         },
+    )
+
+
+def useless(
+    record: Record, samples: Samples, rests: tuple[Dwell, ...], settings: StrapdownSettings, force: float
+) -> Estimate:
+    """The estimate of a recording that no solution fits; ``force`` [m/s^2] is the size read at rest."""
+    text = (
+        f"no solution was found; at rest the accelerometers read {force:.3g} m/s^2, expected about "
+        f"{settings.site.gravity:.3g}: check units, signs and the order of axes"
+    )
+    result = {"estimator": "batch", "rests": _times(rests, samples), "turns": []}
+    return Estimate.without(
+        _basis(record, settings), Status.NOT_CONVERGED, text, findings=record.findings, result=result
     )
 
 
@@ -201,8 +216,8 @@ def _too_quiet(fit: Fit) -> list[Finding]:
     if fit.chi2 >= chdtri(fit.dof, 1.0 - LIMITS.risk):
         return []
     text = (
-        f"chi-square {fit.chi2:.4g} is far below the {fit.dof} expected: the noise is stated too large, and so is every "
-        "u"
+        f"chi-square {fit.chi2:.4g} is far below the {fit.dof} expected: the noise is stated too large, and every u "
+        "with it"
     )
     return [Finding("low_scatter", text)]
 

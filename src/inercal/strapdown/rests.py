@@ -39,6 +39,13 @@ def found_rests(samples: Samples, settings: Rests) -> tuple[Dwell, ...]:
     return tuple(Dwell(each.start + margin, each.stop - margin) for each in whole)
 
 
+def mean_force(samples: Samples, rests: tuple[Dwell, ...]) -> float:
+    """Median over the ``rests`` of the size [m/s^2] of the mean force read in each."""
+    with np.errstate(all="ignore"):
+        means = [np.mean(samples.force[each.start : each.stop], axis=0) for each in rests]
+        return float(np.median(np.linalg.norm(means, axis=1)))
+
+
 def _moving(x: Array, window: int) -> tuple[Array, Array]:
     """Mean (n, 3) and standard deviation (n,), its three axes together, in a window about each sample."""
     middle = np.median(x, axis=0)

@@ -132,6 +132,12 @@ class Plan:
     first_dwell: float = quantity("of the first rest", "time", "60 s", bounds=TIME)
     sample_rate: float = quantity("of a simulated recording", "frequency", "100 Hz", bounds=FREQUENCY)
 
+    @property
+    def duration(self) -> float:
+        """Time [s] of all rests and turns."""
+        angles = sum(abs(angle) for _, angle in self.turns)
+        return self.first_dwell + self.turn_time * angles / (0.5 * math.pi) + self.dwell * len(self.turns)
+
 
 @dataclass(frozen=True)
 class Motion:

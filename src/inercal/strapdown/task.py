@@ -14,9 +14,9 @@ from inercal.records.dwells import Dwell
 from inercal.records.record import Record
 from inercal.strapdown.batch import Fit, fit
 from inercal.strapdown.limits import LIMITS
-from inercal.strapdown.outcome import assemble, too_few
+from inercal.strapdown.outcome import assemble, too_few, useless
 from inercal.strapdown.reading import samples_of
-from inercal.strapdown.rests import found_rests, nodes_of
+from inercal.strapdown.rests import found_rests, mean_force, nodes_of
 from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import StrapdownSettings
 
@@ -24,7 +24,7 @@ from inercal.strapdown.settings import StrapdownSettings
 @short_repr
 @dataclass(frozen=True, eq=False)
 class StrapdownCalibration:
-    """An ``estimate``, and the evidence behind it: samples, rests, and the fit, None where there were too few rests."""
+    """An ``estimate``, and the evidence behind it: samples, rests, and the fit, None where there is none."""
 
     estimate: Estimate
     samples: Samples
@@ -63,7 +63,12 @@ def calibrate(
         estimate = too_few(record, samples, rests, settings)
         return StrapdownCalibration(timed(estimate, clock), samples, rests, None)
     progress("fitting")
-    fitted = fit(samples, nodes_of(samples, rests, settings.rests.node), settings)
+    force = mean_force(samples, rests)
+    plausible = abs(force / settings.site.gravity - 1.0) < LIMITS.off_gravity
+    fitted = fit(samples, nodes_of(samples, rests, settings.rests.node), settings) if plausible else None
+    if fitted is None:
+        estimate = useless(record, samples, rests, settings, force)
+        return StrapdownCalibration(timed(estimate, clock), samples, rests, None)
     progress("assembling")
     estimate = assemble(record, samples, rests, fitted, settings)
     return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)

@@ -131,10 +131,7 @@ k1 = "1000 ppm"
 axes = "300 arcsec"
 [plan]
 start = ["0 deg", "-90 deg", "0 deg"]
-turns = [
-  ["y", "90 deg"], ["y", "90 deg"], ["y", "90 deg"], ["z", "90 deg"], ["x", "90 deg"], ["x", "90 deg"],
-  ["x", "90 deg"], ["z", "90 deg"], ["z", "90 deg"],
-]
+turns = [["z", "90 deg"], ["y", "180 deg"], ["x", "90 deg"], ["y", "180 deg"], ["x", "90 deg"]]
 turn_time = "4 s"
 dwell = "20 s"
 first_dwell = "60 s"

@@ -46,6 +46,9 @@ from inercal.studies.instrument import Typed, check_symbol, coefficient_of
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_unit, shown
 
+FEWEST_ROWS, MOST_ROWS = 100, 20_000_000
+"""Samples of a simulated recording."""
+
 _ANGLE = ExactText(
     "angle", "90 deg", lambda a: 0.0 < abs(a) <= 2.0 * math.pi, "an angle within 360 deg, not 0"
 )
@@ -157,7 +160,7 @@ class PlanTable(table_of(Plan)):  # type: ignore[misc]
     turns: list[Annotated[TypedTurn, TurnTexts()]] = Field(
         min_length=1,
         examples=[[["y", "90 deg"], ["-z", "90 deg"]]],
-        description="turns one after the other, about axes of the unit",
+        description="turns of the unit, consecutively: axis and angle",
     )
 
 
@@ -210,7 +213,7 @@ def strapdown_study(data: Mapping[str, Any], path: str | Path) -> StrapdownSetti
         ),
         start=_start(file.start),
         prior=file.prior,
-        plan=None if file.plan is None else _plan(file.plan),
+        plan=None if file.plan is None else _plan(file.plan, path),
         motion=file.motion,
         truth=truth,
         traceability=file.traceability.model_dump(),
@@ -238,7 +241,11 @@ def _start(table: StartTable) -> Start:
     return Start(compass=None if table.heading is None else table.heading == "gyrocompass")
 
 
-def _plan(table: Any) -> Plan:
-    """The plan."""
+def _plan(table: Any, path: str | Path) -> Plan:
+    """The plan; refused where it has too many samples, or too few for its turns."""
     start = (0.0, 0.0, 0.0) if table.start is None else table.start.values
-    return settings_of(Plan, table, start=start, turns=tuple(each.turn for each in table.turns))
+    plan = settings_of(Plan, table, start=start, turns=tuple(each.turn for each in table.turns))
+    rows = plan.duration * plan.sample_rate
+    if not FEWEST_ROWS <= rows <= MOST_ROWS:
+        raise StudyError(path, f"plan: found {rows:.4g} samples, expected {FEWEST_ROWS} to {MOST_ROWS:.0e}")
+    return plan
