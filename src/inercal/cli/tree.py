@@ -78,7 +78,7 @@ COMMANDS = {
         "scale factor and misalignment of both triads, second-order coefficients, lever arms and the delay between the "
         "triads, with uncertainties. --out saves them (.json or .toml), --report writes a page to hand over. Exit code "
         "1: done, but the verdict is not ok.",
-        "inercal calibrate strapdown log.csv --study strapdown.toml --report cal.html",
+        "inercal calibrate strapdown log.csv --study unit.toml --out cal.json",
     ),
     ("calibrate", "turntable"): (
         "inercal.cli.calibrate:calibrate_turntable",
