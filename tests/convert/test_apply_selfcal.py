@@ -33,7 +33,7 @@ def estimate(values, status=Status.OK, **changes):
     """An estimate of `inercal selfcal` with these coefficients, product form."""
     p = len(values)
     whole = Estimate(
-        "selfcal", names(p), units(p), np.asarray(values), 1e-18 * np.eye(p), np.full(p, 100.0),
+        "selfcal", names(p), units(names(p)), np.asarray(values), 1e-18 * np.eye(p), np.full(p, 100.0),
         status, "as drawn",
     )  # fmt: skip
     return replace(whole, **changes)

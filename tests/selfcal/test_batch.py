@@ -42,7 +42,7 @@ def recorded(seed=1, name="paper", step=0.2, **changes):
     settings = study(plan=path(name, step), **changes)
     prepared = experiment(settings)
     simulated = simulate(prepared, np.random.default_rng(seed))
-    return simulated.recording, problem(settings), prepared.truth[: settings.size]
+    return simulated.recording, problem(settings), prepared.truth[: len(settings.states.names)]
 
 
 def sigmas(found):
@@ -308,6 +308,6 @@ def test_perfect_attitude_leaves_the_outputs_of_the_coefficients():
     c[13], c[16] = 1e-3, 1e-3
     level = np.tile([1.0, 0.0, 0.0, 0.0], (len(measured.acc), 1))
     g = np.linalg.norm(given.world.up)
-    read = measured.acc - sensed(level, c, measured, given.world).residual[:, :3] / measured.acc_weight
+    read = measured.acc - sensed(level, c, measured, given).residual[:, :3] / measured.acc_weight
     assert_allclose(read[:, 1], 1e-3 + 1.001 * g)
     assert_allclose(read[:, [0, 2]], 0.0, atol=1e-12)

@@ -148,7 +148,7 @@ def of_earth(extended):
 def test_riccati_is_that_of_its_plain_twin(extended):
     asked = of_earth(extended)
     path, stated = motion(asked.plan, asked.world), problem(asked)
-    c = to_linear(asked.truth[: asked.size])
+    c = to_linear(asked.truth[: len(asked.states.names)])
     slope = product_slope(c)
     expected = slope @ twin(path, stated, c) @ slope.T
     got = bounds(path, stated, truth=asked.truth).covariance
@@ -229,7 +229,9 @@ def test_contributions_add_up(extended):
     assert tuple(known.contributions) == SOURCES
     scale = np.outer(known.u, known.u)
     assert sum(known.contributions.values()) / scale == pytest.approx(known.covariance / scale, abs=1e-6)
-    assert np.sum(list(known.shares.values()), axis=0) == pytest.approx(np.ones(asked.size), abs=1e-6)
+    assert np.sum(list(known.shares.values()), axis=0) == pytest.approx(
+        np.ones(len(asked.states.names)), abs=1e-6
+    )
     assert min(share.min() for share in known.shares.values()) > -1e-9
     assert known.covariance / scale == pytest.approx(along(asked).covariance / scale, abs=1e-12)
 

@@ -25,6 +25,7 @@ from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform import linearised, model
 from inercal.selfcal.platform.kinematics import attitude, joint_axes
 from inercal.selfcal.platform.rig import Gimbals
+from inercal.selfcal.platform.states import EXTENDED_MODEL, state_vector
 from inercal.selfcal.settings import Filter
 
 EXTENDED = Filter(extended=True)
@@ -142,6 +143,10 @@ def test_the_kernel_is_its_matrix_twin(short, extended):
     assert found.nis == pytest.approx(nis, rel=1e-6)
 
 
+#: of the extended model
+PLACE = state_vector(EXTENDED_MODEL).layout.place
+
+
 def random_case(seed):
     """Attitude, coefficients of rough size, rate, and vectors of the base."""
     rng = np.random.default_rng(seed)
@@ -178,7 +183,7 @@ def test_the_transition_is_the_derivative_of_the_step(seed, turn):
     expected = F @ P @ F.T + np.diag(np.r_[np.full(3, 0.4), np.zeros(24)])
     rate, earth_e = model.platform_rate(w, c), model.on_the_base(earth, c)
     taken = linearised.Step(tuple(w), rate, earth_e, tuple(base), dt)
-    linearised.propagate_covariance(P, c, taken, 0.4, np.empty((6, 27)))
+    linearised.propagate_covariance(P, c, PLACE, taken, 0.4, np.empty((3, 27)), linearised.empty_columns())
     # the kernel takes the earth's turn within a step for small
     assert np.abs(P - expected).max() < 10.0 * turn * np.abs(expected).max()
     assert np.array_equal(P, P.T)
@@ -198,10 +203,11 @@ def test_accelerometer_rows_are_derivatives(seed):
     h = 1e-6
     differences = np.stack([(read(e) - read(-e)) / (2 * h) for e in h * np.eye(27)], axis=1)
     up_e = model.on_the_base(up, c)
-    f = model.specific_force(tuple(q), up_e)
+    still = (0.0, 0.0, 0.0)
+    sensed = model.sensing(tuple(q), model.Rates(still, still), still, up_e, c)
     for i in range(3):
         row = empty_row(linearised.WIDEST)
-        size = linearised.accelerometer_row(i, f, c, up_e, tuple(q), row)
+        size = linearised.accelerometer_row(i, sensed, c, PLACE, up_e, row)
         whole = np.zeros(27)
         whole[row.places[:size]] = row.values[:size]
         assert whole == pytest.approx(differences[i], abs=1e-8)

@@ -64,6 +64,7 @@ def filtered(kind="error-state", p=18, seed=1, **changes):
     return replace(
         FilterResult(
             kind=kind,
+            names=names(p),
             coefficients=course[-1],
             covariance=np.diag(u[-1] ** 2),
             attitude=history.attitude[-1],
@@ -95,7 +96,7 @@ def evidence(found=None, status=Status.OK, **changes):
     estimate = Estimate(
         "selfcal",
         names(p),
-        units(p),
+        units(names(p)),
         to_product(found.coefficients),
         total,
         dof,
@@ -267,7 +268,7 @@ def test_what_people_see_is_the_same_in_other_units():
     si = evidence(filtered(p=24)).estimate
     shown = si.shown()
     factor = [parse_unit(unit).factor for unit in shown.units]
-    assert shown.units == shown_units(24)[0]
+    assert shown.units == shown_units(names(24))[0]
     assert shown.values * factor == pytest.approx(si.values)
     assert shown.u * factor == pytest.approx(si.u)
     assert shown.correlation == pytest.approx(si.correlation)

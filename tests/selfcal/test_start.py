@@ -23,7 +23,7 @@ def simulated(seed=1, name="paper", step=0.2, **changes):
     settings = study(plan=path(name, step), **changes)
     prepared = experiment(settings)
     made = simulate(prepared, np.random.default_rng(seed))
-    return made, problem(settings), prepared.truth[: settings.size]
+    return made, problem(settings), prepared.truth[: len(settings.states.names)]
 
 
 def blind(recording):

@@ -64,7 +64,7 @@ def dimensions(schema):
 
 
 KINDS = {kind: keys(kind) for kind in ("Imu", "Turntable", "Selfcal", "Aoa")}
-OWN_TABLES = ("rig", "noise", "prior", "disturbances", "design", "timing", "goal")
+OWN_TABLES = ("rig", "model", "noise", "prior", "disturbances", "design", "timing", "goal")
 """Tables that are of each kind of study what its rig, instruments and search need."""
 
 TWO_DIMENSIONS = {

@@ -19,6 +19,7 @@ from inercal.instruments.terms import TERMS
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
+from inercal.selfcal.platform.states import ALL
 from inercal.selfcal.settings import Gating
 from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
 from inercal.studies.schema import json_schema
@@ -94,7 +95,7 @@ def test_the_study_of_the_contract(write):
     assert found.noise.accelerometer == pytest.approx(nominal.accelerometer)
     assert found.noise.encoder == pytest.approx(nominal.encoder)
     assert found.goal == pytest.approx(dict.fromkeys(NAMES[:3], 0.002 * PER_HOUR))
-    assert (found.filter.kind, found.filter.gating, found.size) == ("error-state", None, 18)
+    assert (found.filter.kind, found.filter.gating, found.states.names) == ("error-state", None, NAMES)
     assert found.disturbances.dropouts == 0.0
     assert json.loads(json.dumps(found.given)) == tomllib.loads(CONTRACT)
     VALIDATOR.validate(tomllib.loads(CONTRACT))
@@ -210,7 +211,7 @@ def test_filter_disturbances_and_design():
         "euler",
     )
     assert found.filter.gating == Gating("two", "step")
-    assert found.size == 24
+    assert found.states.names == EXTENDED
     harmonics = [(2, 2, 5 * ARCSEC, math.pi / 2), (0, 1, ARCSEC, 0.0)]
     assert_allclose(found.disturbances.harmonics, harmonics)
     assert (found.disturbances.dropouts, found.disturbances.command_delay) == (0.01, 0.2)
@@ -343,4 +344,4 @@ def test_whatever_a_key_holds_it_is_a_study_or_one_sentence(place, value):
 
 
 def test_the_table_of_terms_knows_every_coefficient_with_its_unit():
-    assert [(name, TERMS[name].unit) for name in EXTENDED] == list(zip(EXTENDED, units(24), strict=True))
+    assert tuple(TERMS[name].unit for name in ALL) == units(ALL)

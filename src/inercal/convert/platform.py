@@ -126,7 +126,10 @@ def platform_model(estimate: Estimate, where: object = "calibration") -> Platfor
 
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
     """``not_held``: the coefficients that `platform_model` leaves out."""
-    if "beta_x" not in estimate.names:
-        return ()
-    text = "the zero of the encoders beta is not applied: gimbal angles stay as they are"
-    return (Finding("not_held", text, str(where)),)
+    left = [name for name in estimate.names if name not in NAMES and not name.startswith(("kg1", "beta"))]
+    texts = []
+    if "beta_x" in estimate.names:
+        texts.append("the zero of the encoders beta is not applied: gimbal angles stay as they are")
+    if left:
+        texts.append(f"errors of the rig are not applied: {', '.join(left)}")
+    return tuple(Finding("not_held", text, str(where)) for text in texts)

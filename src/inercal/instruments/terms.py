@@ -16,10 +16,7 @@ from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
 
 @dataclass(frozen=True)
 class Term:
-    """One coefficient of an instrument.
-
-    ``unit`` is what its value is expressed in, with ``output`` for the unit the instrument's output has.
-    """
+    """One coefficient of an instrument; in its ``unit`` ``output`` stands for that of the instrument's output."""
 
     symbol: str
     name: str
@@ -45,9 +42,7 @@ _ACCELEROMETER = (
 _ON_A_TABLE = (
     *(
         Term(
-            f"r_{i}{j}",
-            f"lever arm: place of accelerometer {i} along {j} beside the crossing of the axes",
-            "m",
+            f"r_{i}{j}", f"lever arm: place of accelerometer {i} along {j} from the crossing of the axes", "m"
         )
         for i in _AXES
         for j in _AXES
@@ -83,11 +78,7 @@ _RATE_TEST = tuple(
         ("S2", "second-order coefficient, of the square of the rate", "1/(rad/s)"),
         ("S3", "third-order coefficient, of the cube of the rate", "1/(rad/s)^2"),
         ("S_nl", "non-linearity: largest residual from the best straight line, over full scale", "1"),
-        (
-            "S_hyst",
-            "hysteresis: largest difference at a rate reached from below and above, over full scale",
-            "1",
-        ),
+        ("S_hyst", "hysteresis: largest difference at a rate reached both ways, over full scale", "1"),
     )
 )
 
@@ -141,27 +132,35 @@ _DRIFT = tuple(
     )
 )
 
-# eta pz, oy, oz: az reads eta_pz fx more and eta_oz fy less, ay reads eta_oy fx less; ds and do likewise for gyros
 _SELF_CALIBRATION = (
     *(Term(f"kg0_{i}", f"gyro {i} bias: rate of the platform at zero command", "rad/s") for i in _AXES),
     Term("eta_pz", "misalignment of accelerometer z: output per specific force along x", "rad"),
     Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
     Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
     *(
-        Term(f"ds_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}", "rad")
-        for i, j in ("xy", "yz", "zx")
+        Term(
+            f"{symbol}_{p[0]}",
+            f"misalignment of gyro {p[0]}: rate about {p[0]} per rate about {p[1]}{way}",
+            "rad",
+        )
+        for symbol, way, pairs in (("ds", "", "xy yz zx"), ("do", ", reversed", "xz yx zy"))
+        for p in pairs.split()
     ),
     *(
-        Term(f"do_{i}", f"misalignment of gyro {i}: rate about {i} per rate about {j}, reversed", "rad")
-        for i, j in ("xz", "yx", "zy")
+        Term(f"{symbol}_{i}", name.format(i), unit)
+        for symbol, name, unit, ends in (
+            ("ka0", "accelerometer {} bias: reading at zero specific force", "m/s^2", _AXES),
+            ("ka1", "accelerometer {} scale error", "1", _AXES),
+            ("kg1", "gyro {} scale error", "1", _AXES),
+            ("beta", "zero of the encoders: turn of their frame about {} of the base", "rad", _AXES),
+            ("gamma", "turn of the sensors about {} of the platform, against the last gimbal", "rad", _AXES),
+            ("zero", "reading of the encoder {} at zero", "rad", "y"),
+        )
+        for i in ends
     ),
-    *(Term(f"ka0_{i}", f"accelerometer {i} bias: reading at zero specific force", "m/s^2") for i in _AXES),
-    *(Term(f"ka1_{i}", f"accelerometer {i} scale error", "1") for i in _AXES),
-    *(Term(f"kg1_{i}", f"gyro {i} scale error", "1") for i in _AXES),
-    *(
-        Term(f"beta_{i}", f"zero of the encoders: turn of their frame about {i} of the base", "rad")
-        for i in _AXES
-    ),
+    Term("nonorth_xy", "non-orthogonality of the joints: turn of axis y against axis x", "rad"),
+    Term("nonorth_yz", "non-orthogonality of the joints: turn of axis z against axis y", "rad"),
+    Term("tau_enc", "delay of the encoders", "s"),
 )
 
 #: every term, in the order results list them

@@ -20,10 +20,12 @@ FACTOR_OF: Final[Mapping[FilterKind, FactorKind]] = {
 
 
 class Estimator(NamedTuple):
-    """An estimator in ``words``, and the ``publications`` behind it beside those of self-calibration."""
+    """An estimator in ``words``, and the ``publications`` behind it beside those of self-calibration; ``rig``: it can
+    have states of the rig."""
 
     words: str
     publications: tuple[str, ...] = ()
+    rig: bool = False
 
 
 _JULIER = (
@@ -45,11 +47,11 @@ _GREWAL = (
 )
 
 ESTIMATORS: Final[Mapping[FilterKind, Estimator]] = {
-    "error-state": Estimator("error-state filter", (_LEFFERTS,)),
-    "mukf": Estimator("multiplicative sigma-point filter", (_JULIER, _CRASSIDIS)),
+    "error-state": Estimator("error-state filter", (_LEFFERTS,), rig=True),
+    "mukf": Estimator("multiplicative sigma-point filter", (_JULIER, _CRASSIDIS), rig=True),
     "svd-qukf": Estimator("quaternion sigma-point filter", (_JULIER,)),
     "gimbal-ukf": Estimator("gimbal-angle sigma-point filter", (_JULIER,)),
-    "map": Estimator("batch, largest posterior"),
+    "map": Estimator("batch, largest posterior", rig=True),
     "lm": Estimator("batch, Levenberg-Marquardt"),
     "linear": Estimator("linear filter of misalignment angles", (_GREWAL,)),
 }

@@ -28,7 +28,7 @@ from inercal.selfcal.settings import SelfcalSettings
 
 def is_rough(settings: SelfcalSettings) -> bool:
     """True for a base to be found before the calibration: heading unknown, or a wide prior of beta."""
-    wide = settings.filter.extended and bool((settings.prior[BETA] > LIMITS.base_sigma).any())
+    wide = settings.extended and bool((settings.prior[BETA] > LIMITS.base_sigma).any())
     return settings.heading_unknown or wide
 
 
@@ -66,7 +66,7 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
     if settings.heading_unknown:
         prior[BETA] = np.hypot(prior[BETA], LIMITS.heading_sigma * vertical)
         guesses = [replace(base, heading=0.5 * math.pi * k) for k in range(4)]
-    wide = replace(settings, prior=prior, filter=replace(settings.filter, extended=True))
+    wide = replace(settings.with_extended(), prior=prior)
     tried = [(guess, estimate(recording, problem(replace(wide, base=guess)), "map")) for guess in guesses]
     base, batch = min(tried, key=lambda each: _misfit(each[1]))
     if not math.isfinite(_misfit(batch)):

@@ -80,6 +80,10 @@ class Limits:
     base_prior_ratio: float = 10.0
     """Prior of beta about the base found, in its standard uncertainties: a hundredth of what the recording tells."""
 
+    still_joint: float = math.radians(1.0 / 60.0)
+    """Range [rad] of a joint's angle below which it stands still: non-orthogonality of 20 arcsec then turns the
+    platform by less than 0.01 arcsec otherwise than gamma and beta."""
+
     turning_ratio: float = 2.0
     """Rate, over earth rate, from which the platform turns."""
 

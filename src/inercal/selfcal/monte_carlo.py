@@ -24,7 +24,8 @@ from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.filters.run import estimate, load_kernels
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import names, product_slope, to_product
+from inercal.selfcal.platform.coefficients import product_slope, to_product
+from inercal.selfcal.platform.states import ALL
 from inercal.selfcal.settings import SelfcalSettings
 
 if TYPE_CHECKING:
@@ -178,14 +179,14 @@ def campaign(
     )  # kept in the problem, so that the task is the same to the byte whenever it is asked for
     one = partial(one_run, made, of_study, kind)
     sample = run(one, runs=runs, seed=seed, executor=executor or Threads(2), folder=folder, progress=progress)
-    truth, size = settings.truth, settings.size
+    truth = settings.true_values
     assert truth is not None
     sound = sample["converged"] > 0.0
     if sound.sum() < 2:
         raise InputError(kind, f"{int(sound.sum())} of {runs} runs converged, expected two or more")
     return Campaign(
         kind=kind,
-        names=names(size),
+        names=of_study.names,
         error=sample["error"][sound],
         u=sample["u"][sound],
         joint_error=sample["joint_error"][sound],
@@ -213,8 +214,8 @@ def expected_nis(experiment: Experiment, problem: FilterProblem, kind: FilterKin
     sine = np.abs(np.sin(angles))
     f = 0.0 if kind in ("svd-qukf", "gimbal-ukf") else LIMITS.encoder_floor
     floor = sum(f**2 / (each + f**2) for each in (np.ones_like(sine), 1.0 + sine, 1.0 - sine))
-    p = len(problem.prior)
-    learned = p - float(np.square(experiment.truth[:p] / problem.prior).sum())
+    truth = _truth(experiment, problem)
+    learned = len(truth) - float(np.square((truth - problem.mean) / problem.prior).sum())
     return float(dims - np.mean(floor) - learned / len(angles))
 
 
@@ -224,9 +225,8 @@ def one_run(
     """Simulate once, estimate, and compare with the truth; fields of `Campaign` by name."""
     simulated = simulate(experiment, rng)
     filtered = estimate(simulated.recording, problem, kind, history=False)
-    size = len(problem.prior)
     slope = product_slope(filtered.coefficients)
-    error = to_product(filtered.coefficients) - to_product(experiment.truth)[:size]
+    error = to_product(filtered.coefficients) - to_product(_truth(experiment, problem))
     joint_error, joint = _joint(filtered, simulated, error, slope)
     away = np.abs(np.cos(simulated.angles[1:, 1])) > LIMITS.lock_cosine
     counted = away & np.isfinite(filtered.nis)
@@ -240,6 +240,13 @@ def one_run(
         "rows": float(counted.sum()),
         "converged": float(filtered.converged),
     }
+
+
+def _truth(experiment: Experiment, problem: FilterProblem) -> Array:
+    """(p,) the true values of the states, linear form."""
+    whole = np.zeros(len(ALL))
+    whole[: len(experiment.truth)] = experiment.truth
+    return np.asarray(whole[problem.states.index])
 
 
 def _joint(filtered: FilterResult, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:

@@ -23,6 +23,8 @@ from inercal.selfcal.filters.gaps import walked, with_held
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import JOINTS
+from inercal.selfcal.platform.states import twins
 from inercal.selfcal.settings import SelfcalSettings
 
 _REFERENCE = ("q_ref_0", "q_ref_1", "q_ref_2", "q_ref_3")
@@ -83,6 +85,22 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
         began = float(time[np.argmax(np.isfinite(time))])
         findings += off_the_path(recording, settings.plan, settings.world, began, rows)
     return replace(recording, findings=(*of_record, *findings))
+
+
+def told_apart(settings: SelfcalSettings, th: Array) -> tuple[SelfcalSettings, tuple[Finding, ...]]:
+    """The study without states that nobody can tell from others along angles ``th`` (n, 3) [rad], where a joint stands
+    still; ``at_prior`` names them."""
+    still = np.nanmax(th, axis=0) - np.nanmin(th, axis=0) < LIMITS.still_joint
+    fixed = [int(joint) for joint in np.flatnonzero(still)]
+    left = twins(settings.kinds, fixed)
+    if not left:
+        return settings, ()
+    joints = ", ".join(JOINTS[joint] for joint in fixed)
+    text = (
+        f"{', '.join(left)}: {joints} stands still, they cannot be told from gamma and beta and are left out"
+    )
+    model = replace(settings.model, left_out=left)
+    return replace(settings, model=model), (Finding("at_prior", text),)
 
 
 def _rate_sensor(record: Record, where: str) -> str:

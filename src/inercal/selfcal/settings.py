@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,10 +13,10 @@ from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
 from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
 from inercal.selfcal.estimators import FactorKind, FilterKind
-from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.rig import Base, Gimbals, World, world
-from inercal.units import Quantity
+from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, STATES, StateVector, state_vector
+from inercal.units import Quantity, parse_quantity
 
 _OF_A_SAMPLE = above_zero("a standard deviation of a sample")
 _OF_A_TURN = Bounds(lambda angle: 0.0 < angle <= 2.0 * math.pi, "an angle above 0 and up to 360 deg")
@@ -69,6 +69,17 @@ class Filter:
     integration: Literal["rk4", "euler"] = option("of the gimbal angles, for gimbal-ukf", "rk4")
 
 
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The model of the platform: kinds of ``states`` (None: the paper's, with the extended model where the filter has
+    it), and, by name of parameter, what is ``stated`` of those of the rig: value and standard uncertainty [SI].
+    ``left_out``: parameters of these kinds that a recording cannot tell from others."""
+
+    states: tuple[str, ...] | None = None
+    stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class Disturbances:
     """Errors that a simulation adds to the model: ``harmonics`` of encoders, a sin(k th + phase), as joint 0, 1, 2,
@@ -107,9 +118,9 @@ class SelfcalSettings:
 
     ``site`` with its uncertainties; ``gimbals`` and ``base`` the rig, its heading to be found from the record where
     ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name; ``plan`` None where a record is
-    enough. ``prior`` (24,) standard deviations of all coefficients about 0, in the order of
-    `inercal.selfcal.platform.coefficients`; ``truth`` (24,) or None, product form, for simulations; ``goal`` wanted
-    standard uncertainty [SI] by name. ``traceability``, ``temperature``, ``given`` as in
+    enough. ``prior`` (24,) standard deviations of the coefficients about 0, in the order of
+    `inercal.selfcal.platform.coefficients`; ``truth`` (24,), (K,) with the rig's, or None, product form, for
+    simulations; ``goal`` wanted standard uncertainty [SI] by name. ``traceability``, ``temperature``, ``given`` as in
     `inercal.imu.settings.ImuSettings`.
     """
 
@@ -124,6 +135,7 @@ class SelfcalSettings:
     truth: Array | None = None
     goal: Mapping[str, float] = field(default_factory=dict)
     filter: Filter = field(default_factory=Filter)
+    model: Model = field(default_factory=Model)
     disturbances: Disturbances = field(default_factory=Disturbances)
     search: Search = field(default_factory=Search)
     traceability: Mapping[str, str] = field(default_factory=dict)
@@ -136,6 +148,50 @@ class SelfcalSettings:
         return world(self.site, self.base, self.gimbals)
 
     @property
-    def size(self) -> int:
-        """Number of coefficients estimated: 18, or 24."""
-        return len(self.prior) if self.filter.extended else len(NAMES)
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of the states that are estimated."""
+        if self.model.states is not None:
+            return self.model.states
+        return EXTENDED_MODEL if self.filter.extended else PAPER
+
+    @property
+    def extended(self) -> bool:
+        """True where gyro scale errors and the encoders' zero are estimated."""
+        return "beta" in self.kinds
+
+    def with_extended(self) -> SelfcalSettings:
+        """The study with the extended model."""
+        if self.extended:
+            return self
+        if self.model.states is None:
+            return replace(self, filter=replace(self.filter, extended=True))
+        kinds = (*EXTENDED_MODEL, *self.model.states[len(PAPER) :])
+        return replace(self, model=replace(self.model, states=kinds))
+
+    @property
+    def states(self) -> StateVector:
+        """The states that are estimated, and the values of those that are not."""
+        stated = np.zeros(len(ALL))
+        for name, (value, _) in self.model.stated.items():
+            stated[ALL.index(name)] = value
+        return state_vector(self.kinds, stated, self.model.left_out)
+
+    @property
+    def priors(self) -> Array:
+        """(K,) standard deviations of the full vector, those of the rig as stated or usual."""
+        usual = [
+            parse_quantity(state.prior, state.dimension, kind).value
+            for kind, state in STATES.items()
+            for _ in state.parameters
+        ]
+        whole = np.append(self.prior, usual[len(self.prior) :])
+        for name, (_, u) in self.model.stated.items():
+            whole[ALL.index(name)] = u or whole[ALL.index(name)]
+        return whole
+
+    @property
+    def true_values(self) -> Array | None:
+        """(K,) the truth of the full vector, product form, if it is stated."""
+        if self.truth is None:
+            return None
+        return np.append(self.truth, np.zeros(len(ALL) - len(self.truth)))

@@ -25,7 +25,7 @@ from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.reading import recording_of
+from inercal.selfcal.reading import recording_of, told_apart
 from inercal.selfcal.result.comparison import beside, differing, of_attitude, stated_variance
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
@@ -84,6 +84,7 @@ def calibrate(
         progress("looking for the heading" if settings.heading_unknown else "looking for the base")
         settings = with_base(recording, settings)
         recording = recording_of(record, settings)  # rates over gaps depend on it
+    settings, left_out = told_apart(settings, recording.th)
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
     filtered = filtering.estimate(recording, of)
@@ -91,12 +92,16 @@ def calibrate(
     along = filtered.history.attitude, filtered.coefficients
     bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
     progress("looking for faults")
-    faults = [*diagnose(recording, of, filtered, stated_errors(settings)), *taken_anew(recording, filtered)]
+    faults = [
+        *diagnose(recording, of, filtered, stated_errors(settings)),
+        *taken_anew(recording, filtered),
+        *left_out,
+    ]
     compared: dict[FilterKind, FilterResult] = {}
     for kind in KINDS if compare else ():
         if kind != filtered.kind:
             progress(f"filtering ({kind})")
-            compared[kind] = filtering.estimate(recording, of, kind)
+            compared[kind] = filtering.estimate(recording, of.for_kind(kind), kind)
     faults += differing(filtered, compared)
     progress("assembling")
     estimate = assemble(recording, settings, filtered, bounds, faults)
@@ -115,7 +120,7 @@ def calibrate(
         **{key: 1e-6 * each.step_us for key, each in steps.items()},
     }
     timed = replace(estimate, result=result, message=message, timing=timing)
-    truth = None if settings.truth is None else settings.truth[: len(of.prior)].copy()
+    truth = None if settings.true_values is None else settings.true_values[of.states.index]
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
     return Calibration(timed, of, recording, filtered, bounds, settings, compared, stated, truth)

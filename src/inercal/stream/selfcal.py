@@ -21,7 +21,7 @@ from inercal.arrays import Array
 from inercal.errors import RecordError, StudyError
 from inercal.findings import Finding
 from inercal.selfcal.filters.filter_result import Estimates, History, State, Trace, estimate_of
-from inercal.selfcal.filters.gaps import advance, held_rate, usual
+from inercal.selfcal.filters.gaps import advance, held_rate, initial, usual
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.run import load_kernels as load_filter
 from inercal.selfcal.filters.run import recursive
@@ -123,7 +123,7 @@ class Selfcal:
         self._factors = [column.unit.factor for column in channels]
         self._measured = sensor == "gyro"
         self._gained = np.array([column.increment for column in channels[:3]])
-        self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(len(problem.prior))]]
+        self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(problem.names)]]
 
     @property
     def settings(self) -> Mapping[str, object]:
@@ -164,10 +164,15 @@ class Selfcal:
         state = self._after(state, sample.t, dt)
         state, over, walked = self._rate(state, sample.t, over)
         doubt, seen = walked is not None or state.doubt, bool(np.isfinite(th).all())
-        walk = dt if walked is None else walked
-        step, held = Steps(np.array([dt]), over[None], acc[None], th[None]), (0,) if doubt else ()
+        walk, later = dt if walked is None else walked, np.where(np.isfinite(following), following, over)
+        step = Steps(np.array([dt]), over[None], acc[None], th[None], later[None])
         filter_, trace = advance(
-            self._module, state.filter, self._problem, step, held, walked=np.array([walk])
+            self._module,
+            state.filter,
+            self._problem,
+            step,
+            (0,) if doubt else (),
+            walked=np.array([walk]),
         )
         kept = state.kept.after(step, doubt, walk)
         estimate: History | Estimates = trace.estimates
@@ -197,7 +202,7 @@ class Selfcal:
         begun = bool(np.isfinite(th).all() and (np.isfinite(rate) | self._gained).all())
         if not begun:
             return state._replace(begun=False), ()
-        filter_ = self._module.initial(self._problem, th)
+        filter_ = initial(self._module, self._problem, th, np.where(np.isfinite(rate), rate, 0.0))
         kept = Kept.of(self._problem.filter.kind, self._problem, th)
         state = state._replace(
             begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th, kept=kept

@@ -17,6 +17,7 @@ from inercal.errors import StudyError
 from inercal.geometry.site import Site
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
 from inercal.selfcal.platform.rig import Base
+from inercal.selfcal.platform.states import STATES
 from inercal.selfcal.settings import (
     Disturbances,
     Filter,
@@ -36,38 +37,15 @@ from inercal.studies.common import (
 )
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive
 from inercal.studies.platform import GimbalsTable, PlanTable, base_of, gimbals_of, limits_of, plan_of
+from inercal.studies.platform_model import ModelTable, model_of, on_rig, true_errors
 from inercal.studies.rig import Angle
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_quantity
 
-#: group -> dimension and example of its values
-_MEASURED = {
-    "kg0": ("rate", "0.08 deg/h"),
-    "eta": ("angle", "60 arcsec"),
-    "ds": ("angle", "60 arcsec"),
-    "do": ("angle", "60 arcsec"),
-    "ka0": ("acceleration", "100 ug"),
-    "ka1": ("number", "500 ppm"),
-    "kg1": ("number", "10 ppm"),
-    "beta": ("angle", "5 arcsec"),
-}
-
-#: group -> its prior standard deviation where the study does not state one
-_USUAL_PRIOR = {
-    "kg0": "0.3 deg/h",
-    "eta": "300 arcsec",
-    "ds": "300 arcsec",
-    "do": "300 arcsec",
-    "ka0": "500 ug",
-    "ka1": "1500 ppm",
-    "kg1": "100 ppm",
-    "beta": "60 arcsec",
-}
-
 
 def _small(group: str) -> QuantityText:
     """A value of a group: misalignments of some degrees and scale errors of a half are none."""
-    dimension, example = _MEASURED[group]
+    dimension, example = STATES[group].dimension, STATES[group].example
     limit, words = {
         "angle": (math.radians(10.0), "an angle within 10 deg"),
         "number": (0.5, "a scale error within 0.5"),
@@ -75,22 +53,11 @@ def _small(group: str) -> QuantityText:
     return QuantityText(dimension, example, lambda value: abs(value) <= limit, words)
 
 
-_IN_WORDS = {
-    "kg0": "gyro biases",
-    "eta": "misalignments eta of accelerometers, pz, oy, oz",
-    "ds": "misalignments ds of gyros",
-    "do": "misalignments do of gyros",
-    "ka0": "accelerometer biases",
-    "ka1": "accelerometer scale errors",
-    "kg1": "gyro scale errors, in the extended model",
-    "beta": "the encoders' zero, in the extended model",
-}
-
-
 def _true_values() -> dict[str, Any]:
     """Fields of three true values for each group."""
     fields = {}
-    for group, words in _IN_WORDS.items():
+    for group in GROUPS:
+        words = STATES[group].words
         texts = SeveralTexts(_small(group), ", ".join(GROUPS[group][0]))
         fields[group] = (
             Annotated[Several, texts] | None,
@@ -109,11 +76,11 @@ class TruthTable(_TRUE):  # type: ignore[misc]
 def _of_deviations(what: str, note: str) -> dict[str, Any]:
     """Fields of one standard deviation for each group, or three; ``note`` on what absent ones mean."""
     fields = {}
-    for group, words in _IN_WORDS.items():
-        dimension, example = _MEASURED[group]
-        each = QuantityText(dimension, example, positive, f"{what} above zero")
+    for group in GROUPS:
+        state = STATES[group]
+        each = QuantityText(state.dimension, state.example, positive, f"{what} above zero")
         texts = SeveralTexts(each, ", ".join(GROUPS[group][0]), one=True)
-        described = f"of {words}; {note.format(_USUAL_PRIOR[group])} if absent"
+        described = f"of {state.words}; {note.format(state.prior)} if absent"
         fields[group] = (Annotated[Several, texts] | None, Field(default=None, description=described))
     return fields
 
@@ -154,7 +121,10 @@ class HarmonicTable(Strict):
     phase: Angle | None = Field(default=None, description="at angle 0; 0 if absent")
 
 
-class DisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
+_ON_RIG: Any = create_model("OnRig", __base__=table_of(Disturbances), **true_errors())
+
+
+class DisturbancesTable(_ON_RIG):  # type: ignore[misc]
     """Disturbances that a simulation adds to the model; none if absent."""
 
     harmonics: list[HarmonicTable] = Field(
@@ -175,6 +145,9 @@ class SelfcalStudyFile(Strict):
     )
     truth: TruthTable | None = Field(
         default=None, title="Truth", description="true coefficients, for simulations"
+    )
+    model: ModelTable = Field(
+        default=ModelTable(), title="Model", description="errors of the rig, estimated or stated"
     )
     noise: Stated[Noise] = Field(title="Noise", description="noise of the instruments")
     prior: PriorTable = Field(
@@ -206,9 +179,10 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         heading_unknown=file.rig.heading == "unknown",
         limits=limits,
         plan=None if file.plan is None else plan_of(file.plan, limits, path),
-        truth=None if file.truth is None else _truth(file.truth),
+        truth=None if file.truth is None else np.append(_truth(file.truth), on_rig(file.disturbances)),
         goal=_wanted(file.goal),
         filter=_filter(file.filter),
+        model=model_of(file.model, file.filter, path),
         disturbances=_disturbances(file.disturbances),
         search=file.design,
         traceability=file.traceability.model_dump(),
@@ -233,7 +207,7 @@ def _prior(table: PriorTable, base: Base) -> Array:
     """(24,) standard deviations; that of beta with the uncertainty of the base, about the axes of b."""
     prior = np.concatenate(
         [
-            [parse_quantity(_USUAL_PRIOR[group], _MEASURED[group][0], group).value] * 3
+            [parse_quantity(STATES[group].prior, STATES[group].dimension, group).value] * 3
             if (given := getattr(table, group)) is None
             else given.values
             for group in GROUPS

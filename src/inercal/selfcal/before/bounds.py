@@ -20,20 +20,31 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.selfcal.filters.gaps import anew, walking
-from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
-from inercal.selfcal.platform.coefficients import names, product_slope, to_linear
+from inercal.selfcal.filters.problem import (
+    FilterModel,
+    FilterProblem,
+    admitted,
+    encoders_at,
+    updating,
+    watch,
+)
+from inercal.selfcal.platform.coefficients import product_slope, to_linear
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
     WIDEST,
     Step,
     accelerometer_row,
+    empty_columns,
+    encoder_columns,
     encoder_roots,
     propagate_covariance,
 )
 from inercal.selfcal.platform.model import (
+    Rates,
     Truth,
     on_the_base,
     platform_rate,
+    sensing,
     simulate_truth,
     specific_force,
 )
@@ -97,13 +108,13 @@ def bounds(
     ``truth`` (p,) or longer, product form, makes the path, the nominal one if absent; ``measured`` (n, 4) rows that
     accelerometers x, y, z and the encoders measure, all if absent. The first row's accelerometers play no part.
     """
-    p = len(problem.prior)
-    c = np.zeros(p) if truth is None else to_linear(truth[:p])
+    c = problem.mean if truth is None else to_linear(truth[problem.states.index])
     world, n, rate = problem.world, len(motion.t), motion.rate
     q, dt = np.empty((n, 4)), np.diff(motion.t)
     first = np.array(attitude(motion.angles[0], world.axes, world.signs))
     without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
-    simulate_truth(first, rate[:, None], dt[0], without, c, world, Truth(q, unused))
+    full = problem.states.full(c)
+    simulate_truth(first, rate[:, None], dt[0], without, full, world, Truth(q, unused, motion.angles.copy()))
     seen = np.ones((n, 4), dtype=np.bool_) if measured is None else measured
     return _along(q, motion.angles, dt, rate, seen, c, problem, history, contributions)
 
@@ -151,21 +162,34 @@ def _along(
     P[0] = np.diag(start[0] + start[1])
     if contributions:
         P[3], P[4] = np.diag(start[0]), np.diag(start[1])
+    if len(rate):
+        _tie(P, problem, th[0], c, rate[0])
     first, angles = 0, np.arange(3)
     for last in (*restarts, len(q)):
         for begin, end, own in _evenly(first, last, problem, walked):
             rows, steps = slice(begin, end), slice(begin, max(end - 1, 0))
-            riccati(P, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows]), c, own.model, u[rows])
+            path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows])
+            riccati(P, path, problem.states.full(c), own.model, u[rows])
         if last < len(q):
             P[:, :3], P[:, :, :3] = 0.0, 0.0
             P[:, angles, angles] = [
                 [anew(problem, th[last]).sigma ** 2 if s in (0, 3) else 0.0] for s in range(len(P))
             ]
+            _tie(P, problem, th[last], c, rate[min(last, len(rate) - 1)])
         first = last
     slope = product_slope(c)
     whole, *parts = (slope @ each[3:, 3:] @ slope.T for each in P)
     split = dict(zip(SOURCES, parts, strict=True)) if contributions else {}
-    return PathBounds(names(p), whole, problem.prior, u, split)
+    return PathBounds(problem.names, whole, problem.prior, u, split)
+
+
+def _tie(P: Array, problem: FilterProblem, th: Array, c: Array, rate: Array) -> None:
+    """Put into covariance and parts (s, 3 + p, 3 + p) that errors of the attitude are those of the encoders' states."""
+    if not problem.states.of_rig:
+        return
+    whole = np.eye(P.shape[1])
+    whole[:3, 3:] = encoders_at(problem, th, c, rate)[1]
+    P[:] = whole @ P @ whole.T
 
 
 def _evenly(
@@ -223,38 +247,48 @@ class Path(NamedTuple):
 def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> None:
     """Covariance of the error state along a path, in place.
 
-    ``P`` (1 or 1 + sources, 3 + p, 3 + p) is that at the first row, the whole and then its parts; ``c`` (p,) are
-    coefficients, linear form; ``u`` (n or 0, p) receives standard uncertainties.
+    ``P`` (1 or 1 + sources, 3 + p, 3 + p) is that at the first row, the whole and then its parts; ``c`` is the
+    full vector, linear form; ``u`` (n or 0, p) receives standard uncertainties.
     """
     q, th, dt, w, seen = path
-    world, noise, gate = model
-    m, p = P.shape[1], len(c)
-    top, work, row = np.empty((6, m)), np.empty((2, m)), empty_row(WIDEST)
+    world, noise, gate, layout = model
+    m, place = P.shape[1], layout.place
+    top, work, row, columns = np.empty((3, m)), np.empty((2, m)), empty_row(WIDEST), empty_columns()
     near = np.zeros(3, dtype=np.int64)
     earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
     variance = noise.accelerometer * noise.accelerometer
     for k in range(len(q)):
         at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
         if k > 0:
+            following = min(k, len(w) - 1)
             commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
+            read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
             step = Step(commanded, platform_rate(commanded, c), earth_e, at, dt[k - 1])
             walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
             for s in range(len(P)):
-                propagate_covariance(P[s], c, step, walk if s < 2 else 0.0, top)
+                propagate_covariance(P[s], c, place, step, walk if s < 2 else 0.0, top, columns)
             if seen[k, 3]:
                 watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
             if updating(gate, near):
                 if seen[k, 3]:
                     roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                    wide = encoder_columns(
+                        th[k], at, read, earth_e, c, place, world.axes, world.signs, columns
+                    )
                     for i in range(3):
+                        root = roots[i]
                         for j in range(i + 1):
-                            row.places[j], row.values[j] = j, roots[i][j]
-                        observe(P, row, i + 1, 1.0, _PARTS[1], work)
-                f = specific_force(at, up_e)
+                            row.places[j], row.values[j] = j, root[j]
+                        for a in range(wide):
+                            x, y, z = columns.axes[a, 0], columns.axes[a, 1], columns.axes[a, 2]
+                            row.places[1 + i + a] = columns.places[a]
+                            row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
+                        observe(P, row, i + 1 + wide, 1.0, _PARTS[1], work)
+                sensed = sensing(at, read, earth_e, up_e, c)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
-                        size = accelerometer_row(i, f, c, up_e, at, row)
+                        size = accelerometer_row(i, sensed, c, place, up_e, row)
                         observe(P, row, size, variance, _PARTS[0], work)
         if len(u) > 0:
-            for i in range(p):
+            for i in range(u.shape[1]):
                 u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

@@ -71,7 +71,7 @@ class Observability:
 
     def _shown(self) -> list[tuple[str, str, str]]:
         """Name, u and unit of each coefficient for people."""
-        unit, size = shown_units(len(self.bounds.names))
+        unit, size = shown_units(self.bounds.names)
         texts = (rounded(u, u)[1] for u in self.bounds.u / size)
         return list(zip(self.bounds.names, texts, unit, strict=True))
 

@@ -22,7 +22,7 @@ from inercal.units import parse_unit
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """A plan on a rig, ready to be simulated many times: ``motion`` as commanded; ``fine`` (n - 1, m, 3) [rad/s] the
-    rates on which the platform acts in each finer step; ``truth`` (p,) coefficients in the linear form."""
+    rates on which the platform acts in each finer step; ``truth`` (24 or K,) full vector in the linear form."""
 
     world: World
     noise: Noise
@@ -48,13 +48,26 @@ def experiment(settings: SelfcalSettings) -> Experiment:
     if settings.truth is None:
         raise StudyError("truth", "missing, expected the true coefficients")
     commanded = motion(settings.plan, settings.world)
-    other = settings.disturbances
-    m, step = other.substeps, settings.plan.step
-    # the platform acts late: at time t on what was commanded at t - delay, at the start on the first command
-    middle = (np.arange(len(commanded.rate) * m) + 0.5) * (step / m) - other.command_delay
-    row = np.clip(np.floor(middle / step), 0.0, len(commanded.rate) - 1.0).astype(np.int64)
-    fine = np.ascontiguousarray(commanded.rate[row].reshape(-1, m, 3))
-    return Experiment(settings.world, settings.noise, commanded, fine, to_linear(settings.truth), other)
+    other, truth = settings.disturbances, settings.truth
+    if not truth[24:].any():
+        truth = truth[:24]
+    fine = _acting(commanded, other.substeps, other.command_delay)
+    return Experiment(settings.world, settings.noise, commanded, fine, to_linear(truth), other)
+
+
+def _acting(commanded: CommandedMotion, m: int, delay: float) -> Array:
+    """Rates (n - 1, m, 3) [rad/s] on which the platform acts in each of ``m`` parts of a step: at t on what was
+    commanded at t - ``delay`` [s], at the ends on the first and last command."""
+    n = len(commanded.rate)
+    if delay == 0.0:
+        return np.ascontiguousarray(np.repeat(commanded.rate[:, None], m, axis=1))
+    t = commanded.t
+    ends = t[0] + (t[-1] - t[0]) / (n * m) * np.arange(n * m + 1) - delay
+    turned = np.vstack([np.zeros(3), np.cumsum(commanded.rate * np.diff(t)[:, None], axis=0)])
+    at = np.stack([np.interp(ends, t, turned[:, k]) for k in range(3)], axis=-1)
+    at += np.minimum(ends - t[0], 0.0)[:, None] * commanded.rate[0]
+    at += np.maximum(ends - t[-1], 0.0)[:, None] * commanded.rate[-1]
+    return np.ascontiguousarray(np.diff(at, axis=0).reshape(n, m, 3) * (n * m) / (t[-1] - t[0]))
 
 
 def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
@@ -67,10 +80,11 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     wander *= noise.angle_random_walk / np.sqrt(dt)
     q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
     q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
-    simulate_truth(q0, fine, dt, wander, experiment.truth, world, Truth(q, acc))
+    read = commanded.angles.copy()
+    simulate_truth(q0, fine, dt, wander, experiment.truth, world, Truth(q, acc, read))
     all_angles(q, commanded.angles[0], world.axes, world.signs, th)
     acc += noise.accelerometer * rng.standard_normal((n, 3))
-    measured = th + noise.encoder * rng.standard_normal((n, 3))
+    measured = (read if len(experiment.truth) > 24 else th) + noise.encoder * rng.standard_normal((n, 3))
     for joint, order, amplitude, phase in other.harmonics:
         measured[:, joint] += amplitude * np.sin(order * th[:, joint] + phase)
     acc[0] = np.nan

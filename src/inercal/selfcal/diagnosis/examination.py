@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.arrays import Array
 from inercal.estimate.hypotheses import Hypothesis, likeliest, sigmas
 from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.rounding import rounded
@@ -27,8 +26,8 @@ from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import names, units
 from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import UNIT_OF
 
 _BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
 """Findings of the reading of a recording that end its diagnosis."""
@@ -64,12 +63,13 @@ def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) ->
     if not result.converged:
         return problem
     u, prior = np.sqrt(np.diag(result.covariance)), problem.prior
-    # values are distributed about 0 with this variance where the prior holds
+    size = np.abs(result.coefficients - problem.mean)
+    # values are distributed about their mean with this variance where the prior holds
     spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
-    far = (u < UNSEEN * prior) & ~(np.abs(result.coefficients) < sigmas(LIMITS.risk, len(prior)) * spread)
+    far = (u < UNSEEN * prior) & ~(size < sigmas(LIMITS.risk, len(prior)) * spread)
     return replace(
         moved,
-        prior=np.where(far, LIMITS.widened_prior * np.maximum(np.abs(result.coefficients), prior), prior),
+        prior=np.where(far, LIMITS.widened_prior * np.maximum(size, prior), prior),
     )
 
 
@@ -85,18 +85,19 @@ def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Fin
     rest = misstated(corrected, now)
     if errors and any(finding.code == "contradiction" for finding in rest):
         return misstated(fair, filtered(fair))  # errors that leave a contradiction are none
-    return [*(each.finding for each in errors), *_beyond_prior(now, problem.prior), *rest]
+    return [*(each.finding for each in errors), *_beyond_prior(now, problem), *rest]
 
 
-def _beyond_prior(result: FilterResult, prior: Array) -> list[Finding]:
-    """Coefficients further from 0 than their prior [SI] allows, found with a wider one."""
+def _beyond_prior(result: FilterResult, problem: FilterProblem) -> list[Finding]:
+    """Coefficients further from their mean than their prior allows, found with a wider one."""
     if not result.converged:
         return []
-    values, variance, p = result.coefficients, np.diag(result.covariance), len(prior)
-    findings = []
-    far = ~(np.abs(values) <= sigmas(LIMITS.risk, p) * np.sqrt(prior**2 + variance))
+    values, variance, prior = result.coefficients, np.diag(result.covariance), problem.prior
+    findings, p = [], len(prior)
+    far = ~(np.abs(values - problem.mean) <= sigmas(LIMITS.risk, p) * np.sqrt(prior**2 + variance))
     for i in np.flatnonzero(far):
-        name, (unit, size) = names(p)[i], shown_unit(units(p)[i])
+        name = result.names[i]
+        unit, size = shown_unit(UNIT_OF[name])
         value, u = rounded(values[i] / size, math.sqrt(variance[i]) / size)
         text = f"{name}: the recording says {value} +- {u} {unit}, its prior is {prior[i] / size:.3g}"
         findings.append(Finding("prior_suspect", f"{text} {unit}: state a wider one", harm=(name,)))

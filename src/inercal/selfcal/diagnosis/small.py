@@ -25,7 +25,6 @@ from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
 
@@ -65,16 +64,19 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     yield Hypothesis(
         "latitude", "site_suspect", _latitude, _other_earth, ("north", "up"), step, harm=EVERYTHING
     )
-    yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
-    yield _vector(
-        "mounting",
-        "gamma",
-        _other_mounting,
-        "rad",
-        "the sensors are turned on the platform, against the axis of its joint",
-        "the angles are not those of the sensors' axes: align them, or take the turn out of the angles",
-    )
-    if len(case[1].prior) == len(NAMES):
+    if not case[1].states.has("delay"):
+        yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
+    states = case[1].states
+    if not states.has("gamma"):
+        yield _vector(
+            "mounting",
+            "gamma",
+            _other_mounting,
+            "rad",
+            "the sensors are turned on the platform, against the axis of its joint",
+            "the angles are not those of the sensors' axes: align them, or take the turn out of the angles",
+        )
+    if not states.has("beta"):
         yield _vector(
             "base",
             "beta",
@@ -83,6 +85,7 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
             "the base or the zero of the encoders is turned",
             "set extended = true under [filter], or correct heading and tilt under [rig]",
         )
+    if not states.has("kg1"):
         yield _vector(
             "scale",
             "kg1",

@@ -27,8 +27,8 @@ from inercal.selfcal.filters import residuals
 from inercal.selfcal.filters.filter_result import product_form
 from inercal.selfcal.platform.coefficients import (
     ETA,
+    EXTENDED,
     KA0,
-    names,
     product_slope,
     shown_units,
     to_linear,
@@ -106,9 +106,11 @@ def compare_pictures(calibration: Calibration) -> list[Picture]:
     values, u = with_stated(calibration.filtered, calibration.stated)
     first = calibration.filtered.kind
     apart: dict[str, Array] = {
-        kind: (product_form(each)[0] - values) / u for kind, each in filters.items() if kind != first
+        kind: (product_form(each, calibration.filtered.names)[0] - values) / u
+        for kind, each in filters.items()
+        if kind != first
     }
-    return [filters_apart(names(len(values)), apart, first)]
+    return [filters_apart(calibration.filtered.names, apart, first)]
 
 
 def convergence(calibration: Calibration) -> list[Picture]:
@@ -116,11 +118,11 @@ def convergence(calibration: Calibration) -> list[Picture]:
     as a history knows nothing of the correlation between eta and ka1."""
     history, bounds, t = calibration.filtered.history, calibration.bounds, calibration.recording.t
     assert history is not None
-    values, p = history.coefficients, history.coefficients.shape[1]
-    truth = None if calibration.truth is None else to_linear(calibration.truth[:p])
+    values = history.coefficients
+    truth = None if calibration.truth is None else to_linear(calibration.truth)
     to_filter = np.linalg.inv(product_slope(calibration.filtered.coefficients))
     bound = np.sqrt(np.diag(to_filter @ bounds.covariance @ to_filter.T))
-    units, size = shown_units(p)
+    units, size = shown_units(calibration.filtered.names)
     courses = [
         Course(
             name,
@@ -131,7 +133,7 @@ def convergence(calibration: Calibration) -> list[Picture]:
             None if truth is None else float(truth[k] / size[k]),
             float(bound[k] / size[k]),
         )
-        for k, name in enumerate(names(p))
+        for k, name in enumerate(calibration.filtered.names)
     ]
     form = " Misalignments eta as filters know them, (1 + ka1) eta; the table of coefficients has eta itself."
     dotted = " Red dots: the truth." if calibration.truth is not None else ""
@@ -165,7 +167,7 @@ def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
     def lines(group: slice) -> list[Line]:
         return [
             Line(
-                names(len(reference))[k],
+                EXTENDED[k],
                 100.0 * (values[:, k] - reference[k]) / (abs(reference[k]) or np.nan),
             )
             for k in range(group.start, group.stop)
@@ -210,7 +212,7 @@ def _attitude(calibration: Calibration, history: History, truth: Array | None) -
 def _bounds(calibration: Calibration) -> Picture:
     """Uncertainties beside bounds, priors and goals."""
     estimate, bounds = calibration.estimate, calibration.bounds
-    units, size = shown_units(len(bounds.names))
+    units, size = shown_units(bounds.names)
     goal = np.array([calibration.settings.goal.get(name, np.nan) for name in bounds.names])
     u = [estimate[name].u if name in estimate.parameters else np.nan for name in bounds.names]
     return bounds_beside(

@@ -32,7 +32,7 @@ def main(designed: Designed) -> Picture:
 def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of a search for a path as one self-contained HTML page."""
     bounds, plan = designed.bounds, designed.plan
-    units, size = shown_units(len(bounds.names))
+    units, size = shown_units(bounds.names)
     goal = np.array([settings.goal.get(name, np.nan) for name in bounds.names]) / size
     pictures = [
         main(designed),

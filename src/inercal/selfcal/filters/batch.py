@@ -13,6 +13,7 @@ bound along the path found (Triggs et al. 2000, "Bundle adjustment - a modern sy
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -35,7 +36,7 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import broken
-from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.filters.problem import FilterProblem, Start, encoders_at
 from inercal.selfcal.filters.residuals import (
     Measurements,
     Sensed,
@@ -47,9 +48,12 @@ from inercal.selfcal.filters.residuals import (
     readings,
     sensed,
     turns,
+    turns_on_rig,
 )
 from inercal.selfcal.filters.start import rough_path
+from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import TAU
 
 BAND = 5
 """Entries below the diagonal that the attitudes' normal matrix has."""
@@ -76,18 +80,20 @@ def estimate_map(
     import scipy.linalg  # noqa: F401  as the kernels, loaded before time is taken
 
     first = first_reading(recording, problem) if start is None else start
+    of_encoders = start is None
     followed(first.attitude, np.empty((0, 3)))
     inverse_diagonal(np.ones((2, 2), order="F"), np.empty(2))
     began = time.perf_counter()
     measured, loose = readings(recording, problem), broken(recording, problem, start)
     q, c = _first_guess(recording, problem, measured, start)
+    c = c + problem.mean
     p = len(c)
     message = f"the iteration did not end in {ITERATIONS} steps, so far is the recording from the model"
     covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
     for _ in range(ITERATIONS):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # lost numbers are refused below
-                terms = terms_at(q, c, recording, problem, measured, first, loose)
+                terms = terms_at(q, c, recording, problem, measured, first, loose, of_encoders)
                 step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
             message = "the iteration diverged: the normal equations are not positive definite"
@@ -100,7 +106,9 @@ def estimate_map(
     covariance = covariance * np.outer(problem.prior, problem.prior)
     innovations = normalised(terms.sensed.residual, measured) if history else None
     nis = _per_row(terms, measured)
-    result = batch_result("map", recording, measured, (q, u), (c, covariance), nis, innovations, message)
+    result = batch_result(
+        "map", recording, problem, measured, (q, u), (c, covariance), nis, innovations, message
+    )
     return replace(result, seconds=time.perf_counter() - began, restarts=tuple(k + 1 for k in loose))
 
 
@@ -110,7 +118,13 @@ def _first_guess(
     """Attitudes (n, 4) and coefficients (p,) to begin with: the encoders', carried by the commands where silent."""
     seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
     if start is not None and not seen.any():
-        return rough_path(recording, problem, start)
+        of_paper = replace(problem, prior=problem.prior[: len(NAMES)], vector=None)
+        q, c = (
+            rough_path(recording, of_paper, start)
+            if problem.states.of_rig
+            else rough_path(recording, problem, start)
+        )
+        return q, np.append(c, np.zeros(len(problem.prior) - len(c))) - problem.mean
     first = first_reading(recording, problem).attitude if start is None else start.attitude
     attitudes = np.vstack([first, measured.attitude])
     path = followed(first, recording.rate * recording.dt[:, None])
@@ -129,6 +143,7 @@ class _Terms(NamedTuple):
 
     first: Array
     by_first: Array
+    first_by_coefficients: Array
     sensed: Sensed
     process: Array
     by_last: Array
@@ -145,15 +160,23 @@ def terms_at(
     measured: Measurements,
     start: Start,
     loose: Sequence[int] = (),
+    of_encoders: bool = False,
 ) -> _Terms:
-    """All terms at attitudes (n, 4) and coefficients (p,); ``loose`` steps weigh next to nothing."""
+    """All terms at attitudes (n, 4) and coefficients (p,); ``loose`` steps weigh next to nothing; ``of_encoders``: the
+    start is that of the first reading, whose errors are those of the states."""
     world, prior, dt = problem.world, problem.prior, recording.dt
-    of_rows = sensed(q[1:], c, measured, world)
-    base = on_base(c, world)
-    turn, slope = turns(recording.rate, dt, c)
+    of_rows = sensed(q[1:], c, measured, problem)
+    rig, by_start = problem.states.of_rig, np.zeros((3, len(c)))
+    base = on_base(problem.states.full(c)[:24], world)
+    if rig:
+        turn, slope = turns_on_rig(q[1:], recording.steps, c, problem)
+        if of_encoders:
+            start, by_start = _at_encoders(recording, problem, c, start)
+    else:
+        turn, slope = turns(recording.rate, dt, c)
     ahead, of_earth = exp(turn), -dt[:, None] * base.earth
     propagated = multiply(multiply(exp(of_earth), q[:-1]), ahead)
-    if base.earth_slope is not None:
+    if base.earth_slope is not None and not rig:
         # qexp(-(w + d) dt) = qexp(-Jl d dt) qexp(-w dt), which turns the propagated attitude from the left
         by_earth = -dt[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
         slope[:, :, -3:] += np.swapaxes(to_matrix(propagated), 1, 2) @ by_earth
@@ -165,13 +188,26 @@ def terms_at(
     return _Terms(
         miss / start.sigma,
         inverse_left_jacobian(miss) / start.sigma,
+        -inverse_left_jacobian(miss).T @ by_start * prior / start.sigma,
         of_rows._replace(by_coefficients=of_rows.by_coefficients * prior),
         residual * weight[:, None],
         left @ np.swapaxes(to_matrix(ahead), 1, 2),
         -np.swapaxes(left, 1, 2),
         left @ (slope * prior),
-        -c / prior,
+        (problem.mean - c) / prior,
     )
+
+
+def _at_encoders(recording: Recording, problem: FilterProblem, c: Array, start: Start) -> tuple[Start, Array]:
+    """The start at the first reading of the encoders as the states have it, and its change (3, p) by these; with the
+    turn within the prior of a delay added to its sigma."""
+    q, slope = encoders_at(problem, recording.th[0], c, recording.rate[0])
+    late = problem.states.layout.place[TAU] - 3
+    sigma = start.sigma
+    if late >= 0:
+        sigma = math.hypot(sigma, float(np.linalg.norm(slope[:, late])) * problem.prior[late])
+        slope[:, late] = 0.0
+    return Start(q, sigma), slope
 
 
 class _GaussNewtonStep(NamedTuple):
@@ -199,7 +235,8 @@ def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     below = following @ terms.by_last
     # gradients of the attitudes, and their ties to the coefficients beside them
     right = np.zeros((n, 3, 1 + p))
-    right[0, :, 0] = terms.by_first.T @ terms.first
+    of_first = np.column_stack([terms.first, terms.first_by_coefficients])
+    right[0] = terms.by_first.T @ of_first
     of_process = np.concatenate([terms.process[:, :, None], terms.by_coefficients], axis=2)
     of_sensed = np.concatenate([of_rows.residual[:, :, None], of_rows.by_coefficients], axis=2)
     right[1:] += seen @ of_sensed + following @ of_process
@@ -215,6 +252,7 @@ def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     solved = cho_solve_banded((factor, True), ties)
     flat_process, flat_sensed = of_process.reshape(-1, 1 + p), of_sensed.reshape(-1, 1 + p)
     both = flat_process.T @ flat_process + flat_sensed.T @ flat_sensed - ties.T @ solved
+    both[1:] += terms.first_by_coefficients.T @ of_first
     schur = both[1:, 1:] + np.eye(p)
     covariance = np.linalg.inv(schur)
     if not (np.diag(covariance) > 0.0).all():

@@ -13,37 +13,78 @@ import numpy as np
 
 from inercal._jit import kernel
 from inercal.arrays import Array
-from inercal.estimate.kalman import empty_row, innovation_variance, scalar_update
+from inercal.estimate.kalman import Row, empty_row, innovation_variance, scalar_update
 from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
-from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
-from inercal.selfcal.platform.kinematics import attitude, nearest_turn
+from inercal.selfcal.filters.problem import (
+    FilterModel,
+    FilterProblem,
+    Start,
+    admitted,
+    encoders_at,
+    updating,
+    watch,
+)
+from inercal.selfcal.platform.kinematics import Axes, nearest_turn
 from inercal.selfcal.platform.linearised import (
     WIDEST,
+    Columns,
+    Places,
     Step,
     accelerometer_row,
+    empty_columns,
+    encoder_columns,
     encoder_roots,
     propagate_covariance,
 )
 from inercal.selfcal.platform.model import (
-    accelerometers,
+    Rates,
+    encoders_attitude,
     on_the_base,
+    outputs,
     platform_rate,
     propagate,
+    sensing,
     specific_force,
 )
 from inercal.selfcal.platform.recording import Steps
+from inercal.selfcal.platform.states import LEVER, TAU
 
 
-def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> State:
-    """The state before the first step: coefficients 0 with the prior, the attitude that of ``th`` (3,) or ``start``."""
-    world, p = problem.world, len(problem.prior)
-    covariance = np.zeros((3 + p, 3 + p))
+def initial(
+    problem: FilterProblem, th: Array, start: Start | None = None, rate: Array | None = None
+) -> State:
+    """The state before the first step: the states at their mean with the prior, the attitude that of encoders which
+    read ``th`` (3,) or ``start``; ``rate`` (3,) [rad/s] is the first one read."""
+    p = len(problem.prior)
+    q = None if start is None else start.attitude.copy()
     sigma = problem.noise.encoder if start is None else start.sigma
-    covariance[np.diag_indices(3)] = sigma**2
+    covariance = np.zeros((3 + p, 3 + p))
     covariance[3:, 3:] = np.diag(problem.prior**2)
-    q = np.array(attitude(th, world.axes, world.signs)) if start is None else start.attitude.copy()
-    return State(q, np.zeros(p), covariance, np.zeros(3, dtype=np.int64), np.array(th, dtype=float))
+    begun = State(
+        np.empty(4), problem.mean.copy(), covariance, np.zeros(3, dtype=np.int64), np.array(th, dtype=float)
+    )
+    return with_attitude(begun, problem, q, sigma, np.zeros(3) if rate is None else rate)
+
+
+def with_attitude(state: State, problem: FilterProblem, q: Array | None, sigma: float, rate: Array) -> State:
+    """The state with an attitude ``q`` (4,) known to ``sigma`` [rad], or else that of the encoders, whose errors are
+    those of the states; coefficients and their covariance stay. Encoders that are late are taken to be so by less than
+    the platform turns at ``rate`` (3,) [rad/s] in the prior of the delay."""
+    P = state.covariance.copy()
+    P[:3], P[:, :3] = 0.0, 0.0
+    P[np.diag_indices(3)] = sigma**2
+    if q is None:
+        q, slope = encoders_at(problem, state.th, state.coefficients, rate)
+        at_rest = problem.states.layout.place[TAU] - 3
+        if at_rest >= 0:  # the platform may have begun to turn at this row
+            P[:3, :3] += np.outer(slope[:, at_rest], slope[:, at_rest]) * P[3 + at_rest, 3 + at_rest]
+            slope[:, at_rest] = 0.0
+        if slope.any():
+            P[:3, 3:] = slope @ P[3:, 3:]
+            P[:3, :3] += P[:3, 3:] @ slope.T
+            P[3:, :3] = P[:3, 3:].T
+    return state._replace(attitude=np.array(q), covariance=P)
 
 
 def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
@@ -54,81 +95,183 @@ def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = 
 
 
 @kernel
-def corrected(q: Quaternion, c: Array, x: Array) -> Quaternion:
-    """The attitude with the error state ``x`` put in, and the coefficients ``c`` too, in place; x is then 0."""
-    for j in range(len(c)):
-        c[j] += x[3 + j]
+def corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
+    """The attitude with the error state ``x`` put in, and the states of the full vector ``c`` too, at their places
+    ``index`` (p,); x is then 0."""
+    for j in range(len(index)):
+        c[index[j]] += x[3 + j]
     turned = normalize(multiply(q, exp((x[0], x[1], x[2]))))
     x[:] = 0.0
     return turned
 
 
 @kernel
+def undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> float:
+    """Variance [rad^2] of the angle turned while it is not known on which side of a row a sensor, 0 encoders or 1
+    accelerometers, was read where the rate changes: its delay may be of either sign."""
+    at, lag = place[TAU + sensor], c[TAU + sensor]
+    if at < 0 or lag * lag > 9.0 * P[at, at]:
+        return 0.0
+    x, y, z = (
+        read.after[0] - read.before[0],
+        read.after[1] - read.before[1],
+        read.after[2] - read.before[2],
+    )
+    return float(P[at, at] * (x * x + y * y + z * z))
+
+
+@kernel
+def shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
+    """Variance [m^2/s^4] of accelerometers away from the centre at a row where the rate changes, within the step of
+    ``dt`` [s] before or after: as large as the angular acceleration makes it at the places that they have."""
+    square = 0.0
+    for k in range(LEVER, LEVER + 9):
+        if place[k] >= 0:
+            square += c[k] * c[k] + P[place[k], place[k]]
+    x, y, z = (
+        read.after[0] - read.before[0],
+        read.after[1] - read.before[1],
+        read.after[2] - read.before[2],
+    )
+    return square * (x * x + y * y + z * z) / (dt * dt)
+
+
+@kernel
+def encoder_update(
+    q: Quaternion,
+    of_encoders: Quaternion,
+    angles: Array,
+    axes: Axes,
+    signs: Array,
+    sigma: float,
+    P: Array,
+    x: Array,
+    columns: Columns,
+    count: int,
+    row: Row,
+    work: Array,
+    innovations: Array,
+) -> float:
+    """Put encoders of noise ``sigma`` [rad] into covariance ``P`` and error state ``x``; returns the sum of squares.
+
+    ``of_encoders`` (4,) the attitude that they have, with ``count`` columns of states; ``innovations`` (3,) are
+    written, or (0,).
+    """
+    roots, variances = encoder_roots(angles, axes, signs, sigma)
+    miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
+    if len(innovations) > 0:
+        for i in range(3):
+            row.places[0], row.values[0] = i, 1.0
+            for a in range(count):
+                row.places[1 + a], row.values[1 + a] = columns.places[a], -columns.axes[a, i]
+            innovations[i] = miss[i] / math.sqrt(innovation_variance(P, row, 1 + count, variances[i]))
+    total = 0.0
+    for i in range(3):
+        root = roots[i]
+        for j in range(i + 1):
+            row.places[j], row.values[j] = j, root[j]
+        for a in range(count):
+            row.places[1 + i + a] = columns.places[a]
+            row.values[1 + i + a] = -(
+                root[0] * columns.axes[a, 0] + root[1] * columns.axes[a, 1] + root[2] * columns.axes[a, 2]
+            )
+        z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
+        total += scalar_update(P, x, row, i + 1 + count, z, 1.0, work)
+    return total
+
+
+@kernel
 def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> float:
     """The loop; returns the least |cos thy|."""
-    c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
-    world, noise, gate = model
-    intervals, rates, acc, th = steps
+    estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
+    world, noise, gate, layout = model
+    intervals, rates, acc, th, later = steps
+    index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
+    c = layout.stated.copy()
+    for j in range(len(index)):
+        c[index[j]] = estimated[j]
     n = len(P)
-    top, x, work = np.empty((6, n)), np.empty(n), np.empty(n)
-    row = empty_row(WIDEST)
+    top, x, work = np.empty((3, n)), np.zeros(n), np.empty(n)
+    row, columns = empty_row(WIDEST), empty_columns()
     variance = noise.accelerometer * noise.accelerometer
-    history = len(out.u) > 0
-    cosine = 1.0
+    history, rig = len(out.u) > 0, len(c) > 24
+    late = place[TAU] >= 0 or place[TAU + 1] >= 0
+    levers, unwanted = rig and place[LEVER] >= 0, np.empty(0)
+    cosine, sigma, of_acc = 1.0, noise.encoder, variance
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
     for k in range(len(intervals)):
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
+        read = Rates(w, (later[k, 0], later[k, 1], later[k, 2]))
         rate, earth_e, up_e = platform_rate(w, c), on_the_base(world.earth, c), on_the_base(world.up, c)
         q = normalize(propagate(q, rate, earth_e, dt))
         walk = noise.angle_random_walk * noise.angle_random_walk * dt
-        propagate_covariance(P, c, Step(w, rate, earth_e, q, dt), walk, top)
-        x[:] = 0.0
+        propagate_covariance(P, c, place, Step(w, rate, earth_e, q, dt), walk, top, columns)
         total, count = 0.0, 0
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = attitude(angles, world.axes, world.signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, c, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         if history:
             for i in range(6):
                 out.innovations[k, i] = math.nan
         if take and seen:
-            roots, variances = encoder_roots(angles, world.axes, world.signs, noise.encoder)
-            miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
-            for i in range(3):
-                if history:
-                    out.innovations[k, 3 + i] = miss[i] / math.sqrt(P[i, i] + variances[i])
-            for i in range(3):
-                root = roots[i]
-                for j in range(i + 1):
-                    row.places[j], row.values[j] = j, root[j]
-                z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-                total += scalar_update(P, x, row, i + 1, z, 1.0, work)
-                count += 1
-            q = corrected(q, c, x)
+            wide = 0
+            if rig:
+                wide = encoder_columns(angles, of_encoders, read, earth_e, c, place, axes, signs, columns)
+            if late:
+                sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
+            shown = out.innovations[k, 3:] if history else unwanted
+            total += encoder_update(
+                q,
+                of_encoders,
+                angles,
+                axes,
+                signs,
+                sigma,
+                P,
+                x,
+                columns,
+                wide,
+                row,
+                work,
+                shown,
+            )
+            count += 3
+            q = corrected(q, c, index, x)
         if take:
             up_e = on_the_base(world.up, c)
-            f = specific_force(q, up_e)
-            read = accelerometers(f, c)
+            if rig:
+                earth_e = on_the_base(world.earth, c)
+            sensed = sensing(q, read, earth_e, up_e, c)
+            expected = outputs(sensed, c)
+            if late:
+                f = sensed.force
+                of_acc = variance + undecided(P, c, place, 1, read) * (
+                    f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
+                )
+            if levers:
+                of_acc = (of_acc if late else variance) + shaken(P, c, place, read, dt)
+            for i in range(3):
+                if history and not math.isnan(acc[k, i]) and admitted(i, gate, near):
+                    size = accelerometer_row(i, sensed, c, place, up_e, row)
+                    own = innovation_variance(P, row, size, of_acc)
+                    out.innovations[k, i] = (acc[k, i] - expected[i]) / math.sqrt(own)
             for i in range(3):
                 if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    size = accelerometer_row(i, f, c, up_e, q, row)
-                    if history:
-                        own = innovation_variance(P, row, size, variance)
-                        out.innovations[k, i] = (acc[k, i] - read[i]) / math.sqrt(own)
-            for i in range(3):
-                if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    size = accelerometer_row(i, f, c, up_e, q, row)
-                    total += scalar_update(P, x, row, size, acc[k, i] - read[i], variance, work)
+                    size = accelerometer_row(i, sensed, c, place, up_e, row)
+                    total += scalar_update(P, x, row, size, acc[k, i] - expected[i], of_acc, work)
                     count += 1
-            q = corrected(q, c, x)
+            q = corrected(q, c, index, x)
         out.nis[k] = total if count > 0 else math.nan
         out.dims[k] = count
         if history:
-            remember(out, k, q, c, P)
+            remember(out, k, q, c, index, P)
     for i in range(4):
         state.attitude[i] = q[i]
+    for j in range(len(index)):
+        estimated[j] = c[index[j]]
     return cosine

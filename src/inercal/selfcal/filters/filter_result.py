@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -62,15 +63,15 @@ def empty_estimates(m: int, p: int, history: bool) -> Estimates:
 
 
 @kernel
-def remember(out: Estimates, k: int, q: Quaternion, c: Array, P: Array) -> None:
-    """Write row ``k`` of a history: attitude and coefficients (p,), and their standard deviations by the covariance
-    (3 + p, 3 + p)."""
+def remember(out: Estimates, k: int, q: Quaternion, c: Array, index: NDArray[np.int64], P: Array) -> None:
+    """Write row ``k`` of a history: attitude and states, at places ``index`` (p,) of the full vector ``c``, and their
+    standard deviations by the covariance (3 + p, 3 + p)."""
     for i in range(4):
         out.attitude[k, i] = q[i]
     for i in range(3):
         out.attitude_u[k, i] = math.sqrt(P[i, i])
-    for j in range(len(c)):
-        out.coefficients[k, j] = c[j]
+    for j in range(len(index)):
+        out.coefficients[k, j] = c[index[j]]
         out.u[k, j] = math.sqrt(P[3 + j, 3 + j])
 
 
@@ -125,11 +126,11 @@ def attitude_of(state: State, problem: FilterProblem) -> Array:
 class FilterResult:
     """Result of an estimator.
 
-    ``coefficients`` (p,), linear form, and their ``covariance`` (p, p); ``attitude`` (4,) q_bp at the last row. ``nis``
-    (n - 1,) normalised innovation squared of each row but the first, NaN where nothing was measured, of ``dims``
-    (n - 1,) scalars; of ``map`` and ``lm`` squared normalised residuals. ``innovations`` (n - 1, 6) of accelerometers
-    and of the attitude about the axes of p (gimbal angles for the gimbal-ukf), each over its standard deviation, NaN
-    where not measured; no rows without a history. ``seconds`` of the computation alone, kernels loaded.
+    ``coefficients`` (p,) by ``names``, linear form, their ``covariance`` (p, p); ``attitude`` (4,) q_bp at the
+    last row. ``nis`` (n - 1,) normalised innovation squared of each row but the first, NaN where nothing was measured,
+    of ``dims`` (n - 1,) scalars; of ``map`` and ``lm`` squared normalised residuals. ``innovations`` (n - 1, 6) of
+    accelerometers and of the attitude about the axes of p (gimbal angles for the gimbal-ukf), each over its standard
+    deviation, NaN where not measured; no rows without a history. ``seconds`` of the computation alone, kernels loaded.
 
     Not ``converged`` where the numbers must not be used, and the ``message`` says why. ``lowest_eigenvalue`` of the
     correlation matrix that was factored, over all steps, NaN where none was; ``fallbacks`` steps at which Cholesky's
@@ -138,6 +139,7 @@ class FilterResult:
     """
 
     kind: FilterKind
+    names: tuple[str, ...]
     coefficients: Array
     covariance: Array
     attitude: Array
@@ -171,8 +173,14 @@ class FilterResult:
         return float(self.nis[finite].mean()) if finite.any() else math.nan
 
 
-def product_form(result: FilterResult) -> tuple[Array, Array]:
-    """Coefficients (p,) of an estimator and their standard uncertainties (p,), product form."""
+def product_form(result: FilterResult, names: Sequence[str] = ()) -> tuple[Array, Array]:
+    """Coefficients (p,) of an estimator and their standard uncertainties (p,), product form; of other ``names``, where
+    these are given, NaN for those that it does not have."""
     slope = product_slope(result.coefficients)
     variances = np.diag(slope @ result.covariance @ slope.T)
-    return to_product(result.coefficients), np.sqrt(np.where(variances > 0.0, variances, np.nan))
+    values, u = to_product(result.coefficients), np.sqrt(np.where(variances > 0.0, variances, np.nan))
+    if not names or tuple(names) == result.names:
+        return values, u
+    of = {name: k for k, name in enumerate(result.names)}
+    there = [of.get(name, -1) for name in names]
+    return np.append(values, np.nan)[there], np.append(u, np.nan)[there]

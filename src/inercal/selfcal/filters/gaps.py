@@ -33,7 +33,7 @@ from inercal.selfcal.filters.filter_result import (
     empty_estimates,
     estimate_of,
 )
-from inercal.selfcal.filters.problem import FilterProblem, Start
+from inercal.selfcal.filters.problem import FilterProblem, Start, encoders_at
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.selfcal.platform.recording import Recording, Steps
@@ -145,7 +145,7 @@ def advance(
         if not seen[k]:
             state = propagated
         elif _contradicted(propagated, problem, steps.th[k]):
-            state, trace = _anew(module, propagated, problem, steps.th[k], history)
+            state, trace = _anew(module, propagated, problem, step, history)
             restarts.append(k)
         else:
             state, trace = module.advance(state, restless, step, history)
@@ -153,6 +153,15 @@ def advance(
         done = k + 1
     state, trace = module.advance(state, problem, steps.part(slice(done, None)), history)
     return state, joined([*parts, trace])._replace(restarts=tuple(restarts))
+
+
+def initial(
+    module: ModuleType, problem: FilterProblem, th: Array, rate: Array, start: Start | None = None
+) -> State:
+    """The state of a recursive filter at a first row: angles ``th`` (3,) [rad], rate (3,) [rad/s] from there on."""
+    of_rig = (rate,) if problem.states.of_rig else ()
+    state: State = module.initial(problem, th, start, *of_rig)
+    return state
 
 
 def walking(problem: FilterProblem, factor: float) -> FilterProblem:
@@ -197,9 +206,9 @@ def taken_anew(recording: Recording, result: FilterResult) -> list[Finding]:
 
 def _contradicted(state: State, problem: FilterProblem, th: Array) -> bool:
     """True where encoder readings (3,) [rad] are far from the attitude of a state that has not seen them."""
-    expected, read = estimate_of(state, problem), anew(problem, th)
-    limit = LIMITS.held_sigmas * np.hypot(expected.attitude_u[0], read.sigma)
-    return bool((np.abs(boxminus(read.attitude, expected.attitude[0])) > limit).any())
+    expected, read = estimate_of(state, problem), encoders_at(problem, th, state.coefficients, np.zeros(3))[0]
+    limit = LIMITS.held_sigmas * np.hypot(expected.attitude_u[0], anew(problem, th).sigma)
+    return bool((np.abs(boxminus(read, expected.attitude[0])) > limit).any())
 
 
 def anew(problem: FilterProblem, th: Array) -> Start:
@@ -210,14 +219,17 @@ def anew(problem: FilterProblem, th: Array) -> Start:
 
 
 def _anew(
-    module: ModuleType, state: State, problem: FilterProblem, th: Array, history: bool
+    module: ModuleType, state: State, problem: FilterProblem, step: Steps, history: bool
 ) -> tuple[State, Trace]:
-    """The state with its attitude as encoders (3,) [rad] read it, and the trace of that row, without an update."""
-    p = len(problem.prior)
+    """The state with its attitude as encoders read it after one step, and the trace of that row, without an update."""
+    p, th = len(problem.prior), step.th[0]
     on_turn = np.array([nearest_turn(*each) for each in zip(th, state.th, strict=True)])
-    begun: State = module.initial(problem, on_turn, anew(problem, on_turn))
+    start = anew(problem, on_turn)
+    begun: State = module.initial(problem, on_turn, start)
     begun.covariance[-p:, -p:] = state.covariance[-p:, -p:]
     state = begun._replace(coefficients=state.coefficients, near=state.near)
+    if problem.states.of_rig:
+        state = error_state.with_attitude(state, problem, None, start.sigma, step.rate[0])
     out = empty_estimates(1, p, history)
     out.nis[:], out.dims[:] = math.nan, 0
     if history:

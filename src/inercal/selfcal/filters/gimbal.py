@@ -206,8 +206,8 @@ def _advance(
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
-    world, noise, gate = model
-    intervals, rate, acc, th_m = steps
+    world, noise, gate, layout = model
+    intervals, rate, acc, th_m, _ = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted = empty_points(n), np.empty(p)
@@ -258,7 +258,7 @@ def _advance(
         for j in range(p):
             c[j] += x[3 + j]
         if history:
-            remember(out, k, attitude(th, world.axes, world.signs), c, P)
+            remember(out, k, attitude(th, world.axes, world.signs), c, layout.chosen, P)
     return points.health[0], int(points.health[1]), cosine
 
 

@@ -92,7 +92,9 @@ def estimate_linear(
     nis = np.where(measured.dims > 0, out.nis, np.nan)
     path = q, np.vstack([np.full(3, first.sigma), out.sd[:, :3]])
     innovations = normalised(np.zeros_like(out.innovations), measured) if history else None
-    result = batch_result("linear", recording, measured, path, (c, covariance), nis, innovations, message)
+    result = batch_result(
+        "linear", recording, problem, measured, path, (c, covariance), nis, innovations, message
+    )
     if history:
         begin = np.vstack([np.zeros(p), np.ones(p)])
         courses = (

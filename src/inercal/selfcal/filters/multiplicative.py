@@ -19,25 +19,29 @@ import numpy as np
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
-from inercal.estimate.kalman import Row, scalar_update
+from inercal.estimate.kalman import empty_row
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize, rotate
 from inercal.selfcal.estimators import FACTOR_OF
-from inercal.selfcal.filters.error_state import corrected
+from inercal.selfcal.filters.error_state import corrected, encoder_update, shaken, undecided
 from inercal.selfcal.filters.error_state import initial as initial
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
-from inercal.selfcal.platform.kinematics import attitude, nearest_turn
-from inercal.selfcal.platform.linearised import encoder_roots
+from inercal.selfcal.platform.kinematics import nearest_turn
+from inercal.selfcal.platform.linearised import WIDEST, Places, empty_columns, encoder_columns
 from inercal.selfcal.platform.model import (
-    accelerometers,
+    Rates,
+    encoders_attitude,
     on_the_base,
+    outputs,
     platform_rate,
     propagate,
+    sensing,
     specific_force,
 )
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.platform.states import LEVER, TAU
 
 WIDE = 3.0
 """Length [rad] beyond which a deviation may be more than half a turn, where a logarithm is not what it came from."""
@@ -65,11 +69,28 @@ def _deviation(q: Quaternion, before: Vector, turn: Vector) -> Vector:
 
 
 @kernel
+def _moved(c: Array, index: Places, column: Array, sign: float, shifted: Array) -> None:
+    """Put the states at a point, of which ``column`` is the deviation, into ``shifted``, else the full vector ``c``."""
+    for j in range(len(index)):
+        at = index[j]
+        shifted[at] = c[at] + sign * column[3 + j]
+
+
+@kernel
 def _predict(
-    q: Quaternion, c: Array, w: Vector, dt: float, world: World, columns: Array, shifted: Array, z: Array
+    q: Quaternion,
+    c: Array,
+    index: Places,
+    w: Vector,
+    dt: float,
+    world: World,
+    columns: Array,
+    shifted: Array,
+    z: Array,
 ) -> Quaternion:
     """Attitude after a step of ``dt`` [s], from which ``z`` (2 n + 1, 3) receives the deviations of all points;
-    ``columns`` (n, n) are those of the points before, ``shifted`` (p,) is used up."""
+    ``columns`` (n, n) are those of the points before, ``index`` (p,) the places of states in ``c``; ``shifted``, as
+    long, has what is no state."""
     n = len(columns)
     rate = platform_rate(w, c)
     turn = (rate[0] * dt, rate[1] * dt, rate[2] * dt)
@@ -79,8 +100,7 @@ def _predict(
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)
         d = (sign * column[0], sign * column[1], sign * column[2])
-        for j in range(len(c)):
-            shifted[j] = c[j] + sign * column[3 + j]
+        _moved(c, index, column, sign, shifted)
         rate = platform_rate(w, shifted)
         if len(c) > 18:
             held = multiply(back, multiply(_by_earth(world.earth, shifted, dt), q))
@@ -97,17 +117,25 @@ def _by_earth(earth: Array, c: Array, dt: float) -> Quaternion:
 
 
 @kernel
-def _read(q: Quaternion, c: Array, up: Array, columns: Array, shifted: Array, z: Array) -> None:
-    """Put into ``z`` (2 n + 1, 3) [m/s^2] the accelerometers' readings at all points; arguments as of `_predict`."""
+def _read(
+    q: Quaternion,
+    c: Array,
+    index: Places,
+    read: Rates,
+    world: World,
+    columns: Array,
+    shifted: Array,
+    z: Array,
+) -> None:
+    """Put into ``z`` (2 n + 1, 3) [m/s^2] the accelerometers' readings at all points; ``read`` are the rates about the
+    row, other arguments as of `_predict`."""
     n = len(columns)
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)
-        for j in range(len(c)):
-            shifted[j] = c[j] + sign * column[3 + j]
+        _moved(c, index, column, sign, shifted)
         turned = multiply(q, exp((sign * column[0], sign * column[1], sign * column[2])))
-        z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = accelerometers(
-            specific_force(turned, on_the_base(up, shifted)), shifted
-        )
+        earth, up = on_the_base(world.earth, shifted), on_the_base(world.up, shifted)
+        z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = outputs(sensing(turned, read, earth, up, shifted), shifted)
 
 
 @kernel
@@ -115,21 +143,29 @@ def _advance(
     state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
-    c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
-    world, noise, gate = model
-    intervals, rates, acc, th = steps
-    n, p = len(P), len(c)
+    estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
+    world, noise, gate, layout = model
+    intervals, rates, acc, th, later = steps
+    index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
+    c = layout.stated.copy()
+    for j in range(len(index)):
+        c[index[j]] = estimated[j]
+    n = len(P)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
-    points, shifted, of_points = empty_points(n), np.empty(p), empty_moments(n, 3)
-    z, r, L, x, spare = np.zeros((2 * n + 1, 3)), np.empty(3), np.empty((3, 3)), np.empty(n), np.empty(n)
-    row = Row(np.arange(3), np.empty(3))
+    points, shifted, of_points = empty_points(n), c.copy(), empty_moments(n, 3)
+    z, r, L, x, spare = np.zeros((2 * n + 1, 3)), np.empty(3), np.empty((3, 3)), np.zeros(n), np.empty(n)
+    row, of_states, unwanted = empty_row(WIDEST), empty_columns(), np.empty(0)
     history = len(out.u) > 0
-    cosine = 1.0
+    late = place[TAU] >= 0 or place[TAU + 1] >= 0
+    levers = place[LEVER] >= 0
+    variance = noise.accelerometer * noise.accelerometer
+    cosine, sigma, of_acc = 1.0, noise.encoder, variance
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
     for k in range(len(intervals)):
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
+        read = Rates(w, (later[k, 0], later[k, 1], later[k, 2]))
         draw(P, factor, spread, points)
-        q = _predict(q, c, w, dt, world, points.columns, shifted, z)
+        q = _predict(q, c, index, w, dt, world, points.columns, shifted, z)
         moments(z, points.columns, other, of_points)
         middle = of_points.mean
         q = normalize(multiply(q, exp((middle[0], middle[1], middle[2]))))
@@ -144,7 +180,8 @@ def _advance(
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = attitude(angles, world.axes, world.signs)
+            earth_e = on_the_base(world.earth, c)
+            of_encoders = encoders_attitude(angles, read, earth_e, c, axes, signs)
             watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
         take = updating(gate, near)
         total, count = 0.0, 0
@@ -152,39 +189,55 @@ def _advance(
             for i in range(6):
                 out.innovations[k, i] = math.nan
         if take and seen:
-            roots, variances = encoder_roots(angles, world.axes, world.signs, noise.encoder)
-            miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
+            wide = encoder_columns(angles, of_encoders, read, earth_e, c, place, axes, signs, of_states)
+            if late:
+                sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
+            shown = out.innovations[k, 3:] if history else unwanted
             x[:] = 0.0
-            for i in range(3):
-                if history:
-                    out.innovations[k, 3 + i] = miss[i] / math.sqrt(P[i, i] + variances[i])
-            for i in range(3):
-                root = roots[i]
-                row.values[0], row.values[1], row.values[2] = root
-                along = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-                total += scalar_update(P, x, row, 3, along, 1.0, spare)
-                count += 1
+            total += encoder_update(
+                q,
+                of_encoders,
+                angles,
+                axes,
+                signs,
+                sigma,
+                P,
+                x,
+                of_states,
+                wide,
+                row,
+                spare,
+                shown,
+            )
+            count += 3
             # The covariance is not turned with the corrected attitude. Small corrections turn it by nothing; after a
             # large one it is that of the encoders, which is stated about the measured attitude as it is.
-            q = corrected(q, c, x)
+            q = corrected(q, c, index, x)
         for i in range(3):
             r[i] = acc[k, i] if take and admitted(i, gate, near) else math.nan
         if not (math.isnan(r[0]) and math.isnan(r[1]) and math.isnan(r[2])):
             draw(P, factor, spread, points)
-            _read(q, c, world.up, points.columns, shifted, z)
+            _read(q, c, index, read, world, points.columns, shifted, z)
             moments(z, points.columns, other, of_points)
+            if late:
+                up_square = world.up[0] ** 2 + world.up[1] ** 2 + world.up[2] ** 2
+                of_acc = variance + undecided(P, c, place, 1, read) * up_square
+            if levers:
+                of_acc = (of_acc if late else variance) + shaken(P, c, place, read, dt)
             for i in range(3):
                 r[i] -= of_points.mean[i]
-                of_points.covariance[i, i] += noise.accelerometer * noise.accelerometer
+                of_points.covariance[i, i] += of_acc
                 if history:
                     out.innovations[k, i] = r[i] / math.sqrt(of_points.covariance[i, i])
-            of_acc, used = update(r, of_points.cross, of_points.covariance, L, P, x)
-            total, count = total + of_acc, count + used
-            q = corrected(q, c, x)
+            own, used = update(r, of_points.cross, of_points.covariance, L, P, x)
+            total, count = total + own, count + used
+            q = corrected(q, c, index, x)
         out.nis[k] = total if count > 0 else math.nan
         out.dims[k] = count
         if history:
-            remember(out, k, q, c, P)
+            remember(out, k, q, c, index, P)
     for i in range(4):
         state.attitude[i] = q[i]
+    for j in range(len(index)):
+        estimated[j] = c[index[j]]
     return points.health[0], int(points.health[1]), cosine

@@ -7,7 +7,7 @@ beyond a second, larger one. Off unless asked for: it only loses information, as
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Vector
+from inercal.selfcal.estimators import ESTIMATORS, FilterKind
+from inercal.selfcal.platform.linearised import empty_columns, encoder_columns
+from inercal.selfcal.platform.model import Rates, encoders_attitude, on_the_base
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.platform.states import ALL, Layout, StateVector
 from inercal.selfcal.settings import Filter, Gating, Noise, SelfcalSettings
 
 OFF, ANY, TWO, CHANNEL = range(4)
@@ -91,28 +95,59 @@ class FilterModel(NamedTuple):
     world: World
     noise: NoiseLevels
     gate: Gate
+    layout: Layout
 
 
 @dataclass(frozen=True, eq=False)
 class FilterProblem:
-    """The problem of an estimator, without the recording: ``prior`` (p,) standard deviations about 0, p 18 or 24."""
+    """The problem of an estimator, without the recording.
+
+    ``prior`` (p,) standard deviations of its states about their ``mean`` (p,), in the order of `states`; without a
+    ``vector`` those are the first p of all, p 18 or 24, about 0.
+    """
 
     world: World
     noise: Noise
     prior: Array
     filter: Filter = field(default_factory=Filter)
+    vector: StateVector | None = None
+
+    @cached_property
+    def states(self) -> StateVector:
+        """The states."""
+        return self.vector or StateVector(ALL[: len(self.prior)], np.zeros(len(ALL)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self.states.names
+
+    @cached_property
+    def mean(self) -> Array:
+        """(p,) values of the states before the recording."""
+        return self.states.stated[self.states.index]
+
+    def for_kind(self, kind: FilterKind) -> FilterProblem:
+        """The problem with the states that an estimator can have: without those of the rig where it has none."""
+        if ESTIMATORS[kind].rig or not self.states.of_rig:
+            return self
+        size = 24 if self.states.has("kg1") and self.states.has("beta") else 18
+        return replace(self, prior=self.prior[:size], vector=None)
 
     @cached_property
     def model(self) -> FilterModel:
         """World, noise and near-level gate, for kernels."""
         noise = self.noise
         levels = NoiseLevels(float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder))
-        return FilterModel(self.world, levels, gate_of(self.filter.gating))
+        return FilterModel(self.world, levels, gate_of(self.filter.gating), self.states.layout)
 
 
 def problem(settings: SelfcalSettings) -> FilterProblem:
     """The problem of a study."""
-    return FilterProblem(settings.world, settings.noise, settings.prior[: settings.size], settings.filter)
+    vector = settings.states
+    return FilterProblem(
+        settings.world, settings.noise, settings.priors[vector.index], settings.filter, vector
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,3 +157,17 @@ class Start:
 
     attitude: Array
     sigma: float
+
+
+def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tuple[Array, Array]:
+    """Attitude (4,) of p as encoders have it that read ``th`` (3,) [rad], and its change (3, p) [rad, about the axes of
+    p] per change of the states ``c`` (p,); ``rate`` (3,) [rad/s] as read about that time."""
+    world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
+    w, earth = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full)
+    read = Rates(w, w)
+    q = encoders_attitude(th, read, earth, full, world.axes, world.signs)
+    columns = empty_columns()
+    count = encoder_columns(th, q, read, earth, full, layout.place, world.axes, world.signs, columns)
+    slope = np.zeros((3, len(c)))
+    slope[:, columns.places[:count] - 3] = columns.axes[:count].T
+    return np.array(q), slope

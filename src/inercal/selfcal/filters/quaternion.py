@@ -175,8 +175,8 @@ def _advance(
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
-    world, noise, gate = model
-    intervals, rates, acc, th = steps
+    world, noise, gate, _ = model
+    intervals, rates, acc, th, _ = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n + 8, 1.0, 0.0, 0.0)
     points, ck = empty_points(n), np.empty(p)

@@ -31,8 +31,10 @@ from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
-from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.linearised_rows import LinearisedRows, linearise_rows, linearise_steps
+from inercal.selfcal.platform.recording import Recording, Steps
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.platform.states import LEVER
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,7 @@ class Measurements:
     ``acc`` (m, 3) [m/s^2], 0 where missing, with reciprocal standard deviations ``acc_weight``; ``attitude`` (m, 4)
     q_bp at the encoders' angles, with the Cholesky factor ``root`` (m, 3, 3) [rad] of its covariance about the axes of
     p, ``sigma^2 (J J^T + 0.05^2 I)``, and ``whitening`` its inverse; ``used`` (m, 6) accelerometers and encoders.
+    ``th`` (m, 3) [rad] as read, 0 where missing, and the ``steps`` before the rows.
     """
 
     acc: Array
@@ -50,6 +53,8 @@ class Measurements:
     root: Array
     whitening: Array
     used: NDArray[np.bool_]
+    th: Array
+    steps: Steps
 
     @property
     def dims(self) -> NDArray[np.int64]:
@@ -61,7 +66,8 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     """The measurements of all rows but the first."""
     acc, th = recording.acc[1:], recording.th[1:]
     seen = np.all(np.isfinite(th), axis=1)
-    attitude, joints = gimbals(np.where(seen[:, None], th, 0.0), problem.world)
+    angles = np.where(seen[:, None], th, 0.0)
+    attitude, joints = gimbals(angles, problem.world)
     used = np.column_stack([np.isfinite(acc), np.repeat(seen[:, None], 3, axis=1)])
     if problem.filter.gating is not None:
         used &= _gate(attitude, seen, problem)
@@ -69,12 +75,26 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
     return Measurements(
         np.where(used[:, :3], acc, 0.0),
-        used[:, :3] / problem.noise.accelerometer,
+        used[:, :3] / _accelerometer_noise(recording, problem),
         attitude,
         root,
         np.linalg.inv(root) * used[:, 3:, None],
         used,
+        angles,
+        recording.steps,
     )
+
+
+def _accelerometer_noise(recording: Recording, problem: FilterProblem) -> Array | float:
+    """Standard deviation [m/s^2] of the accelerometers, (m, 1) where they may be away from the centre of the gimbals:
+    with what a change of rate at a row makes there."""
+    noise = problem.noise.accelerometer
+    if not problem.states.has("levers"):
+        return noise
+    reach = float(np.linalg.norm(problem.prior[problem.states.layout.place[LEVER : LEVER + 9] - 3]))
+    steps = recording.steps
+    change = np.linalg.norm(steps.later - steps.rate, axis=1) / steps.dt
+    return np.asarray(np.hypot(noise, reach * change)[:, None])
 
 
 def gimbals(th: Array, world: World) -> tuple[Array, Array]:
@@ -116,6 +136,7 @@ def normalised(residual: Array, measured: Measurements, attitude_variance: Array
 def batch_result(
     kind: FilterKind,
     recording: Recording,
+    problem: FilterProblem,
     measured: Measurements,
     path: tuple[Array, Array],
     coefficients: tuple[Array, Array],
@@ -135,6 +156,7 @@ def batch_result(
     cosine = np.abs(np.cos(recording.th[:, 1]))
     return FilterResult(
         kind=kind,
+        names=problem.names,
         coefficients=c,
         covariance=covariance,
         attitude=path[0][-1],
@@ -183,8 +205,11 @@ class Sensed(NamedTuple):
     by_coefficients: Array
 
 
-def sensed(q: Array, c: Array, measured: Measurements, world: World) -> Sensed:
+def sensed(q: Array, c: Array, measured: Measurements, problem: FilterProblem) -> Sensed:
     """Compare measurements with attitudes (m, 4) and coefficients (p,)."""
+    world = problem.world
+    if problem.states.of_rig:
+        return _sensed_on_rig(q, c, measured, problem)
     base = on_base(c, world)
     back = conjugate(q)
     f = rotate(back, base.up)
@@ -206,6 +231,35 @@ def sensed(q: Array, c: Array, measured: Measurements, world: World) -> Sensed:
         by_coefficients[:, :3, BETA] = through @ np.swapaxes(to_matrix(q), 1, 2) @ base.up_slope
     by_coefficients[:, :3] *= weight[:, :, None]
     return Sensed(residual, by_attitude, by_coefficients)
+
+
+def _sensed_on_rig(q: Array, c: Array, measured: Measurements, problem: FilterProblem) -> Sensed:
+    """`sensed` where there are states of the rig, or stated values of them."""
+    m, p, states = len(q), len(c), problem.states
+    of_encoders, expected = np.empty((m, 4)), np.empty((m, 3))
+    by_encoders, by_acc = np.zeros((m, 3, 3 + p)), np.zeros((m, 3, 3 + p))
+    rows = LinearisedRows(of_encoders, by_encoders, expected, by_acc)
+    linearise_rows(q, measured.th, measured.steps, states.full(c), states.layout, problem.world, rows)
+    weight, whitening = measured.acc_weight, measured.whitening
+    miss = boxminus(of_encoders, q)
+    left = inverse_left_jacobian(miss)
+    residual = np.concatenate(
+        [(measured.acc - expected) * weight, np.einsum("kij,kj->ki", whitening, miss)], axis=1
+    )
+    by_acc *= weight[:, :, None]
+    # miss = log(q* q_e): a change of q_e from the right moves it by the inverse right Jacobian
+    right = np.swapaxes(left, 1, 2)
+    by_attitude = np.concatenate([by_acc[:, :, :3], whitening @ left], axis=1)
+    by_coefficients = np.concatenate([by_acc[:, :, 3:], -whitening @ right @ by_encoders[:, :, 3:]], axis=1)
+    return Sensed(residual, by_attitude, by_coefficients)
+
+
+def turns_on_rig(q: Array, steps: Steps, c: Array, problem: FilterProblem) -> tuple[Array, Array]:
+    """`turns` where there are states of the rig, with beta too; ``q`` (m, 4) attitudes after the steps."""
+    m, states = len(q), problem.states
+    turn, slope = np.empty((m, 3)), np.zeros((m, 3, len(c)))
+    linearise_steps(q, steps, states.full(c), states.layout, problem.world, turn, slope)
+    return turn, slope
 
 
 def turns(rate: Array, dt: Array, c: Array) -> tuple[Array, Array]:

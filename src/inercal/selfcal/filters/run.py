@@ -22,7 +22,7 @@ from inercal.selfcal.filters.filter_result import (
     empty_estimates,
     estimate_of,
 )
-from inercal.selfcal.filters.gaps import advance, joined
+from inercal.selfcal.filters.gaps import advance, initial, joined
 from inercal.selfcal.filters.linear import estimate_linear
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.second_pass import is_due, second_pass
@@ -64,10 +64,10 @@ def estimate(
         return whole(recording, problem, start, history)
     load_kernels(kind, problem)
     began = time.perf_counter()
-    state: State = module.initial(problem, recording.th[0], start)
+    state = initial(module, problem, recording.th[0], recording.rate[0], start)
     state, trace, rows = _passed(module, state, problem, recording, history, brief)
     if not brief and is_due(kind, problem):
-        begun = module.initial(problem, recording.th[0], start)
+        begun = initial(module, problem, recording.th[0], recording.rate[0], start)
         state = second_pass(module, begun, state, problem, recording.steps, recording.held, recording.walked)
         for name, row in vars(estimate_of(state, problem)).items() if rows is not None else ():
             getattr(rows, name)[-1:] = row
@@ -75,6 +75,7 @@ def estimate(
     size = len(problem.prior)
     result = FilterResult(
         kind=kind,
+        names=problem.names,
         coefficients=state.coefficients,
         covariance=state.covariance[-size:, -size:],
         attitude=attitude_of(state, problem),
@@ -140,7 +141,9 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
     module = recursive(kind)
     if module is not None and kind not in _LOADED:
         none = np.empty((0, 3))
-        module.advance(module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none))
+        module.advance(
+            module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none, none)
+        )
         _LOADED.add(kind)
 
 

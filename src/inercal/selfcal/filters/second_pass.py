@@ -24,8 +24,9 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.rotations import boxplus, normalize
 from inercal.selfcal.estimators import FilterKind
+from inercal.selfcal.filters.error_state import with_attitude
 from inercal.selfcal.filters.filter_result import State
-from inercal.selfcal.filters.gaps import advance
+from inercal.selfcal.filters.gaps import advance, initial
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES
@@ -60,18 +61,22 @@ def second_pass(
     narrow = np.minimum(problem.prior, LIMITS.second_prior * np.sqrt(variance))
     begun.coefficients[:] = about
     begun.covariance[-p:, -p:] = np.diag(narrow**2)
+    if begun.covariance[
+        :3, 3:
+    ].any():  # the attitude is that of the encoders, whose errors are those of the states
+        begun = with_attitude(begun, problem, None, problem.noise.encoder, steps.rate[0])
     state, _ = advance(module, begun, problem, steps, held, False, walked)
-    again = _with_prior(state, about, narrow, problem.prior)
+    again = _with_prior(state, (about, narrow), (problem.mean, problem.prior))
     sound = np.isfinite(again.covariance).all() and (np.diag(again.covariance) > 0.0).all()
     return again if sound else found
 
 
 class Kept(NamedTuple):
-    """Rows that a stream keeps for further passes: of ``rows`` (m, 12) the first ``used``, the first angles and then
-    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked. None of a filter that
-    needs no second pass, or once there are `LIMITS.kept_rows`."""
+    """Rows that a stream keeps for further passes: of ``rows`` (m, 15) the first ``used``, the first angles and then
+    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked, later. None of a filter
+    that needs no second pass, or once there are `LIMITS.kept_rows`."""
 
-    rows: Array = np.empty((0, 12))
+    rows: Array = np.empty((0, 15))
     used: int = 0
 
     @staticmethod
@@ -79,7 +84,7 @@ class Kept(NamedTuple):
         """The rows kept from a start with those angles (3,) [rad] on."""
         if not is_due(kind, problem):
             return Kept()
-        rows = np.zeros((64, 12))
+        rows = np.zeros((64, 15))
         rows[0, 7:10] = th
         return Kept(rows, 1)
 
@@ -88,7 +93,9 @@ class Kept(NamedTuple):
         if not self.used:
             return self
         rows = self.rows
-        rows[self.used] = np.hstack([step.dt, step.rate[0], step.acc[0], step.th[0], held, walked])
+        rows[self.used] = np.hstack(
+            [step.dt, step.rate[0], step.acc[0], step.th[0], held, walked, step.later[0]]
+        )
         return Kept(rows, self.used + 1)
 
     @property
@@ -100,16 +107,17 @@ class Kept(NamedTuple):
         """The state after another pass through all rows kept, and the rows with room for as many more."""
         first, steps = self.rows[0, 7:10], self.rows[1:]
         held = np.flatnonzero(steps[:, 10]).tolist()
-        rate, acc, th = (np.ascontiguousarray(steps[:, k : k + 3]) for k in (1, 4, 7))
-        taken = Steps(np.ascontiguousarray(steps[:, 0]), rate, acc, th)
-        begun = module.initial(problem, first)
+        rate, acc, th, later = (np.ascontiguousarray(steps[:, k : k + 3]) for k in (1, 4, 7, 12))
+        taken = Steps(np.ascontiguousarray(steps[:, 0]), rate, acc, th, later)
+        begun = initial(module, problem, first, steps[0, 1:4])
         state = second_pass(module, begun, found, problem, taken, held, steps[:, 11])
         more = Kept() if self.used >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.used)
         return state, more
 
 
-def _with_prior(state: State, about: Array, narrow: Array, prior: Array) -> State:
-    """The state with the prior 0, ``prior`` (p,) in the place of ``about``, ``narrow`` (p,)."""
+def _with_prior(state: State, taken_out: tuple[Array, Array], put_in: tuple[Array, Array]) -> State:
+    """The state with one prior, mean and standard deviations (p,), in the place of another."""
+    (about, narrow), (mean, prior) = taken_out, put_in
     P, p = state.covariance, len(prior)
     more = 1.0 / prior**2 - 1.0 / narrow**2
     try:
@@ -119,7 +127,7 @@ def _with_prior(state: State, about: Array, narrow: Array, prior: Array) -> Stat
     Q = P - P[:, -p:] @ taken
     Q = 0.5 * (Q + Q.T)
     c = state.coefficients
-    shift = Q[:, -p:] @ ((c - about) / narrow**2 - c / prior**2)
+    shift = Q[:, -p:] @ ((c - about) / narrow**2 - (c - mean) / prior**2)
     return state._replace(
         attitude=normalize(boxplus(state.attitude, shift[:3])), coefficients=c + shift[-p:], covariance=Q
     )

@@ -50,7 +50,7 @@ from inercal.selfcal.filters.residuals import (
     sensed,
     turns,
 )
-from inercal.selfcal.platform.coefficients import DS, ETA, KA0, KA1, names
+from inercal.selfcal.platform.coefficients import DS, ETA, KA0, KA1
 from inercal.selfcal.platform.recording import Recording
 
 
@@ -95,7 +95,9 @@ def estimate_lm(
         over = residual.copy()
         over[:, :3] /= np.sqrt(np.diagonal(spread, axis1=1, axis2=2)[:, :3])
         innovations = normalised(over, measured, wander[:, None])
-    result = batch_result("lm", recording, measured, (at.q, u), (at.c, covariance), nis, innovations, message)
+    result = batch_result(
+        "lm", recording, problem, measured, (at.q, u), (at.c, covariance), nis, innovations, message
+    )
     return replace(result, seconds=time.perf_counter() - began)
 
 
@@ -167,7 +169,7 @@ def _along(
         by_earth = -since[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
         slope[:, :, -3:] += np.swapaxes(to_matrix(q), 1, 2) @ by_earth
     slope[:, :, 3:] *= problem.prior
-    of_rows = sensed(q[1:], c, measured, problem.world)
+    of_rows = sensed(q[1:], c, measured, problem)
     of_rows = of_rows._replace(by_coefficients=of_rows.by_coefficients * problem.prior)
     return _Along(q, c, of_rows, inertial, slope)
 
@@ -201,7 +203,7 @@ def _fit(
         of_prior[:3, :3] = inverse_left_jacobian(miss) @ right_jacobian(x[:3]) / start.sigma
         return -np.concatenate([of_prior, of_rows.reshape(-1, size)])
 
-    named = ("turn_x", "turn_y", "turn_z", *names(size - 3))
+    named = ("turn_x", "turn_y", "turn_z", *problem.names)
     scale = np.append(np.full(3, start.sigma), np.ones(size - 3))
     fit = solve(residuals, jacobian, np.zeros(size), named, scale)
     return fit, along(fit.x)

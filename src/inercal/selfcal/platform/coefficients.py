@@ -1,6 +1,7 @@
 """The coefficients of a platform: names, units, order, and two forms of misalignment.
 
-Everywhere coefficients are one array (p,) in the order of `NAMES`, in SI. p is 18, or 24 with the extended model:
+Everywhere coefficients are one array (p,) in the order of `NAMES`, in SI. p is 18, 24 with the extended model, or more
+with states of the rig behind them (`inercal.selfcal.platform.states`):
 
     kg0 (3)   gyro bias [rad/s]
     eta (3)   misalignment of accelerometers: pz, oy, oz [rad]
@@ -28,22 +29,18 @@ coefficients.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from inercal.arrays import Array
 from inercal.instruments.terms import shown_unit
+from inercal.selfcal.platform.states import EXTENDED_MODEL, STATES, UNIT_OF
 
 GROUPS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
-    "kg0": (("x", "y", "z"), "rad/s"),
-    "eta": (("pz", "oy", "oz"), "rad"),
-    "ds": (("x", "y", "z"), "rad"),
-    "do": (("x", "y", "z"), "rad"),
-    "ka0": (("x", "y", "z"), "m/s^2"),
-    "ka1": (("x", "y", "z"), "1"),
-    "kg1": (("x", "y", "z"), "1"),
-    "beta": (("x", "y", "z"), "rad"),
+    kind: (tuple(name.removeprefix(f"{kind}_") for name in STATES[kind].parameters), STATES[kind].unit)
+    for kind in EXTENDED_MODEL
 }
 """Group -> endings of its names, unit; the last two belong to the extended model."""
 
@@ -64,14 +61,14 @@ def names(p: int) -> tuple[str, ...]:
     return EXTENDED[:p]
 
 
-def units(p: int) -> tuple[str, ...]:
-    """SI units of the first ``p`` coefficients, 18 or 24."""
-    return tuple(unit for ends, unit in GROUPS.values() for _ in ends)[:p]
+def units(names: Sequence[str]) -> tuple[str, ...]:
+    """SI units of coefficients or states of the rig, by name."""
+    return tuple(UNIT_OF[name] for name in names)
 
 
-def shown_units(p: int) -> tuple[tuple[str, ...], Array]:
-    """Units of the first ``p`` coefficients for people, and how many SI units (p,) each is."""
-    shown = [shown_unit(unit) for unit in units(p)]
+def shown_units(names: Sequence[str]) -> tuple[tuple[str, ...], Array]:
+    """Their units for people, and how many SI units (p,) each is."""
+    shown = [shown_unit(unit) for unit in units(names)]
     return tuple(unit for unit, _ in shown), np.array([size for _, size in shown])
 
 

@@ -6,7 +6,9 @@ The error state is dtheta (3) [rad], right-handed about the axes of p, then the 
     dtheta+ = exp(-[w dt]x) dtheta + Jr(w dt) dt dw,   dw = dkg0 + dM w_c,   Jr the right Jacobian of rotations
     df = f x dtheta = [f]x dtheta
 
-With the extended model earth rate and gravity turn with beta: d(R(beta) v) = -[R v]x Jr(-beta) dbeta.
+With the extended model earth rate and gravity turn with beta: d(R(beta) v) = -[R v]x Jr(-beta) dbeta. States of the
+rig have a column each, an axis in p [per unit of the state]: of the rotation gained in a step (`dynamics_columns`), of
+the attitude that encoders have (`encoder_columns`), and entries of an accelerometer's row (`accelerometer_row`).
 """
 
 from __future__ import annotations
@@ -14,20 +16,59 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row
-from inercal.geometry.kernels import Quaternion, Vector, exp, right_jacobian, rotate
+from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, right_jacobian, rotate
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.kinematics import Axes, joint_axes
+from inercal.selfcal.platform.kinematics import Axes, elementary, joint_axes, unit
+from inercal.selfcal.platform.model import (
+    Rates,
+    Sensing,
+    centripetal,
+    platform_rate,
+    rate_at,
+    squared,
+)
+from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, ZERO_Y
 
 Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
 FLOOR = LIMITS.encoder_floor
 """As kernels take it."""
 
-WIDEST = 10
-"""Most entries of a row of the model."""
+WIDEST = 20
+"""Most entries of a row of the model, and most columns of states."""
+
+Places: TypeAlias = NDArray[np.int64]
+"""Place (K,) of each parameter of the full vector in the error state, -1 where it is no state."""
+
+
+class Columns(NamedTuple):
+    """Room for ``WIDEST`` columns: ``places`` in the error state, ``axes`` (WIDEST, 3) in p per unit of the state."""
+
+    places: NDArray[np.int64]
+    axes: Array
+
+
+@kernel
+def empty_columns() -> Columns:
+    """Room for columns."""
+    return Columns(np.empty(WIDEST, dtype=np.int64), np.empty((WIDEST, 3)))
+
+
+@kernel
+def put(columns: Columns, count: int, place: int, v: Vector, factor: float) -> int:
+    """Put a column into its room where ``place`` is that of a state; returns the number of columns."""
+    if place < 0:
+        return count
+    columns.places[count] = place
+    for i in range(3):
+        columns.axes[count, i] = factor * v[i]
+    return count + 1
 
 
 @kernel
@@ -61,24 +102,56 @@ class Step(NamedTuple):
 
 
 @kernel
-def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Array) -> None:
-    """Covariance ``P`` (3 + p, 3 + p) of the error state after a step, in place; ``c`` (p,) coefficients, ``noise``
-    [rad^2] the variance of the attitude gained in the step; ``top`` (6, 3 + p) is used up."""
+def dynamics_columns(c: Array, place: Places, step: Step, columns: Columns) -> int:
+    """Columns of the rotation gained in a step, but those of the paper's states; returns their number."""
+    count, dt, w = 0, step.dt, step.commanded
+    j = right_jacobian((step.rate[0] * dt, step.rate[1] * dt, step.rate[2] * dt))
+    for i in range(3):
+        axis = (j[0][i], j[1][i], j[2][i])
+        count = put(columns, count, place[18 + i], axis, dt * w[i])
+        count = put(columns, count, place[ASYM + i], axis, 0.5 * dt * abs(w[i]))
+    by_beta = turned_by_beta(step.earth, step.attitude, c)
+    for i in range(3):
+        count = put(columns, count, place[21 + i], by_beta[i], -dt)
+    return count
+
+
+@kernel
+def add_columns(P: Array, columns: Columns, count: int, top: Array) -> None:
+    """Add to ``top`` (3, n) the rows of ``P`` (n, n) that states have with their columns."""
+    for a in range(count):
+        of_state = columns.places[a]
+        for i in range(3):
+            axis = columns.axes[a, i]
+            for m in range(len(P)):
+                top[i, m] += axis * P[of_state, m]
+
+
+@kernel
+def along_columns(columns: Columns, count: int, k: int, top: Array, i: int) -> float:
+    """Sum of component ``k`` of the columns, each times the entry of ``top`` of row ``i`` at the place of its state."""
+    total = 0.0
+    for a in range(count):
+        total += columns.axes[a, k] * top[i, columns.places[a]]
+    return total
+
+
+@kernel
+def propagate_covariance(
+    P: Array, c: Array, place: Places, step: Step, noise: float, top: Array, columns: Columns
+) -> None:
+    """Covariance ``P`` (3 + p, 3 + p) of the error state after a step, in place; ``c`` the full vector, ``noise``
+    [rad^2] the variance of the attitude gained in the step; ``top`` (3, 3 + p) and ``columns`` are used up."""
     n, w, rate, dt = len(P), step.commanded, step.rate, step.dt
     j = right_jacobian((rate[0] * dt, rate[1] * dt, rate[2] * dt))
     back = exp((-rate[0] * dt, -rate[1] * dt, -rate[2] * dt))
     a0, a1, a2 = rotate(back, (1.0, 0.0, 0.0)), rotate(back, (0.0, 1.0, 0.0)), rotate(back, (0.0, 0.0, 1.0))
-    extended = n > 21
-    b0 = b1 = b2 = (0.0, 0.0, 0.0)
-    if extended:
-        b0, b1, b2 = turned_by_beta(step.earth, step.attitude, c)
+    count = dynamics_columns(c, place, step, columns) if len(c) > 18 else 0
     for m in range(n):
         # change of the platform's rate, about each axis
         x = P[3, m] + w[1] * P[9, m] - w[2] * P[12, m]
         y = P[4, m] + w[2] * P[10, m] - w[0] * P[13, m]
         z = P[5, m] + w[0] * P[11, m] - w[1] * P[14, m]
-        if extended:
-            x, y, z = x + w[0] * P[21, m], y + w[1] * P[22, m], z + w[2] * P[23, m]
         for i in range(3):
             top[i, m] = (
                 a0[i] * P[0, m]
@@ -86,21 +159,19 @@ def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Arra
                 + a2[i] * P[2, m]
                 + dt * (j[i][0] * x + j[i][1] * y + j[i][2] * z)
             )
-            if extended:
-                top[i, m] -= dt * (b0[i] * P[24, m] + b1[i] * P[25, m] + b2[i] * P[26, m])
+    if count > 0:
+        add_columns(P, columns, count, top)
     for i in range(3):
         x = top[i, 3] + w[1] * top[i, 9] - w[2] * top[i, 12]
         y = top[i, 4] + w[2] * top[i, 10] - w[0] * top[i, 13]
         z = top[i, 5] + w[0] * top[i, 11] - w[1] * top[i, 14]
-        if extended:
-            x, y, z = x + w[0] * top[i, 21], y + w[1] * top[i, 22], z + w[2] * top[i, 23]
         for k in range(i + 1):
             value = (
                 a0[k] * top[i, 0] + a1[k] * top[i, 1] + a2[k] * top[i, 2]
                 + dt * (j[k][0] * x + j[k][1] * y + j[k][2] * z)
             )  # fmt: skip
-            if extended:
-                value -= dt * (b0[k] * top[i, 24] + b1[k] * top[i, 25] + b2[k] * top[i, 26])
+            if count > 0:
+                value += along_columns(columns, count, k, top, i)
             P[i, k] = value
             P[k, i] = value
         P[i, i] += noise
@@ -111,11 +182,45 @@ def propagate_covariance(P: Array, c: Array, step: Step, noise: float, top: Arra
 
 
 @kernel
-def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, row: Row) -> int:
+def encoder_columns(
+    th: Vector | Array,
+    q: Quaternion,
+    read: Rates,
+    earth: Vector,
+    c: Array,
+    place: Places,
+    axes: Axes,
+    signs: Array,
+    columns: Columns,
+) -> int:
+    """Columns of the attitude ``q`` (4,) that encoders have which read ``th`` (3,) [rad]; returns their number.
+
+    Turns of p within a delay, of some 1e-4, are left out of the axes.
+    """
+    if len(c) <= 24:
+        return 0
+    gamma = (c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])
+    j, count = right_jacobian(gamma), 0
+    for i in range(3):
+        count = put(columns, count, place[GAMMA + i], (j[0][i], j[1][i], j[2][i]), 1.0)
+    back = multiply(exp((-gamma[0], -gamma[1], -gamma[2])), elementary(axes[2], -signs[2] * th[2]))
+    count = put(columns, count, place[NONORTH + 1], rotate(back, unit(axes[0], 1.0)), 1.0)
+    back = multiply(back, elementary(axes[0], -c[NONORTH + 1]))
+    count = put(columns, count, place[ZERO_Y], rotate(back, unit(axes[1], signs[1])), -1.0)
+    back = multiply(back, elementary(axes[1], -signs[1] * (th[1] - c[ZERO_Y])))
+    count = put(columns, count, place[NONORTH], rotate(back, unit(axes[2], 1.0)), 1.0)
+    w, v = platform_rate(rate_at(read, c[TAU]), c), rotate((q[0], -q[1], -q[2], -q[3]), earth)
+    return put(columns, count, place[TAU], (w[0] - v[0], w[1] - v[1], w[2] - v[2]), 1.0)
+
+
+@kernel
+def accelerometer_row(i: int, sensed: Sensing, c: Array, place: Places, up: Vector, row: Row) -> int:
     """Put the derivative of accelerometer ``i`` by the error state into a ``row`` with room for `WIDEST` entries.
 
-    ``f`` (3,) [m/s^2] in p, ``up`` (3,) [m/s^2] in the frame of the encoders. Returns the number of entries.
+    ``up`` (3,) [m/s^2] is in the frame of the encoders. Returns the number of entries. The turn of p within a delay is
+    left out of the derivative by the attitude.
     """
+    f = sensed.force
     # weights of the specific force in this output
     gx = 1.0 + c[15] if i == 0 else -c[4] if i == 1 else c[3]
     gy = 0.0 if i == 0 else 1.0 + c[16] if i == 1 else -c[5]
@@ -136,10 +241,39 @@ def accelerometer_row(i: int, f: Vector, c: Array, up: Vector, q: Quaternion, ro
         places[6], values[6] = 8, -f[1]
         count = 7
     if len(c) > 18:
-        by_beta = turned_by_beta(up, q, c)
+        by_beta = turned_by_beta(up, sensed.attitude, c)
         for k in range(3):
-            places[count] = 24 + k
-            values[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
+            if place[21 + k] >= 0:
+                places[count] = place[21 + k]
+                values[count] = gx * by_beta[k][0] + gy * by_beta[k][1] + gz * by_beta[k][2]
+                count += 1
+    if len(c) > 24:
+        count = rig_entries(i, sensed, (gx, gy, gz), turn, c, place, row, count)
+    return count
+
+
+@kernel
+def rig_entries(
+    i: int, sensed: Sensing, g: Vector, turn: Vector, c: Array, place: Places, row: Row, count: int
+) -> int:
+    """Put delay, K2 and lever of accelerometer ``i`` into its row behind ``count`` entries; returns their number.
+
+    ``g`` (3,) are the weights of the specific force, ``turn`` (3,) the derivative by the attitude.
+    """
+    places, values, f = row.places, row.values, sensed.force
+    late = sensed.over_base
+    if place[TAU + 1] >= 0:
+        places[count] = place[TAU + 1]
+        values[count] = -(turn[0] * late[0] + turn[1] * late[1] + turn[2] * late[2])
+        count += 1
+    if place[K2 + i] >= 0:
+        places[count] = place[K2 + i]
+        values[count] = squared(g[0] * f[0] + g[1] * f[1] + g[2] * f[2], i, c)
+        count += 1
+    along = centripetal(i, sensed.rate)
+    for k in range(3):
+        if place[LEVER + 3 * i + k] >= 0:
+            places[count], values[count] = place[LEVER + 3 * i + k], (1.0 + c[15 + i]) * along[k]
             count += 1
     return count
 

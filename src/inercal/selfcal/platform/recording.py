@@ -15,16 +15,18 @@ from inercal.units import Quantity
 
 class Steps(NamedTuple):
     """Rates and measurements of m steps, as kernels take them: ``dt`` (m,) [s]; ``rate`` (m, 3) [rad/s], held over each
-    step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not."""
+    step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not; ``later`` (m, 3)
+    [rad/s] the rate of the step after it."""
 
     dt: Array
     rate: Array
     acc: Array
     th: Array
+    later: Array
 
     def part(self, steps: slice) -> Steps:
         """Some of the steps."""
-        return Steps(self.dt[steps], self.rate[steps], self.acc[steps], self.th[steps])
+        return Steps(*(each[steps] for each in self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +61,8 @@ class Recording:
     @property
     def steps(self) -> Steps:
         """The n - 1 steps from row to row."""
-        return Steps(self.dt, self.rate, self.acc[1:], self.th[1:])
+        rate = self.rate
+        return Steps(self.dt, rate, self.acc[1:], self.th[1:], np.vstack([rate[1:], rate[-1:]]))
 
     @property
     def walking(self) -> Array:

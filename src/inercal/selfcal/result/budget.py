@@ -12,14 +12,18 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
+from inercal.instruments.terms import shown_unit
 from inercal.selfcal.before.bounds import PathBounds
+from inercal.selfcal.before.considered import sensitivities
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import names, to_product
+from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF
 from inercal.selfcal.result.systematic import systematic_inputs
 from inercal.selfcal.settings import Noise, SelfcalSettings
-from inercal.units import parse_unit
+from inercal.units import parse_quantity, parse_unit
 
 
 def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
@@ -49,13 +53,43 @@ def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> l
     return sources
 
 
+def considered(
+    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, u: Array
+) -> tuple[list[TypeB], Mapping[str, str]]:
+    """Errors of the rig that are no states: those stated with an uncertainty; and of each other kind the error, in
+    words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
+    assert filtered.history is not None
+    of = problem(settings)
+    known = {*of.names, *settings.model.left_out}
+    left = [name for name in ALL[18:] if name not in known and KIND_OF[name] != "beta"]
+    along = filtered.history.attitude, filtered.coefficients
+    by_linear = sensitivities(recording, of, *along, left, restarts=filtered.restarts)
+    slopes = product_slope(filtered.coefficients) @ by_linear
+    sources, exact = list[TypeB](), dict[str, tuple[float, str]]()
+    for name, slope in zip(left, slopes.T, strict=True):
+        stated_u = settings.model.stated.get(name, (0.0, 0.0))[1]
+        if stated_u > 0.0:
+            sources.append(TypeB(name, stated_u, UNIT_OF[name], slope))
+            continue
+        worst, kind = int(np.argmax(np.abs(slope) / u)), KIND_OF[name]
+        usual = parse_quantity(STATES[kind].prior, STATES[kind].dimension, kind).value
+        shift = abs(slope[worst]) * usual / u[worst]
+        if shift > exact.get(kind, (1.0, ""))[0]:
+            unit, size = shown_unit(UNIT_OF[name])
+            exact[kind] = shift, f"{usual / shift / size:.2g} {unit} of {name} ({of.names[worst]})"
+    return sources, {kind: text for kind, (_, text) in exact.items()}
+
+
 def systematic(
     recording: Recording, settings: SelfcalSettings, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
     """Inputs of site and base stated with an uncertainty; and for each that is stated without one the error of it, in
     words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
     sources, exact = list[TypeB](), dict[str, str]()
+    of = problem(settings)
     for each in systematic_inputs(settings):
+        if each.of_rig:
+            continue
         by = each.u or each.step
         ends = [
             estimate(recording, problem(each.changed(change)), "error-state", history=False).coefficients
@@ -75,5 +109,5 @@ def systematic(
             exact[each.name] = f"an unknown error of {each.name}, as the filter does not follow it"
         elif slope[worst] != 0.0:
             error = u[worst] / abs(slope[worst]) / parse_unit(each.unit).factor
-            exact[each.name] = f"{error:.2g} {each.unit} of {each.name} ({names(len(u))[worst]})"
+            exact[each.name] = f"{error:.2g} {each.unit} of {each.name} ({of.names[worst]})"
     return sources, exact

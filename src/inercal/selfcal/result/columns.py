@@ -12,6 +12,7 @@ is left out here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,17 +21,17 @@ from inercal.arrays import Array
 from inercal.inputs import Source
 from inercal.records.record import Record, record_of
 from inercal.selfcal.filters.filter_result import FilterResult
-from inercal.selfcal.platform.coefficients import divisor, names, units
+from inercal.selfcal.platform.coefficients import divisor, units
 from inercal.selfcal.platform.kinematics import all_angles
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
 from inercal.units import parse_unit
 
 
-def columns(p: int) -> list[tuple[str, str]]:
-    """Names and units, after ``t``, for ``p`` coefficients."""
+def columns(names: Sequence[str]) -> list[tuple[str, str]]:
+    """Names and units, after ``t``, for coefficients."""
     of_coefficients = [
-        (f"{way}{name}", unit) for name, unit in zip(names(p), units(p), strict=True) for way in ("", "u_")
+        (f"{way}{name}", unit) for name, unit in zip(names, units(names), strict=True) for way in ("", "u_")
     ]
     return [
         *((joint, "rad") for joint in JOINTS),
@@ -74,7 +75,7 @@ def history_record(filtered: FilterResult, recording: Recording, world: World) -
         mean = np.where(count > 0, total / count, np.nan)
     last = np.vstack([np.full(2, np.nan), np.column_stack([filtered.nis, mean])])
     source = Source(f"history of {filtered.kind}", "")
-    named = zip(columns(history.u.shape[1]), np.hstack([first, last]).T, strict=True)
+    named = zip(columns(filtered.names), np.hstack([first, last]).T, strict=True)
     made = record_of(
         ((name, parse_unit(symbol), values) for (name, symbol), values in named), recording.t, source
     )

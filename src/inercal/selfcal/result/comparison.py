@@ -13,7 +13,6 @@ from inercal.geometry.rotations import boxminus
 from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult, product_form
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import names
 
 
 def stated_variance(filtered: FilterResult, u: Array) -> Array:
@@ -35,7 +34,7 @@ def beside(
 ) -> dict[str, Any]:
     """An estimator's part of a comparison; ``reference`` (n, 4) the true attitude, where known."""
     values, u = with_stated(other, stated)
-    each = zip(names(len(values)), values.tolist(), u.tolist(), strict=True)
+    each = zip(other.names, values.tolist(), u.tolist(), strict=True)
     return {
         "parameters": {name: {"value": value, "u": own} for name, value, own in each},
         "status": status.value,
@@ -91,6 +90,6 @@ def differing(filtered: FilterResult, others: Mapping[FilterKind, FilterResult])
     worst = int(np.argmax(apart))
     text = (
         f"map, which linearises all rows where it ends, is up to {apart[worst]:.2g} u from {filtered.kind} "
-        f"({names(p)[worst]}): take its values, by --filter map"
+        f"({filtered.names[worst]}): take its values, by --filter map"
     )
-    return [Finding("estimators_differ", text, harm=tuple(names(p)[k] for k in far))]
+    return [Finding("estimators_differ", text, harm=tuple(filtered.names[k] for k in far))]

@@ -26,10 +26,11 @@ from inercal.selfcal.estimators import ESTIMATORS, FACTOR_OF
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import EXTENDED, NAMES, names, product_slope, to_product, units
+from inercal.selfcal.platform.coefficients import NAMES, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.result.budget import systematic, within
+from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF
+from inercal.selfcal.result.budget import considered, systematic, within
 from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import SelfcalSettings
 
@@ -69,12 +70,12 @@ def assemble(
 ) -> Estimate:
     """Put the estimate together; ``bounds`` along the path as it was estimated, with ``contributions``; ``findings`` of
     the diagnosis, beside those of the recording."""
-    p = len(filtered.coefficients)
+    p, kinds = len(filtered.coefficients), list(dict.fromkeys(KIND_OF[name] for name in filtered.names))
     basis = studied(
         COMMAND,
         settings,
         recording.sources,
-        MODEL + (EXTENSION if settings.filter.extended else ""),
+        MODEL + (EXTENSION if {"kg1", "beta"} <= {*kinds} else "") + _on_rig(kinds),
         REFERENCES + ESTIMATORS[filtered.kind].publications,
         _conditions(recording, settings),
     )
@@ -88,6 +89,7 @@ def assemble(
     result: dict[str, Any] = {
         "filter": filtered.kind,
         **({"factor": settings.filter.factor or own} if own else {}),
+        "states": kinds,
         "bounds": {},
         "at_prior": [],
         "goal": {},
@@ -103,9 +105,10 @@ def assemble(
     measured = np.isfinite(filtered.innovations)
     dof = float((measured.sum() if len(measured) else filtered.dims.sum()) - p - 3)
     of_site, exact = systematic(recording, settings, np.sqrt(np.diag(by_filter)))
-    sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site]
-    uncertainty = combine(names(p), sources)
-    if blurred := [each.source for each in of_site if not np.isfinite(each.covariance).all()]:
+    of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
+    sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site, *of_rig]
+    uncertainty = combine(filtered.names, sources)
+    if blurred := [each.source for each in (*of_site, *of_rig) if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
         return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
     if (unusable := singular(bounds.prior, uncertainty.covariance)) is not None:
@@ -118,10 +121,10 @@ def assemble(
     judged = observability(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
     hidden = _hidden(judged, u / bounds.prior, uncertainty.budget)
-    result["at_prior"] = [name for name in names(p) if name in {*judged.at_prior, *hidden}]
+    result["at_prior"] = [name for name in filtered.names if name in {*judged.at_prior, *hidden}]
     result["goal"] = {
         name: {"wanted": goal[name], "u": float(each), "met": bool(each <= goal[name])}
-        for name, each in zip(names(p), u, strict=True)
+        for name, each in zip(filtered.names, u, strict=True)
         if name in goal
     }
     hints = _hardly_turned(recording, settings)
@@ -138,14 +141,20 @@ def assemble(
                 f"{', '.join(exact.values())}; state them with uncertainties"
             )
             all_findings.append(Finding("stated_exact", text))
+        if left_out:
+            text = (
+                f"{', '.join(left_out)} are no states: an error of the rig as large as one u of a coefficient is "
+                f"{', '.join(left_out.values())}; name them in states under [model], or state them with uncertainties"
+            )
+            all_findings.append(Finding("stated_exact", text))
     lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNSEEN and name in NAMES}
     if status is Status.OK and lost:
         status = Status.UNOBSERVABLE
         message = f"{', '.join(lost)}: {next(iter(lost.values()))}; state it better"
     return Estimate.of(
         basis,
-        names(p),
-        units(p),
+        filtered.names,
+        units(filtered.names),
         values,
         uncertainty._replace(dof=effective),
         (status, message),
@@ -164,12 +173,21 @@ def assemble(
     )
 
 
+def _on_rig(kinds: Sequence[str]) -> str:
+    """States of the rig in words."""
+    named = [
+        f"{', '.join(STATES[kind].parameters)}: {STATES[kind].words}" for kind in kinds if STATES[kind].key
+    ]
+    return "".join(f"; {each}" for each in named)
+
+
 def verdict(
     filtered: FilterResult, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
 ) -> tuple[Status, str]:
     """Status and sentence of an estimator, for comparisons."""
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
-    bounds = PathBounds(names(p), slope @ filtered.covariance @ slope.T, settings.prior[:p], np.empty((0, p)))
+    prior = settings.priors[[ALL.index(name) for name in filtered.names]]
+    bounds = PathBounds(filtered.names, slope @ filtered.covariance @ slope.T, prior, np.empty((0, p)))
     if (unusable := useless(filtered, bounds, bounds.covariance)) is not None:
         return unusable
     agreement = nis(filtered.nis, filtered.dims)
@@ -251,7 +269,7 @@ def _left_at_prior(judged: Observability, hints: Mapping[str, str]) -> list[Find
 def _missed(goal: Mapping[str, Mapping[str, Any]], hints: Mapping[str, str]) -> list[Finding]:
     """Goals that were not met."""
     texts = {}
-    for name, unit in zip(EXTENDED, units(len(EXTENDED)), strict=True):
+    for name, unit in UNIT_OF.items():
         if name in goal and not goal[name]["met"]:
             shown, size = shown_unit(unit)
             u, wanted = goal[name]["u"] / size, goal[name]["wanted"] / size

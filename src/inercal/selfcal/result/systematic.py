@@ -10,19 +10,21 @@ from typing import Any
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import Hypothesis
 from inercal.selfcal.diagnosis.fit_quality import Case
+from inercal.selfcal.platform.states import UNIT_OF, StateVector
 from inercal.selfcal.settings import SelfcalSettings
 
 
 @dataclass(frozen=True)
 class SystematicInput:
     """One systematic input: its ``u`` (0 if exact), a ``step`` for the derivative, the study with it ``changed``, and
-    the ``unit`` in which its errors are shown."""
+    the ``unit`` in which its errors are shown; ``of_rig``: a considered state."""
 
     name: str
     u: float
     step: float
     changed: Callable[[float], SelfcalSettings]
     unit: str
+    of_rig: bool = False
 
 
 def systematic_inputs(settings: SelfcalSettings) -> list[SystematicInput]:
@@ -41,7 +43,7 @@ def systematic_inputs(settings: SelfcalSettings) -> list[SystematicInput]:
         SystematicInput("latitude", site.latitude_u, 1e-4, lambda by: _moved(settings, by), "deg"),
         SystematicInput("gravity", gravity_u, 1e-5 * site.gravity, with_gravity, "m/s^2"),
     ]
-    if not settings.filter.extended:
+    if not settings.extended:
         (north, east), (north_u, east_u) = base.tilt, base.tilt_u
         inputs += [
             SystematicInput(
@@ -54,7 +56,26 @@ def systematic_inputs(settings: SelfcalSettings) -> list[SystematicInput]:
                 "tilt about east", east_u, 1e-6, lambda by: with_base(tilt=(north, east + by)), "arcsec"
             ),
         ]
-    return inputs
+    return [*inputs, *_considered(settings)]
+
+
+def _considered(settings: SelfcalSettings) -> list[SystematicInput]:
+    """Errors of the rig that are stated with an uncertainty, but no states."""
+    states, stated = settings.states.names, settings.model.stated
+
+    def changed(name: str) -> Callable[[float], SelfcalSettings]:
+        def by(change: float) -> SelfcalSettings:
+            value, u = stated[name]
+            model = replace(settings.model, stated={**stated, name: (value + change, u)})
+            return replace(settings, model=model)
+
+        return by
+
+    return [
+        SystematicInput(name, u, u, changed(name), UNIT_OF[name], of_rig=True)
+        for name, (_, u) in stated.items()
+        if name not in states and u > 0.0
+    ]
 
 
 def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
@@ -85,12 +106,17 @@ def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
 
     def without(case: Case, values: Array) -> Case:
         recording, problem = case
-        earth, up = problem.world.earth, problem.world.up
+        earth, up, stated = problem.world.earth, problem.world.up, problem.states.stated
         for each, value in zip(uncertain, values, strict=True):
             if value != 0.0:
-                there = each.changed(float(value) * each.u).world
-                earth, up = earth + there.earth - here.earth, up + there.up - here.up
-        return recording, replace(problem, world=problem.world._replace(earth=earth, up=up))
+                there = each.changed(float(value) * each.u)
+                if each.of_rig:
+                    stated = stated + there.states.stated - settings.states.stated
+                else:
+                    earth, up = earth + there.world.earth - here.earth, up + there.world.up - here.up
+        vector = StateVector(problem.names, stated)
+        world = problem.world._replace(earth=earth, up=up)
+        return recording, replace(problem, world=world, vector=vector)
 
     names = tuple(each.name for each in uncertain)
     return Hypothesis(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from inercal.estimate.table import Table, heads
 from inercal.records.places import counted
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult
-from inercal.selfcal.platform.coefficients import names, shown_units
+from inercal.selfcal.platform.coefficients import shown_units
 from inercal.selfcal.platform.plan import Plan, Turn
 from inercal.selfcal.result.comparison import attitude_errors, with_stated
 
@@ -44,14 +44,17 @@ def side_by_side(
     """
     (_, first), *_ = filters.items()
     p = len(first.coefficients)
-    units, size = shown_units(p)
-    by_filter = {kind: with_stated(each, stated) for kind, each in filters.items()}
+    units, size = shown_units(first.names)
+    by_filter = {kind: _onto(p, *with_stated(each, stated)) for kind, each in filters.items()}
     values, u = with_stated(first, stated)
     true = None if truth is None else truth[:p]
     rows, costs = [], []
-    for k, name in enumerate(names(p)):
+    for k, name in enumerate(first.names):
         true_value = () if true is None else (f"{true[k] / size[k]:.6g}",)
-        own = (rounded(c[k] / size[k], u[k] / size[k])[0] for c, _ in by_filter.values())
+        own = (
+            rounded(c[k] / size[k], u[k] / size[k])[0] if name in filters[kind].names else "–"
+            for kind, (c, _) in by_filter.items()
+        )
         last = rounded(values[k] / size[k], u[k] / size[k])[1]
         rows.append((name, units[k], *true_value, *own, last))
     for kind, each in filters.items():
@@ -70,7 +73,7 @@ def side_by_side(
             tuple(rows),
             2,
         ),
-        _apart(by_filter, values, u, true),
+        _apart(first.names, by_filter, values, u, true),
         Table(
             "Verdict and time of each filter",
             "Mean normalised innovation squared, expected 6 where all six scalars of a row are used; largest "
@@ -84,6 +87,12 @@ def side_by_side(
             3,
         ),
     ]
+
+
+def _onto(p: int, values: Array, u: Array) -> tuple[Array, Array]:
+    """Values and u for the ``p`` coefficients of the estimator that counts, NaN for those that another one lacks."""
+    room = np.full(p - len(values), np.nan)
+    return np.append(values, room), np.append(u, room)
 
 
 def of_attitudes(filters: Mapping[FilterKind, FilterResult], reference: Array) -> Table:
@@ -105,14 +114,17 @@ def of_attitudes(filters: Mapping[FilterKind, FilterResult], reference: Array) -
 
 
 def _apart(
-    by_filter: Mapping[FilterKind, tuple[Array, Array]], values: Array, u: Array, true: Array | None
+    names: Sequence[str],
+    by_filter: Mapping[FilterKind, tuple[Array, Array]],
+    values: Array,
+    u: Array,
+    true: Array | None,
 ) -> Table:
     """Errors in percent of the truth where that is known, else differences from the first in its uncertainties."""
-    named = list(enumerate(names(len(values))))
+    named = list(enumerate(names))
     if true is None:
         rows = [
-            (name, *(short(float((c[k] - values[k]) / u[k])) for c, _ in by_filter.values()))
-            for k, name in named
+            (name, *(_difference(c[k] - values[k], u[k]) for c, _ in by_filter.values())) for k, name in named
         ]
         caption = f"Estimate less that of {next(iter(by_filter))}, over its u."
         return Table(
@@ -120,7 +132,7 @@ def _apart(
         )
 
     def percent(part: Array, k: int) -> str:
-        return short(float(100.0 * part[k] / abs(true[k]))) if true[k] else "–"
+        return _difference(100.0 * part[k], abs(true[k])) if true[k] else "–"
 
     rows = [
         (name, *(percent((c - true) * np.sign(true), k) for c, _ in by_filter.values()), percent(u, k))
@@ -132,6 +144,11 @@ def _apart(
         heads("coefficient", *by_filter, "u"),
         tuple(rows),
     )
+
+
+def _difference(difference: float, size: float) -> str:
+    """A difference over a size; a dash where a filter does not have the coefficient."""
+    return "–" if np.isnan(difference) else short(float(difference / size))
 
 
 def weak_combinations(bounds: PathBounds) -> Table:
@@ -217,7 +234,7 @@ def paths(designed: Designed) -> Table:
 def bounds_by_path(designed: Designed) -> Table:
     """Bounds of every path, in units of the field."""
     bounds, first = [each.observability.bounds for each in designed.compare], designed.compare[0]
-    units, size = shown_units(len(bounds[0].names))
+    units, size = shown_units(bounds[0].names)
     to_goal = first.observability.to_goal
     rows = [
         (
@@ -243,7 +260,7 @@ def bounds_by_path(designed: Designed) -> Table:
 
 def campaign_table(campaign: Campaign) -> Table:
     """Errors of each coefficient over many simulated runs."""
-    units, size = shown_units(len(campaign.names))
+    units, size = shown_units(campaign.names)
     coverage, rms = campaign.coverage, np.sqrt(np.mean(np.square(campaign.error), axis=0))
     sizes = np.array([campaign.error.mean(axis=0), rms, campaign.bound]) / size
     rows = [

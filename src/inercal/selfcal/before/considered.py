@@ -1,0 +1,194 @@
+"""Considered states: errors of the rig that are in the recording, but not among the states of an estimator.
+
+The estimator does not know an error b of such a state; its own errors x, attitude and states, go on as
+
+    x+ = F x + G b,   z = H x + D b + v,   x <- x - K z,   K the gain of the estimator,
+
+so that the sensitivity S = dx/db goes on as ``S+ = F S + G``, ``S <- S - K (H S + D)`` (S. F. Schmidt, Application of
+state-space methods to navigation problems, Advances in Control Systems 3 (1966) 293; A. H. Jazwinski, Stochastic
+Processes and Filtering Theory, 1970, section 8.4). G and D are the columns that the state would have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inercal._jit import kernel
+from inercal.arrays import Array
+from inercal.estimate.kalman import Row, empty_row
+from inercal.geometry.kernels import exp, right_jacobian, rotate
+from inercal.selfcal.before.bounds import Path
+from inercal.selfcal.filters.gaps import anew
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, encoders_at, updating, watch
+from inercal.selfcal.platform.kinematics import attitude
+from inercal.selfcal.platform.linearised import (
+    WIDEST,
+    Columns,
+    Places,
+    Step,
+    accelerometer_row,
+    dynamics_columns,
+    empty_columns,
+    encoder_columns,
+    encoder_roots,
+    propagate_covariance,
+)
+from inercal.selfcal.platform.model import Rates, on_the_base, platform_rate, sensing, specific_force
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import ALL, Layout, StateVector
+
+
+def sensitivities(
+    recording: Recording,
+    problem: FilterProblem,
+    attitudes: Array,
+    coefficients: Array,
+    names: Sequence[str],
+    restarts: Sequence[int] = (),
+) -> Array:
+    """Changes (p, m) of the estimates of a problem's states, linear form, per error of each of ``names`` (m,), SI.
+
+    ``attitudes`` (n, 4), ``coefficients`` and ``restarts`` as of `inercal.selfcal.before.bounds.recorded_bounds`.
+    """
+    p, m = len(coefficients), len(names)
+    states = problem.states
+    place = np.full(len(ALL), -1, dtype=np.int64)
+    place[states.index] = 3 + np.arange(p)
+    place[[ALL.index(name) for name in names]] = 3 + p + np.arange(m)
+    full = states.stated.copy()
+    full[states.index] = coefficients
+    whole = StateVector((*states.names, *names), states.stated)
+    wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole)
+    P, S = np.diag(np.append(np.full(3, problem.noise.encoder**2), problem.prior**2)), np.zeros((3 + p, m))
+    seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
+    q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
+    first = 0
+    model = problem.model._replace(layout=Layout(states.index, place, full))
+    for last in (*restarts, len(q)):
+        _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
+        rows, steps = slice(first, last), slice(first, max(last - 1, 0))
+        carry(P, S, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows]), full, model)
+        if last < len(q):
+            P[:3], P[:, :3], S[:3] = 0.0, 0.0, 0.0
+            P[np.diag_indices(3)] = anew(problem, th[last]).sigma ** 2
+        first = last
+    return -S[3:]
+
+
+def _on_encoders(P: Array, S: Array, wide: FilterProblem, th: Array, c: Array, rate: Array) -> None:
+    """Put into covariance (3 + p, 3 + p) and sensitivities (3 + p, m) that the attitude is that of the encoders.
+
+    ``wide`` has all states, estimated ones first; ``c`` are their values. A delay may be that of a platform at rest.
+    """
+    p = len(P) - 3
+    _, slope = encoders_at(wide, th, c, 0.0 * rate)
+    own = slope[:, :p]
+    whole = np.eye(3 + p)
+    whole[:3, 3:] = own
+    P[:] = whole @ P @ whole.T
+    S[:3] = own @ S[3:] + slope[:, p:]
+
+
+@kernel
+def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
+    """Covariance ``P`` (n, n) of the error state and sensitivities ``S`` (n, m) along a path, in place; ``c`` is the
+    whole full vector, linear form; in the layout considered states have the places behind the n."""
+    q, th, dt, w, seen = path
+    world, noise, gate, layout = model
+    n, place = len(P), layout.place
+    own = place.copy()
+    for i in range(len(own)):
+        if own[i] >= n:
+            own[i] = -1
+    top, gain, row, columns = np.empty((3, n)), np.empty(n), empty_row(WIDEST), empty_columns()
+    shift, near = np.empty((3, S.shape[1])), np.zeros(3, dtype=np.int64)
+    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    variance = noise.accelerometer * noise.accelerometer
+    for k in range(1, len(q)):
+        at, following = (q[k, 0], q[k, 1], q[k, 2], q[k, 3]), min(k, len(w) - 1)
+        commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
+        read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
+        step = Step(commanded, platform_rate(commanded, c), earth_e, at, dt[k - 1])
+        _carry_step(S, n, c, place, step, shift, columns)
+        walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
+        propagate_covariance(P, c, own, step, walk, top, columns)
+        if seen[k, 3]:
+            watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
+        if updating(gate, near):
+            if seen[k, 3]:
+                roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                wide = encoder_columns(th[k], at, read, earth_e, c, place, world.axes, world.signs, columns)
+                for i in range(3):
+                    root = roots[i]
+                    for j in range(i + 1):
+                        row.places[j], row.values[j] = j, root[j]
+                    for a in range(wide):
+                        x, y, z = columns.axes[a, 0], columns.axes[a, 1], columns.axes[a, 2]
+                        row.places[1 + i + a] = columns.places[a]
+                        row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
+                    _update(P, S, row, i + 1 + wide, 1.0, gain)
+            sensed = sensing(at, read, earth_e, up_e, c)
+            for i in range(3):
+                if seen[k, i] and admitted(i, gate, near):
+                    size = accelerometer_row(i, sensed, c, place, up_e, row)
+                    _update(P, S, row, size, variance, gain)
+
+
+@kernel
+def _carry_step(
+    S: Array, n: int, c: Array, place: Places, step: Step, shift: Array, columns: Columns
+) -> None:
+    """Sensitivities after a step; ``shift`` (3, m) and ``columns`` are used up."""
+    w, rate, dt, m = step.commanded, step.rate, step.dt, S.shape[1]
+    j = right_jacobian((rate[0] * dt, rate[1] * dt, rate[2] * dt))
+    back = exp((-rate[0] * dt, -rate[1] * dt, -rate[2] * dt))
+    count = dynamics_columns(c, place, step, columns)
+    for k in range(m):
+        v = rotate(back, (S[0, k], S[1, k], S[2, k]))
+        x = S[3, k] + w[1] * S[9, k] - w[2] * S[12, k]
+        y = S[4, k] + w[2] * S[10, k] - w[0] * S[13, k]
+        z = S[5, k] + w[0] * S[11, k] - w[1] * S[14, k]
+        for i in range(3):
+            shift[i, k] = v[i] + dt * (j[i][0] * x + j[i][1] * y + j[i][2] * z)
+    for a in range(count):
+        at = columns.places[a]
+        for i in range(3):
+            if at >= n:
+                shift[i, at - n] += columns.axes[a, i]
+            else:
+                for k in range(m):
+                    shift[i, k] += columns.axes[a, i] * S[at, k]
+    for i in range(3):
+        for k in range(m):
+            S[i, k] = shift[i, k]
+
+
+@kernel
+def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array) -> None:
+    """Covariance and sensitivities after a scalar measurement of variance ``r``; ``gain`` (n,) is used up."""
+    places, values = row.places, row.values
+    n, m = S.shape
+    variance = r
+    for i in range(n):
+        gain[i] = 0.0
+        for a in range(size):
+            if places[a] < n:
+                gain[i] += P[i, places[a]] * values[a]
+    for a in range(size):
+        if places[a] < n:
+            variance += values[a] * gain[places[a]]
+    for k in range(m):
+        seen = 0.0
+        for a in range(size):
+            if places[a] < n:
+                seen += values[a] * S[places[a], k]
+            elif places[a] == n + k:
+                seen += values[a]
+        for i in range(n):
+            S[i, k] -= gain[i] * seen / variance
+    for i in range(n):
+        of_row = gain[i] / variance
+        for j in range(n):
+            P[i, j] -= of_row * gain[j]

@@ -1,0 +1,198 @@
+"""The one table of states that an estimator of a platform may have: names, units, priors, meaning, source.
+
+A platform is described by one array of all parameters, the *full vector* (K,), in the order of `ALL`: the 24 of
+`inercal.selfcal.platform.coefficients`, in the linear form, then those of the rig. An estimator has some of them as
+states; the others stay at the values that the study states, 0 if it is silent. Kernels take the full vector no longer
+than it is needed: 18, 24 or K numbers.
+
+`inercal.selfcal.platform.model` is what each state does, `inercal.selfcal.platform.linearised` its derivative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.arrays import Array
+
+
+class State(NamedTuple):
+    """States of one kind: their ``parameters``, SI ``unit``, ``dimension`` of a quantity, usual ``prior``, an
+    ``example``, the meaning in ``words``, the ``key`` of a study, and the ``source`` of the equation."""
+
+    parameters: tuple[str, ...]
+    unit: str
+    dimension: str
+    prior: str
+    example: str
+    words: str
+    key: str = ""
+    source: str = ""
+
+
+def _by_axis(name: str) -> tuple[str, str, str]:
+    """Parameters of the axes x, y, z."""
+    return f"{name}_x", f"{name}_y", f"{name}_z"
+
+
+_CHAIN = (
+    "R. Paul, Robot Manipulators, MIT Press (1981): a chain of turns, each axis turned against the one before"
+)
+_DELAY = "J. Kelly, G. S. Sukhatme, A general framework for temporal calibration, ISER 2010: delays as states"
+_IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
+
+STATES: Final[Mapping[str, State]] = {
+    "kg0": State(_by_axis("kg0"), "rad/s", "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases"),
+    "eta": State(
+        ("eta_pz", "eta_oy", "eta_oz"), "rad", "angle", "300 arcsec", "60 arcsec",
+        "misalignments eta of accelerometers, pz, oy, oz",
+    ),
+    "ds": State(_by_axis("ds"), "rad", "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros"),
+    "do": State(_by_axis("do"), "rad", "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros"),
+    "ka0": State(_by_axis("ka0"), "m/s^2", "acceleration", "500 ug", "100 ug", "accelerometer biases"),
+    "ka1": State(_by_axis("ka1"), "1", "number", "1500 ppm", "500 ppm", "accelerometer scale errors"),
+    "kg1": State(
+        _by_axis("kg1"), "1", "number", "100 ppm", "10 ppm", "gyro scale errors, in the extended model"
+    ),
+    "beta": State(
+        _by_axis("beta"), "rad", "angle", "60 arcsec", "5 arcsec",
+        "the encoders' zero, in the extended model",
+    ),
+    "gamma": State(
+        _by_axis("gamma"), "rad", "angle", "20 arcsec", "0(20) arcsec",
+        "turn of the sensors' axes p against the last gimbal, about the axes of p", "gamma", _CHAIN,
+    ),
+    "non_orthogonality": State(
+        ("nonorth_xy", "nonorth_yz"), "rad", "angle", "20 arcsec", "0(20) arcsec",
+        "inner axis against the outer, turned about the last at zero angles; last axis against the inner, turned "
+        "about the outer", "non_orthogonality", _CHAIN,
+    ),
+    "zero_y": State(
+        ("zero_y",), "rad", "angle", "20 arcsec", "0(20) arcsec",
+        "reading of the inner encoder where the joint is at zero", "zero_y", _CHAIN,
+    ),
+    "delay": State(
+        ("tau_enc", "tau_a"), "s", "time", "5 ms", "0(5) ms",
+        "time by which encoders, accelerometers are late against the rates, measured or commanded", "delay", _DELAY,
+    ),
+    "k2": State(
+        _by_axis("K2"), "1/(m/s^2)", "quadratic", "20 ug/g^2", "0(20) ug/g^2",
+        "second-order coefficients of accelerometers", "k2", _IEEE_1293,
+    ),
+    "levers": State(
+        tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz"), "m", "length", "50 mm", "0(50) mm",
+        "place of accelerometer x, y, z in p from the centre of the gimbals, along x, y, z", "levers",
+        "centripetal acceleration w x (w x r) of textbooks on mechanics",
+    ),
+    "scale_asymmetry": State(
+        _by_axis("S_asym"), "1", "number", "10 ppm", "0(10) ppm",
+        "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
+        "IEEE Std 952: scale-factor asymmetry",
+    ),
+}  # fmt: skip
+"""Name of a kind -> its states; the first six are the paper's, the next two the extended model's."""
+
+ALL: Final[tuple[str, ...]] = tuple(name for state in STATES.values() for name in state.parameters)
+"""Names of the full vector, in order."""
+
+UNIT_OF: Final[Mapping[str, str]] = {
+    name: state.unit for state in STATES.values() for name in state.parameters
+}
+"""SI unit of each parameter."""
+
+KIND_OF: Final[Mapping[str, str]] = {
+    name: kind for kind, state in STATES.items() for name in state.parameters
+}
+"""Kind that each parameter belongs to."""
+
+PAPER: Final[tuple[str, ...]] = tuple(STATES)[:6]
+EXTENDED_MODEL: Final[tuple[str, ...]] = tuple(STATES)[:8]
+RIG: Final[tuple[str, ...]] = (*EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay")
+
+WORDS: Final[Mapping[str, tuple[str, ...]]] = {"paper": PAPER, "extended": EXTENDED_MODEL, "rig": RIG}
+"""Word for a set of states -> their kinds."""
+
+GAMMA: Final = ALL.index("gamma_x")
+NONORTH: Final = ALL.index("nonorth_xy")
+ZERO_Y: Final = ALL.index("zero_y")
+TAU: Final = ALL.index("tau_enc")
+K2: Final = ALL.index("K2_x")
+LEVER: Final = ALL.index("r_xx")
+ASYM: Final = ALL.index("S_asym_x")
+"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer."""
+
+
+class Layout(NamedTuple):
+    """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
+    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states."""
+
+    chosen: NDArray[np.int64]
+    place: NDArray[np.int64]
+    stated: Array
+
+
+@dataclass(frozen=True, eq=False)
+class StateVector:
+    """States of an estimator: their ``names``, and the ``stated`` (K,) full vector of what is not estimated."""
+
+    names: tuple[str, ...]
+    stated: Array
+
+    @property
+    def index(self) -> NDArray[np.int64]:
+        """(p,) places in the full vector."""
+        return np.array([ALL.index(name) for name in self.names], dtype=np.int64)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The same for kernels."""
+        index, place = self.index, np.full(len(ALL), -1, dtype=np.int64)
+        place[index] = 3 + np.arange(len(index))
+        longest = max(int(index.max(initial=-1)), int(np.flatnonzero(self.stated).max(initial=-1)))
+        size = next(size for size in (18, 24, len(ALL)) if longest < size)
+        return Layout(index, place, self.stated[:size].copy())
+
+    def full(self, c: Array) -> Array:
+        """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
+        whole = self.layout.stated.copy()
+        whole[self.layout.chosen] = c
+        return whole
+
+    @property
+    def of_rig(self) -> bool:
+        """True where there are states of the rig, or stated values of them."""
+        return len(self.layout.stated) > 24
+
+    def has(self, kind: str) -> bool:
+        """True where all parameters of a kind are states."""
+        return set(STATES[kind].parameters) <= set(self.names)
+
+
+#: joint 0, 1, 2 -> parameters that nobody can tell, where it stands still, from those of another kind
+_TWINS: Final[tuple[Mapping[str, str], ...]] = (
+    {"nonorth_xy": "beta", "zero_y": "beta"},
+    {"nonorth_xy": "gamma", "nonorth_yz": "beta"},
+    {"nonorth_yz": "gamma", "zero_y": "gamma"},
+)
+
+
+def twins(kinds: Sequence[str], fixed: Sequence[int]) -> tuple[str, ...]:
+    """Parameters of some kinds that are left out where joints ``fixed`` (0 outer, 1 inner, 2 platform) stand still: a
+    turn between two joints that move not against each other is one of gamma, or of beta."""
+    left = {name for joint in fixed for name, twin in _TWINS[joint].items() if twin in kinds}
+    if len(fixed) > 1 and {"gamma", "beta"} <= {*kinds}:
+        left = {"nonorth_xy", "nonorth_yz", "zero_y"}
+    return tuple(name for name in ALL if name in left and KIND_OF[name] in kinds)
+
+
+def state_vector(
+    kinds: Sequence[str], stated: Array | None = None, left_out: Sequence[str] = ()
+) -> StateVector:
+    """The states of some kinds, in the order of the table, but those ``left_out``."""
+    names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in left_out)
+    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated)

@@ -1,0 +1,347 @@
+"""States of the rig: derivatives against differences of a model written again, and values found in recordings by a
+simulator of its own: joints that move, and sensors that read them, with SciPy's rotations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from paper_study import ARCSEC, DEG, MICRO_G, study
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from inercal.estimate.kalman import empty_row
+from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.considered import sensitivities
+from inercal.selfcal.filters.problem import encoders_at, problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform import linearised, model
+from inercal.selfcal.platform.coefficients import to_linear, to_product
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.rig import Gimbals
+from inercal.selfcal.platform.states import ALL, RIG, STATES
+from inercal.selfcal.reading import told_apart
+from inercal.selfcal.result.outcome import assemble
+from inercal.selfcal.settings import Model
+
+WHOLE = (*RIG, "k2", "levers", "scale_asymmetry")
+MOVES = (("y", 60), ("z", 180), ("x", 90), ("y", -100), ("z", -180), ("x", -120), ("y", 70), ("z", 90))
+"""Turns of one joint after the other [deg], each axis of p through the vertical and the level."""
+
+
+def of(name, c):
+    """Parameters of a kind in the full vector, linear form."""
+    return np.array([c[ALL.index(each)] for each in STATES[name].parameters])
+
+
+def turned(axis, angle):
+    """Rotations about an axis 0, 1, 2 by angles (n,) [rad]."""
+    return Rotation.from_rotvec(np.multiply.outer(np.atleast_1d(angle), np.eye(3)[axis]))
+
+
+def chain(th, c, gimbals):
+    """Attitudes of p in e as joints (n, 3) [rad] are read."""
+    (i, j, k), signs = gimbals.index, gimbals.sign
+    xy, yz = of("non_orthogonality", c)
+    outer = turned(i, signs[0] * th[:, 0]) * turned(k, xy)
+    inner = turned(j, signs[1] * (th[:, 1] - of("zero_y", c)[0])) * turned(i, yz)
+    return outer * inner * turned(k, signs[2] * th[:, 2]) * Rotation.from_rotvec(of("gamma", c))
+
+
+def gyro_matrix(c):
+    """Matrix and signs' part of the gyros: w_p = (1 + M) w + |w| asymmetry / 2 + kg0."""
+    ds, do = of("ds", c), of("do", c)
+    return (
+        np.eye(3)
+        + np.array([[0, ds[0], -do[0]], [-do[1], 0, ds[1]], [ds[2], -do[2], 0]])
+        + np.diag(of("kg1", c))
+    )
+
+
+def accelerometer_outputs(f, w, c):
+    """Outputs (n, 3) at specific force (n, 3) at the centre and rate (n, 3), product form, term by term."""
+    c = to_product(c)
+    arm = of("levers", c).reshape(3, 3)
+    f = f + np.stack([np.cross(w, np.cross(w, arm[i]))[:, i] for i in range(3)], axis=-1)
+    pz, oy, oz = of("eta", c)
+    along = np.stack([f[:, 0], f[:, 1] - oy * f[:, 0], f[:, 2] + pz * f[:, 0] - oz * f[:, 1]], axis=-1)
+    return of("ka0", c) + (1 + of("ka1", c)) * (along + of("k2", c) * along**2)
+
+
+def random_vector(rng, settings):
+    """A full vector, linear form: every parameter of the size of its prior."""
+    return settings.priors * rng.standard_normal(len(ALL))
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("gimbals", [Gimbals(), Gimbals(("y", "z", "x"), (1, -1, -1))])
+def test_columns_of_the_encoders_are_derivatives(gimbals):
+    settings = study(model=Model(WHOLE), gimbals=gimbals)
+    posed, rng = problem(settings), np.random.default_rng(5)
+    c, th, w = random_vector(rng, settings), rng.uniform(-1.2, 1.2, 3), 0.02 * rng.standard_normal(3)
+    world, (late, _) = posed.world, of("delay", c)
+
+    def attitude(states):
+        full = c.copy()
+        full[posed.states.index] = states
+        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        earth = Rotation.from_rotvec(of("beta", full)).apply(world.earth)
+        tau = of("delay", full)[0]
+        return (
+            Rotation.from_rotvec(-earth * tau)
+            * chain(th[None], full, gimbals)[0]
+            * Rotation.from_rotvec(rate * tau)
+        )
+
+    x = c[posed.states.index]
+    q, slope = encoders_at(posed, th, x, w)
+    assert abs(late) > 1e-4
+    np.testing.assert_allclose(
+        Rotation.from_quat(np.roll(q, -1)).as_matrix(), attitude(x).as_matrix(), atol=1e-12
+    )
+    for k, name in enumerate(posed.names):
+        step = 0.1 * posed.prior[k] * np.eye(len(x))[k]
+        expected = (attitude(x - step).inv() * attitude(x + step)).as_rotvec() / (0.2 * posed.prior[k])
+        # the turn within a delay, and what other states do to it, are left out of the columns: so much less than 0.05"
+        off = np.abs(slope[:, k] - expected).max() * posed.prior[k]
+        assert off < 1e-3 * np.abs(slope[:, k]).max() * posed.prior[k] + 0.05 * ARCSEC, name
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(3))
+def test_rows_of_the_accelerometers_are_derivatives(seed):
+    settings = study(model=Model(WHOLE))
+    posed, rng = problem(settings), np.random.default_rng(seed)
+    c, w = random_vector(rng, settings), 0.03 * rng.standard_normal(3)
+    place, world, start = posed.states.layout.place, posed.world, Rotation.random(random_state=seed)
+    read = model.Rates(tuple(w), tuple(w))
+
+    def outputs(error):
+        full = c.copy()
+        full[posed.states.index] += error[3:]
+        base, tau = Rotation.from_rotvec(of("beta", full)), of("delay", full)[1]
+        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        at = start * Rotation.from_rotvec(error[:3])
+        then = Rotation.from_rotvec(base.apply(world.earth) * tau) * at * Rotation.from_rotvec(-rate * tau)
+        return accelerometer_outputs(then.inv().apply(base.apply(world.up))[None], rate[None], full)[0]
+
+    n = 3 + len(posed.names)
+    earth, up = (model.on_the_base(v, c) for v in (world.earth, world.up))
+    q = np.roll(start.as_quat(), 1)
+    sensed = model.sensing(tuple(q), read, earth, up, c)
+    np.testing.assert_allclose(model.outputs(sensed, c), outputs(np.zeros(n)), atol=1e-8)
+    size = np.append(np.full(3, 1e-4), posed.prior)
+    rows = np.zeros((3, n))
+    for i in range(3):
+        row = empty_row(linearised.WIDEST)
+        count = linearised.accelerometer_row(i, sensed, c, place, up, row)
+        rows[i, row.places[:count]] = row.values[:count]
+    for k in range(n):
+        step = 0.1 * size[k] * np.eye(n)[k]
+        expected = (outputs(step) - outputs(-step)) / 0.2
+        # K2 and delays are left out of derivatives by others: so much less than 10 ug
+        assert (
+            np.abs(rows[:, k] * size[k] - expected).max() < 0.02 * np.abs(expected).max() + 0.5 * MICRO_G
+        ), k
+
+
+@pytest.mark.kernels
+def test_columns_of_a_step_are_derivatives():
+    settings = study(model=Model(WHOLE))
+    posed, rng = problem(settings), np.random.default_rng(7)
+    c, w, dt = random_vector(rng, settings), 0.3 * rng.standard_normal(3), 0.2
+    start, place = Rotation.random(random_state=1), posed.states.layout.place
+
+    def after(states):
+        full = c.copy()
+        full[posed.states.index] = states
+        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        earth = Rotation.from_rotvec(of("beta", full)).apply(posed.world.earth)
+        return Rotation.from_rotvec(-earth * dt) * start * Rotation.from_rotvec(rate * dt)
+
+    x = c[posed.states.index]
+    q = tuple(np.roll(after(x).as_quat(), 1))
+    rate, earth = model.platform_rate(tuple(w), c), model.on_the_base(posed.world.earth, c)
+    columns = linearised.empty_columns()
+    count = linearised.dynamics_columns(c, place, linearised.Step(tuple(w), rate, earth, q, dt), columns)
+    found = dict(zip(columns.places[:count].tolist(), columns.axes[:count], strict=True))
+    for k, name in enumerate(posed.names[18:], start=18):
+        step = 0.1 * posed.prior[k] * np.eye(len(x))[k]
+        expected = (after(x - step).inv() * after(x + step)).as_rotvec() / (0.2 * posed.prior[k])
+        np.testing.assert_allclose(
+            found.get(3 + k, np.zeros(3)), expected, rtol=1e-4, atol=1e-8, err_msg=name
+        )
+
+
+def moved(t):
+    """Angles of the joints (n, 3) [rad] at times (n,), 2 deg/s, at rest before the first turn and after the last."""
+    ends, angles = [5.0], [np.zeros(3)]
+    for joint, by in MOVES:
+        step = np.zeros(3)
+        step["xyz".index(joint)] = by * DEG
+        ends.append(ends[-1] + abs(by) / 2.0)
+        angles.append(angles[-1] + step)
+    return np.stack([np.interp(t, ends, np.array(angles)[:, k]) for k in range(3)], axis=-1)
+
+
+LONG = 5.0 + sum(abs(by) for _, by in MOVES) / 2.0 + 5.0
+
+
+def recorded(settings, c, rng, dt=0.2):
+    """A recording by joints that move as `moved`, read by sensors of the full vector ``c`` (linear form)."""
+    noise, world, gimbals = settings.noise, settings.world, settings.gimbals
+    t = dt * np.arange(int(LONG / dt) + 1)
+    base = Rotation.from_rotvec(of("beta", c))
+    earth, up = base.apply(world.earth), base.apply(world.up)
+    zero = replace_kind(c, "zero_y", 0.0)  # joints as they are, not as they are read
+
+    def attitude(at):
+        return chain(moved(at), zero, gimbals)
+
+    def rate(begin, end):
+        """Mean rates against inertial space, in p."""
+        spin = Rotation.from_rotvec(np.multiply.outer(end - begin, earth))
+        return (attitude(begin).inv() * spin * attitude(end)).as_rotvec() / (end - begin)[:, None]
+
+    late, of_acc = of("delay", c)
+    th = moved(t - late) + [0.0, of("zero_y", c)[0], 0.0] + noise.encoder * rng.standard_normal((len(t), 3))
+    h = 1e-3
+    w = rate(t - of_acc - h, t - of_acc)
+    acc = accelerometer_outputs(attitude(t - of_acc).inv().apply(up), w, c)
+    acc += noise.accelerometer * rng.standard_normal(acc.shape)
+    true = rate(t[:-1], t[1:]) + noise.angle_random_walk / np.sqrt(dt) * rng.standard_normal((len(t) - 1, 3))
+    # w_p = (1 + M) w + |w| asymmetry / 2 + kg0, for w
+    read = true
+    for _ in range(5):
+        fixed = true - of("kg0", c) - 0.5 * of("scale_asymmetry", c) * np.abs(read)
+        read = np.linalg.solve(gyro_matrix(c), fixed.T).T
+    return Recording(t, read, th, acc, measured=True)
+
+
+def replace_kind(c, kind, value):
+    """A full vector with other values of a kind."""
+    c = c.copy()
+    c[[ALL.index(name) for name in STATES[kind].parameters]] = value
+    return c
+
+
+def drawn(settings, rng, kinds, delay=1.0):
+    """A full vector, linear form, with values drawn from the priors of some kinds."""
+    c = np.zeros(len(ALL))
+    for kind in kinds:
+        at = [ALL.index(name) for name in STATES[kind].parameters]
+        c[at] = settings.priors[at] * rng.standard_normal(len(at)) * (delay if kind == "delay" else 1.0)
+    return to_linear(c)
+
+
+PAPER_KINDS = tuple(STATES)[:6]
+BASE = study(prior=np.append(study().prior[:18], [100e-6] * 3 + [60 * ARCSEC] * 3))
+
+
+@pytest.mark.parametrize(
+    "kind", ["gamma", "non_orthogonality", "zero_y", "delay", "k2", "levers", "scale_asymmetry"]
+)
+def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
+    """All states within 4.5 u of the truth, and those asked for are worth something; without them all is wrong."""
+    settings = replace(BASE, model=Model((*PAPER_KINDS, kind)))
+    posed, rng = problem(settings), np.random.default_rng(11)
+    c = drawn(settings, rng, (*PAPER_KINDS, kind))
+    recording = recorded(settings, c, rng)
+    found = estimate(recording, posed, "error-state", history=False)
+    u = np.sqrt(np.diag(found.covariance))
+    error = (found.coefficients - c[posed.states.index]) / u
+    assert np.abs(error).max() < 4.5
+    assert error @ np.linalg.solve(found.covariance / np.outer(u, u), error) < chi2.ppf(1 - 1e-4, len(u))
+    assert (u[18:] < 0.5 * posed.prior[18:]).any()
+    paper = estimate(recording, problem(BASE), "error-state", history=False)
+    off = np.abs(paper.coefficients - c[:18]) / np.sqrt(np.diag(paper.covariance))
+    assert off.max() > 5.0
+
+
+@pytest.mark.parametrize("kind", ["error-state", "map", "mukf"])
+def test_estimators_agree_on_a_rig_with_all_errors(kind):
+    settings = replace(BASE, model=Model(WHOLE))
+    posed, rng = problem(settings), np.random.default_rng(12)
+    c = drawn(settings, rng, STATES, delay=0.1)
+    found = estimate(recorded(settings, c, rng), posed, kind, history=False)
+    error = found.coefficients - c[posed.states.index]
+    assert found.converged
+    assert error @ np.linalg.solve(found.covariance, error) < chi2.ppf(1 - 1e-4, len(error))
+
+
+@pytest.mark.slow
+def test_uncertainties_of_rig_states_hold():
+    """NEES of the states over 12 draws from their priors, within limits that 1 in 10000 leaves."""
+    settings = replace(BASE, model=Model(RIG))
+    posed, rng, total = problem(settings), np.random.default_rng(13), 0.0
+    for _ in range(12):
+        c = drawn(settings, rng, RIG)
+        found = estimate(recorded(settings, c, rng), posed, "error-state", history=False)
+        error = found.coefficients - c[posed.states.index]
+        total += error @ np.linalg.solve(found.covariance, error)
+    low, high = chi2.ppf([5e-5, 1 - 5e-5], 12 * len(posed.names))
+    assert low < total < high
+
+
+def test_sensitivities_are_those_of_the_filter_run_again():
+    """Each error of the rig that is no state: one run of the sensitivity, and two of the filter with it stated."""
+    posed, rng = problem(BASE), np.random.default_rng(14)
+    recording = recorded(BASE, drawn(BASE, rng, PAPER_KINDS), rng)
+    found = estimate(recording, posed, "error-state")
+    names = ("kg1_z", "gamma_y", "nonorth_yz", "zero_y", "tau_enc", "tau_a", "K2_x", "r_yy", "S_asym_z")
+    slopes = sensitivities(recording, posed, found.history.attitude, found.coefficients, names)
+    u = np.sqrt(np.diag(found.covariance))
+    for name, slope in zip(names, slopes.T, strict=True):
+        step = 0.01 * BASE.priors[ALL.index(name)]
+        ends = [
+            estimate(
+                recording,
+                problem(replace(BASE, model=Model(None, {name: (by, 0.0)}))),
+                "error-state",
+                None,
+                False,
+            )
+            for by in (step, -step)
+        ]
+        # a value that is taken out acts as its opposite in the recording
+        by_runs = (ends[1].coefficients - ends[0].coefficients) / (2.0 * step)
+        # of delays the two sides differ where a turn begins
+        assert np.abs((slope - by_runs) / u).max() < 0.03 * np.abs(slope / u).max(), name
+
+
+def test_what_is_stated_but_not_estimated_enters_u():
+    """gamma stated as 0(5) arcsec: u of the coefficients covers errors of so much, which the paper's model does not."""
+    gamma = dict.fromkeys(STATES["gamma"].parameters, (0.0, 5 * ARCSEC))
+    settings = replace(BASE, model=Model(None, gamma))
+    rng = np.random.default_rng(15)
+    c = drawn(BASE, rng, PAPER_KINDS)
+    c[[ALL.index(name) for name in gamma]] = 5 * ARCSEC
+    recording = recorded(BASE, c, rng)
+    results = {}
+    for key, each in (("stated", settings), ("exact", BASE)):
+        posed = problem(each)
+        found = estimate(recording, posed, "error-state")
+        path = recorded_bounds(
+            recording, posed, found.history.attitude, found.coefficients, contributions=True
+        )
+        results[key] = assemble(recording, each, found, path)
+    stated = results["stated"]
+    error = np.abs(stated.values - to_product(c[:18]))
+    assert (error / stated.u).max() < 4.0
+    assert not results["exact"].names or (error / results["exact"].u).max() > 15.0
+    assert {"gamma_x", "gamma_y", "gamma_z"} <= {item.source for item in stated.budget}
+    (told,) = (f.message for f in stated.findings if "are no states" in f.message)
+    assert "non_orthogonality" in told
+    assert "gamma" not in told.split(" are no states")[0]
+
+
+def test_joints_that_stand_still_leave_states_out():
+    th = np.zeros((10, 3))
+    th[:, 0] = np.linspace(0.0, 1.0, 10)
+    th[:, 2] = np.linspace(0.0, 2.0, 10)
+    settings, said = told_apart(replace(BASE, model=Model(RIG)), th)
+    assert not {"nonorth_xy", "nonorth_yz"} & set(settings.states.names)
+    assert len(settings.states.names) == 30
+    assert said[0].message.startswith("nonorth_xy, nonorth_yz: th_y stands still")
+    assert told_apart(BASE, th) == (BASE, ())
+    th[:, 1] = np.linspace(0.0, 0.5, 10)
+    assert told_apart(replace(BASE, model=Model(RIG)), th)[1] == ()
