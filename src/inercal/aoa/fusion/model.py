@@ -100,9 +100,9 @@ class Prediction(NamedTuple):
     """A state ``x`` (n,), sine and cosine of its theta, the indications ``p``, ``y`` [rad/s] of the roll and yaw gyros,
     which are not used without a state of roll.
 
-    ``rate`` [rad/s], ``acceleration`` [rad/s^2] and ``jerk`` [rad/s^3] are the motion in the derivatives by positions and
-    by the gyro's scale and delay: that after the row before, which all sensors have corrected, the jerk as far as it is
-    above noise. The noise of a prediction would teach these errors, and always in the same sense.
+    ``rate`` [rad/s], ``acceleration`` [rad/s^2] and ``jerk`` [rad/s^3] are the motion in the derivatives by positions
+    and by the gyro's scale and delay: that after the row before, which all sensors have corrected, the jerk as far as
+    it is above noise. The noise of a prediction would teach these errors, and always in the same sense.
     """
 
     x: Array
