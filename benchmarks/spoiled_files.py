@@ -135,8 +135,8 @@ def _judged(name, path, columns, codes):
         return ("read, strictly refused" if name in STRICT else word), ""
     for each in columns.keys() & wanted.keys():
         theirs = np.asarray(wanted[each], float)
-        if each != "values":  # of a record; a result holds what it says
-            theirs = np.where(np.abs(theirs) < LARGEST, theirs, np.nan)
+        most = np.inf if each == "values" else LARGEST  # a result says what it says
+        theirs = np.where(np.abs(theirs) < most, theirs, np.nan)
         ours = columns[each]
         if ours.shape != theirs.shape or not np.array_equal(ours, theirs, equal_nan=True):
             same = each == "t" and ours.shape == theirs.shape and np.allclose(ours, theirs, rtol=0, atol=1e-6)

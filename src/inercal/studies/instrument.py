@@ -135,7 +135,7 @@ def coefficient_of(
     (site gravity / 9.80665 m/s^2)^n, and a term in the output's unit alone is taken as it is.
     """
     forms, example = _forms(symbol, kind, unit)
-    for form in forms:
+    for form in sorted(forms, key=lambda each: not each.below):  # a unit with a bar is none that pint knows
         parsed = _parse(text, form)
         if parsed is None:
             continue
