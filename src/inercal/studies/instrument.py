@@ -172,6 +172,10 @@ def _forms(symbol: str, kind: str, unit: Unit) -> tuple[list[_Form], str]:
             return [_Form("angle")], '"20 arcsec"'
         case "1":
             return [_Form("number")], '"50 ppm"'
+        case "m":
+            return [_Form("length")], '"2 cm"'
+        case "s":
+            return [_Form("time")], '"1 ms"'
         case "1/(rad/s)":
             return [_Form("number", "rate", 1)], '"5 ppm/(deg/s)"'
         case "1/(rad/s)^2":
