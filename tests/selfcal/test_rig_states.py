@@ -18,7 +18,7 @@ from inercal.selfcal.platform import linearised, model
 from inercal.selfcal.platform.coefficients import to_linear, to_product
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import Gimbals
-from inercal.selfcal.platform.states import ALL, RIG, STATES
+from inercal.selfcal.platform.states import ALL, BIAS_WALK, RIG, STATES, WALK
 from inercal.selfcal.reading import told_apart
 from inercal.selfcal.result.outcome import assemble
 from inercal.selfcal.settings import Model
@@ -64,7 +64,13 @@ def accelerometer_outputs(f, w, c):
     f = f + np.stack([np.cross(w, np.cross(w, arm[i]))[:, i] for i in range(3)], axis=-1)
     pz, oy, oz = of("eta", c)
     along = np.stack([f[:, 0], f[:, 1] - oy * f[:, 0], f[:, 2] + pz * f[:, 0] - oz * f[:, 1]], axis=-1)
-    return of("ka0", c) + (1 + of("ka1", c)) * (along + of("k2", c) * along**2)
+    momentary = of("ka0", c) + of("accelerometer_walk", c)
+    return momentary + (1 + of("ka1", c)) * (along + of("k2", c) * along**2)
+
+
+def bias(c):
+    """Biases of the gyros now."""
+    return of("kg0", c) + of("gyro_walk", c)
 
 
 def random_vector(rng, settings):
@@ -83,7 +89,7 @@ def test_columns_of_the_encoders_are_derivatives(gimbals):
     def attitude(states):
         full = c.copy()
         full[posed.states.index] = states
-        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        rate = gyro_matrix(full) @ w + bias(full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
         earth = Rotation.from_rotvec(of("beta", full)).apply(world.earth)
         tau = of("delay", full)[0]
         return (
@@ -101,9 +107,9 @@ def test_columns_of_the_encoders_are_derivatives(gimbals):
     for k, name in enumerate(posed.names):
         step = 0.1 * posed.prior[k] * np.eye(len(x))[k]
         expected = (attitude(x - step).inv() * attitude(x + step)).as_rotvec() / (0.2 * posed.prior[k])
-        # the turn within a delay, and what other states do to it, are left out of the columns: so much less than 0.05"
+        # the turn within a delay, and what other states do to it, are left out of the columns: so much less than 0.2"
         off = np.abs(slope[:, k] - expected).max() * posed.prior[k]
-        assert off < 1e-3 * np.abs(slope[:, k]).max() * posed.prior[k] + 0.05 * ARCSEC, name
+        assert off < 1e-3 * np.abs(slope[:, k]).max() * posed.prior[k] + 0.2 * ARCSEC, name
 
 
 @pytest.mark.kernels
@@ -119,7 +125,7 @@ def test_rows_of_the_accelerometers_are_derivatives(seed):
         full = c.copy()
         full[posed.states.index] += error[3:]
         base, tau = Rotation.from_rotvec(of("beta", full)), of("delay", full)[1]
-        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        rate = gyro_matrix(full) @ w + bias(full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
         at = start * Rotation.from_rotvec(error[:3])
         then = Rotation.from_rotvec(base.apply(world.earth) * tau) * at * Rotation.from_rotvec(-rate * tau)
         return accelerometer_outputs(then.inv().apply(base.apply(world.up))[None], rate[None], full)[0]
@@ -154,7 +160,7 @@ def test_columns_of_a_step_are_derivatives():
     def after(states):
         full = c.copy()
         full[posed.states.index] = states
-        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        rate = gyro_matrix(full) @ w + bias(full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
         earth = Rotation.from_rotvec(of("beta", full)).apply(posed.world.earth)
         return Rotation.from_rotvec(-earth * dt) * start * Rotation.from_rotvec(rate * dt)
 
@@ -165,8 +171,9 @@ def test_columns_of_a_step_are_derivatives():
     count = linearised.dynamics_columns(c, place, linearised.Step(tuple(w), rate, earth, q, dt), columns)
     found = dict(zip(columns.places[:count].tolist(), columns.axes[:count], strict=True))
     for k, name in enumerate(posed.names[18:], start=18):
-        step = 0.1 * posed.prior[k] * np.eye(len(x))[k]
-        expected = (after(x - step).inv() * after(x + step)).as_rotvec() / (0.2 * posed.prior[k])
+        size = max(0.1 * posed.prior[k], 1e-7)
+        step = size * np.eye(len(x))[k]
+        expected = (after(x - step).inv() * after(x + step)).as_rotvec() / (2.0 * size)
         np.testing.assert_allclose(
             found.get(3 + k, np.zeros(3)), expected, rtol=1e-4, atol=1e-8, err_msg=name
         )
@@ -186,8 +193,19 @@ def moved(t):
 LONG = 5.0 + sum(abs(by) for _, by in MOVES) / 2.0 + 5.0
 
 
+def walked(settings, n, dt, rng):
+    """Biases (n, 6) of gyros and accelerometers about their means: first order, 60 s, step by step."""
+    walk = np.repeat([settings.noise.gyro_walk, settings.noise.accelerometer_walk], 3)
+    sigma, keep = walk * np.sqrt(30.0), np.exp(-dt / 60.0)
+    rows = [sigma * rng.standard_normal(6)]
+    for _ in range(n - 1):
+        rows.append(keep * rows[-1] + sigma * np.sqrt(1.0 - keep**2) * rng.standard_normal(6))
+    return np.array(rows)
+
+
 def recorded(settings, c, rng, dt=0.2):
-    """A recording by joints that move as `moved`, read by sensors of the full vector ``c`` (linear form)."""
+    """A recording by joints that move as `moved`, read by sensors of the full vector ``c`` (linear form); where the
+    study has biases that walk they do, and what they are in the end is put into ``c``."""
     noise, world, gimbals = settings.noise, settings.world, settings.gimbals
     t = dt * np.arange(int(LONG / dt) + 1)
     base = Rotation.from_rotvec(of("beta", c))
@@ -208,11 +226,16 @@ def recorded(settings, c, rng, dt=0.2):
     w = rate(t - of_acc - h, t - of_acc)
     acc = accelerometer_outputs(attitude(t - of_acc).inv().apply(up), w, c)
     acc += noise.accelerometer * rng.standard_normal(acc.shape)
+    drift = np.zeros((len(t), 6))
+    if "gyro_walk" in settings.kinds:
+        drift = walked(settings, len(t), dt, rng)
+        c[WALK:] = drift[-1]
+    acc += drift[:, 3:]
     true = rate(t[:-1], t[1:]) + noise.angle_random_walk / np.sqrt(dt) * rng.standard_normal((len(t) - 1, 3))
     # w_p = (1 + M) w + |w| asymmetry / 2 + kg0, for w
     read = true
     for _ in range(5):
-        fixed = true - of("kg0", c) - 0.5 * of("scale_asymmetry", c) * np.abs(read)
+        fixed = true - of("kg0", c) - drift[:-1, :3] - 0.5 * of("scale_asymmetry", c) * np.abs(read)
         read = np.linalg.solve(gyro_matrix(c), fixed.T).T
     return Recording(t, read, th, acc, measured=True)
 
@@ -228,6 +251,8 @@ def drawn(settings, rng, kinds, delay=1.0):
     """A full vector, linear form, with values drawn from the priors of some kinds."""
     c = np.zeros(len(ALL))
     for kind in kinds:
+        if kind in BIAS_WALK:
+            continue
         at = [ALL.index(name) for name in STATES[kind].parameters]
         c[at] = settings.priors[at] * rng.standard_normal(len(at)) * (delay if kind == "delay" else 1.0)
     return to_linear(c)
@@ -259,8 +284,9 @@ def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
 
 @pytest.mark.parametrize("kind", ["error-state", "map", "mukf"])
 def test_estimators_agree_on_a_rig_with_all_errors(kind):
-    settings = replace(BASE, model=Model(WHOLE))
-    posed, rng = problem(settings), np.random.default_rng(12)
+    kinds = tuple(each for each in WHOLE if kind != "map" or each not in BIAS_WALK)
+    settings = replace(BASE, model=Model(kinds))
+    posed, rng = problem(settings).for_kind(kind), np.random.default_rng(12)
     c = drawn(settings, rng, STATES, delay=0.1)
     found = estimate(recorded(settings, c, rng), posed, kind, history=False)
     error = found.coefficients - c[posed.states.index]
@@ -340,7 +366,7 @@ def test_joints_that_stand_still_leave_states_out():
     th[:, 2] = np.linspace(0.0, 2.0, 10)
     settings, said = told_apart(replace(BASE, model=Model(RIG)), th)
     assert not {"nonorth_xy", "nonorth_yz"} & set(settings.states.names)
-    assert len(settings.states.names) == 30
+    assert len(settings.states.names) == 36
     assert said[0].message.startswith("nonorth_xy, nonorth_yz: th_y stands still")
     assert told_apart(BASE, th) == (BASE, ())
     th[:, 1] = np.linspace(0.0, 0.5, 10)

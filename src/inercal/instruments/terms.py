@@ -138,13 +138,9 @@ _SELF_CALIBRATION = (
     Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
     Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
     *(
-        Term(
-            f"{symbol}_{p[0]}",
-            f"misalignment of gyro {p[0]}: rate about {p[0]} per rate about {p[1]}{way}",
-            "rad",
-        )
-        for symbol, way, pairs in (("ds", "", "xy yz zx"), ("do", ", reversed", "xz yx zy"))
-        for p in pairs.split()
+        Term(f"{symbol}_{a}", f"misalignment of gyro {a}: rate about {a} per rate about {b}{way}", "rad")
+        for symbol, way, others in (("ds", "", "yzx"), ("do", ", reversed", "zxy"))
+        for a, b in zip(_AXES, others, strict=True)
     ),
     *(
         Term(f"{symbol}_{i}", name.format(i), unit)
@@ -152,6 +148,8 @@ _SELF_CALIBRATION = (
             ("ka0", "accelerometer {} bias: reading at zero specific force", "m/s^2", _AXES),
             ("ka1", "accelerometer {} scale error", "1", _AXES),
             ("kg1", "gyro {} scale error", "1", _AXES),
+            ("kg0_walk", "gyro {} bias at the last row less its mean", "rad/s", _AXES),
+            ("ka0_walk", "accelerometer {} bias at the last row less its mean", "m/s^2", _AXES),
             ("beta", "zero of the encoders: turn of their frame about {} of the base", "rad", _AXES),
             ("gamma", "turn of the sensors about {} of the platform, against the last gimbal", "rad", _AXES),
             ("zero", "reading of the encoder {} at zero", "rad", "y"),

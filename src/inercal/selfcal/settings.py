@@ -13,9 +13,18 @@ from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
 from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
 from inercal.selfcal.estimators import FactorKind, FilterKind
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.rig import Base, Gimbals, World, world
-from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, STATES, StateVector, state_vector
+from inercal.selfcal.platform.states import (
+    ALL,
+    EXTENDED_MODEL,
+    PAPER,
+    STATES,
+    WALK,
+    StateVector,
+    state_vector,
+)
 from inercal.units import Quantity, parse_quantity
 
 _OF_A_SAMPLE = above_zero("a standard deviation of a sample")
@@ -40,6 +49,24 @@ class Noise:
         example="2 arcsec",
         bounds=_OF_A_SAMPLE,
     )
+    gyro_walk: float = quantity(
+        "of the gyros' biases about their means, within 60 s, where bias_walk is among the states",
+        "rate random walk", "1e-4 deg/h/sqrt(s)", bounds=above_zero("a walk"),
+    )  # fmt: skip
+    accelerometer_walk: float = quantity(
+        "the same of the accelerometers' biases", "acceleration random walk", "0.35 ug/sqrt(s)",
+        bounds=above_zero("a walk"),
+    )  # fmt: skip
+
+    @property
+    def gyro_walk_sigma(self) -> float:
+        """Standard deviation [rad/s] of the gyros' biases about their means."""
+        return self.gyro_walk * math.sqrt(0.5 * LIMITS.walk_time)
+
+    @property
+    def accelerometer_walk_sigma(self) -> float:
+        """Standard deviation [m/s^2] of the accelerometers' biases about their means."""
+        return self.accelerometer_walk * math.sqrt(0.5 * LIMITS.walk_time)
 
 
 @dataclass(frozen=True)
@@ -92,6 +119,14 @@ class Disturbances:
     command_delay: float = quantity(
         "by which the platform acts later than commanded", "time", "0 s", example="0.2 s",
         bounds=within(0.0, math.inf, "a time of 0 or more"),
+    )  # fmt: skip
+    accelerometer_walk: float = quantity(
+        "of their biases about their means, within 60 s", "acceleration random walk", "0 ug/sqrt(s)",
+        example="0.35 ug/sqrt(s)", bounds=within(0.0, math.inf, "a walk of 0 or more"),
+    )  # fmt: skip
+    gyro_walk: float = quantity(
+        "the same of the gyros", "rate random walk", "0 deg/h/sqrt(s)", example="1e-4 deg/h/sqrt(s)",
+        bounds=within(0.0, math.inf, "a walk of 0 or more"),
     )  # fmt: skip
     substeps: int = 10
 
@@ -185,6 +220,8 @@ class SelfcalSettings:
             for _ in state.parameters
         ]
         whole = np.append(self.prior, usual[len(self.prior) :])
+        whole[WALK : WALK + 3] = self.noise.gyro_walk_sigma
+        whole[WALK + 3 :] = self.noise.accelerometer_walk_sigma
         for name, (_, u) in self.model.stated.items():
             whole[ALL.index(name)] = u or whole[ALL.index(name)]
         return whole

@@ -13,7 +13,7 @@ from inercal._toml import Strict
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.selfcal.estimators import ESTIMATORS
-from inercal.selfcal.platform.states import ALL, PAPER, STATES, WORDS
+from inercal.selfcal.platform.states import ADDED, ALL, BIAS_WALK, EXTENDED_MODEL, PAPER, STATES, WORDS
 from inercal.selfcal.settings import Model
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, refusal
 from inercal.units import Quantity, shown
@@ -83,14 +83,14 @@ def _kinds(typed: object) -> object:
     listed = typed if isinstance(typed, list) else [typed]
     words = ", ".join(f'"{word}"' for word in WORDS)
     first, *rest = listed or [None]
-    if first not in (*WORDS, *_KINDS) or (not isinstance(typed, list) and first not in WORDS):
-        others = ", ".join(f'"{kind}"' for kind in _KINDS)
+    if first not in (*WORDS, *ADDED) or (not isinstance(typed, list) and first not in WORDS):
+        others = ", ".join(f'"{kind}"' for kind in ADDED)
         raise refusal(
             f"found {shown(typed)}, expected {words}, or a list that may begin with one, of {others}"
         )
     for kind in rest:
-        if kind not in _KINDS:
-            raise refusal(f"found {shown(kind)}, expected one of {', '.join(_KINDS)}")
+        if kind not in ADDED:
+            raise refusal(f"found {shown(kind)}, expected one of {', '.join(ADDED)}")
     if len(set(listed)) < len(listed):
         raise refusal(f"found {shown(typed)}, expected each kind once")
     return typed
@@ -104,8 +104,9 @@ class ModelTable(_MODEL):  # type: ignore[misc]
 
     states: Annotated[str | list[str], BeforeValidator(_kinds)] | None = Field(
         default=None,
-        description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay), or a list "
-        "that may begin with one of these, and goes on with kinds of this table; that of [filter] if absent",
+        description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay, and bias_walk, "
+        "which map leaves out), or a list that may begin with one of these, and goes on with kinds of this table or "
+        "bias_walk; that of [filter] if absent",
         examples=[["rig", "k2", "levers"]],
     )
 
@@ -121,9 +122,16 @@ def model_of(table: Any, filter: Any, where: object) -> Model:
         if filter.extended:
             raise StudyError(where, "model.states: found it beside filter.extended, expected one of them")
         listed = table.states if isinstance(table.states, list) else [table.states]
-        kinds = {kind for each in listed for kind in WORDS.get(each, (*PAPER, each))}
+        kinds = {kind for each in listed for kind in WORDS.get(each) or (*PAPER, *ADDED[each])}
+        if filter.kind == "map":
+            if "bias_walk" in listed:
+                text = (
+                    "model.states: found bias_walk for map, to which biases are constant, expected it without"
+                )
+                raise StudyError(where, text)
+            kinds -= {*BIAS_WALK}
         states = tuple(kind for kind in STATES if kind in kinds)
-        beyond = [kind for kind in states if STATES[kind].key]
+        beyond = [kind for kind in states if kind not in EXTENDED_MODEL]
         if beyond and not ESTIMATORS[filter.kind].rig:
             having = ", ".join(kind for kind, each in ESTIMATORS.items() if each.rig)
             raise StudyError(

@@ -38,6 +38,7 @@ from inercal.selfcal.platform.linearised import (
     encoder_columns,
     encoder_roots,
     propagate_covariance,
+    wander,
 )
 from inercal.selfcal.platform.model import (
     Rates,
@@ -255,7 +256,7 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
     m, place = P.shape[1], layout.place
     top, work, row, columns = np.empty((3, m)), np.empty((2, m)), empty_row(WIDEST), empty_columns()
     near = np.zeros(3, dtype=np.int64)
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(len(q)):
         at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
@@ -267,6 +268,10 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
             walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
             for s in range(len(P)):
                 propagate_covariance(P[s], c, place, step, walk if s < 2 else 0.0, top, columns)
+                if len(c) > 24:  # how far biases walk is known before, as a prior is
+                    known = 1.0 if s == 0 or s == 4 else 0.0
+                    of_gyros, of_accelerometers = known * noise.gyro_walk, known * noise.accelerometer_walk
+                    wander(P[s], mean, place, of_gyros, of_accelerometers, step.dt)
             if seen[k, 3]:
                 watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
             if updating(gate, near):

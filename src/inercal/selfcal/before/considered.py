@@ -11,6 +11,7 @@ Processes and Filtering Theory, 1970, section 8.4). G and D are the columns that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,6 +25,7 @@ from inercal.selfcal.filters.gaps import anew
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, encoders_at, updating, watch
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
+    WALK_TIME,
     WIDEST,
     Columns,
     Places,
@@ -34,10 +36,11 @@ from inercal.selfcal.platform.linearised import (
     encoder_columns,
     encoder_roots,
     propagate_covariance,
+    wander,
 )
 from inercal.selfcal.platform.model import Rates, on_the_base, platform_rate, sensing, specific_force
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, Layout, StateVector
+from inercal.selfcal.platform.states import ALL, WALK, Layout, StateVector
 
 
 def sensitivities(
@@ -104,7 +107,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
             own[i] = -1
     top, gain, row, columns = np.empty((3, n)), np.empty(n), empty_row(WIDEST), empty_columns()
     shift, near = np.empty((3, S.shape[1])), np.zeros(3, dtype=np.int64)
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(1, len(q)):
         at, following = (q[k, 0], q[k, 1], q[k, 2], q[k, 3]), min(k, len(w) - 1)
@@ -114,6 +117,8 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
         _carry_step(S, n, c, place, step, shift, columns)
         walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
         propagate_covariance(P, c, own, step, walk, top, columns)
+        wander(P, mean, own, noise.gyro_walk, noise.accelerometer_walk, step.dt)
+        forget(S, own, step.dt)
         if seen[k, 3]:
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
@@ -134,6 +139,16 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
                 if seen[k, i] and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
                     _update(P, S, row, size, variance, gain)
+
+
+@kernel
+def forget(S: Array, place: Places, dt: float) -> None:
+    """Let what errors of walking biases depend on fade within ``dt`` [s], as these do, in sensitivities ``S``."""
+    keep = math.exp(-dt / WALK_TIME)
+    for i in range(WALK, WALK + 6):
+        if place[i] >= 0:
+            for k in range(S.shape[1]):
+                S[place[i], k] *= keep
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.records.record import Record, record_of
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import all_angles, attitude
 from inercal.selfcal.platform.model import Truth, simulate_truth
@@ -78,12 +80,17 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     dt = float(commanded.t[1] - commanded.t[0]) / fine.shape[1]
     wander = rng.standard_normal(fine.shape)
     wander *= noise.angle_random_walk / np.sqrt(dt)
+    step = dt * fine.shape[1]
+    if other.gyro_walk > 0.0:
+        wander += wandering(other.gyro_walk, step, n, rng)[:-1, None]
     q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
     q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
     read = commanded.angles.copy()
     simulate_truth(q0, fine, dt, wander, experiment.truth, world, Truth(q, acc, read))
     all_angles(q, commanded.angles[0], world.axes, world.signs, th)
     acc += noise.accelerometer * rng.standard_normal((n, 3))
+    if other.accelerometer_walk > 0.0:
+        acc += wandering(other.accelerometer_walk, step, n, rng)
     measured = (read if len(experiment.truth) > 24 else th) + noise.encoder * rng.standard_normal((n, 3))
     for joint, order, amplitude, phase in other.harmonics:
         measured[:, joint] += amplitude * np.sin(order * th[:, joint] + phase)
@@ -92,6 +99,16 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
         lost = np.append(False, rng.random(n - 1) < other.dropouts)
         acc[lost], measured[lost] = np.nan, np.nan
     return Simulated(Recording(commanded.t, commanded.rate, measured, acc), q, th)
+
+
+def wandering(walk: float, step: float, n: int, rng: np.random.Generator) -> Array:
+    """Biases (n, 3) about their means, every ``step`` [s], of a ``walk`` [unit/sqrt(s)] within `LIMITS.walk_time`."""
+    from scipy.signal import lfilter
+
+    keep = math.exp(-step / LIMITS.walk_time)
+    driven = rng.standard_normal((n, 3)) * walk * math.sqrt(0.5 * LIMITS.walk_time)
+    driven[1:] *= math.sqrt(1.0 - keep**2)
+    return np.asarray(lfilter([1.0], [1.0, -keep], driven, axis=0))
 
 
 #: sensor -> unit of its columns in a simulated file

@@ -36,6 +36,7 @@ from inercal.selfcal.platform.linearised import (
     encoder_columns,
     encoder_roots,
     propagate_covariance,
+    wander,
 )
 from inercal.selfcal.platform.model import (
     Rates,
@@ -206,6 +207,8 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
         q = normalize(propagate(q, rate, earth_e, dt))
         walk = noise.angle_random_walk * noise.angle_random_walk * dt
         propagate_covariance(P, c, place, Step(w, rate, earth_e, q, dt), walk, top, columns)
+        if rig:
+            wander(P, c, place, noise.gyro_walk, noise.accelerometer_walk, dt)
         total, count = 0.0, 0
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:

@@ -28,7 +28,7 @@ from inercal.selfcal.filters.error_state import initial as initial
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import nearest_turn
-from inercal.selfcal.platform.linearised import WIDEST, Places, empty_columns, encoder_columns
+from inercal.selfcal.platform.linearised import WIDEST, Places, empty_columns, encoder_columns, wander
 from inercal.selfcal.platform.model import (
     Rates,
     encoders_attitude,
@@ -175,6 +175,8 @@ def _advance(
             P[i, i] += noise.angle_random_walk * noise.angle_random_walk * dt
             for j in range(3, n):
                 P[i, j], P[j, i] = of_points.cross[j, i], of_points.cross[j, i]
+        if len(c) > 24:
+            wander(P, c, place, noise.gyro_walk, noise.accelerometer_walk, dt)
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):

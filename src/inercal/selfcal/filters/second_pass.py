@@ -59,6 +59,8 @@ def second_pass(
     if not (np.isfinite(about).all() and np.isfinite(variance).all() and (variance > 0.0).all()):
         return found
     narrow = np.minimum(problem.prior, LIMITS.second_prior * np.sqrt(variance))
+    walks = problem.states.walks  # what they were in the beginning is not what they are in the end
+    about[walks], narrow[walks] = 0.0, problem.prior[walks]
     begun.coefficients[:] = about
     begun.covariance[-p:, -p:] = np.diag(narrow**2)
     if begun.covariance[

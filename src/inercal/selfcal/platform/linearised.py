@@ -33,12 +33,15 @@ from inercal.selfcal.platform.model import (
     rate_at,
     squared,
 )
-from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, ZERO_Y
+from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, WALK, ZERO_Y
 
 Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
 FLOOR = LIMITS.encoder_floor
 """As kernels take it."""
+
+WALK_TIME = LIMITS.walk_time
+"""As kernels take it [s]."""
 
 WIDEST = 20
 """Most entries of a row of the model, and most columns of states."""
@@ -110,6 +113,7 @@ def dynamics_columns(c: Array, place: Places, step: Step, columns: Columns) -> i
         axis = (j[0][i], j[1][i], j[2][i])
         count = put(columns, count, place[18 + i], axis, dt * w[i])
         count = put(columns, count, place[ASYM + i], axis, 0.5 * dt * abs(w[i]))
+        count = put(columns, count, place[WALK + i], axis, dt)
     by_beta = turned_by_beta(step.earth, step.attitude, c)
     for i in range(3):
         count = put(columns, count, place[21 + i], by_beta[i], -dt)
@@ -179,6 +183,21 @@ def propagate_covariance(
         for i in range(3):
             P[i, m] = top[i, m]
             P[m, i] = top[i, m]
+
+
+@kernel
+def wander(P: Array, c: Array, place: Places, of_gyros: float, of_accelerometers: float, dt: float) -> None:
+    """Biases that walk, and their covariance in ``P`` (3 + p, 3 + p), after ``dt`` [s], in place; they are
+    exponentially correlated, of standard deviations ``of_gyros`` [rad/s] and ``of_accelerometers`` [m/s^2]."""
+    keep = math.exp(-dt / WALK_TIME)
+    for i in range(6):
+        at, sigma = place[WALK + i], of_gyros if i < 3 else of_accelerometers
+        if at >= 0:
+            c[WALK + i] *= keep
+            for m in range(len(P)):
+                P[at, m] *= keep
+                P[m, at] *= keep
+            P[at, at] += sigma * sigma * (1.0 - keep * keep)
 
 
 @kernel
@@ -256,7 +275,7 @@ def accelerometer_row(i: int, sensed: Sensing, c: Array, place: Places, up: Vect
 def rig_entries(
     i: int, sensed: Sensing, g: Vector, turn: Vector, c: Array, place: Places, row: Row, count: int
 ) -> int:
-    """Put delay, K2 and lever of accelerometer ``i`` into its row behind ``count`` entries; returns their number.
+    """Put delay, K2, lever and walk of accelerometer ``i`` into its row behind ``count`` entries; returns their number.
 
     ``g`` (3,) are the weights of the specific force, ``turn`` (3,) the derivative by the attitude.
     """
@@ -275,6 +294,9 @@ def rig_entries(
         if place[LEVER + 3 * i + k] >= 0:
             places[count], values[count] = place[LEVER + 3 * i + k], (1.0 + c[15 + i]) * along[k]
             count += 1
+    if place[WALK + 3 + i] >= 0:
+        places[count], values[count] = place[WALK + 3 + i], 1.0
+        count += 1
     return count
 
 

@@ -9,6 +9,8 @@ earth rate and gravity in b turn with beta. With the states of the rig
 for joints about the axes i, j, k of p, and each accelerometer reads ``ka0 + s + K2 s^2 / (1 + ka1)``, s its output
 without them at the specific force ``f + w x (w x r)``, r its place and w the rate against inertial space.
 
+Biases are ``kg0`` and ``ka0`` in the mean, and walk about them.
+
 A sensor that is late by tau reads at t what was at t - tau, in the clock of the rates: a delay that all share is only
 another time. Rates are held from row to row, and the platform has turned since then at the rate before the row, or
 will turn until then at the one after it where tau is negative.
@@ -23,7 +25,7 @@ from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.selfcal.platform.kinematics import Axes, attitude, elementary, joint_axes, nearest_turn
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, ZERO_Y
+from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, WALK, ZERO_Y
 
 
 @kernel
@@ -35,9 +37,9 @@ def platform_rate(w: Vector | Array, c: Array) -> Vector:
     if len(c) > 18:
         x, y, z = x + c[18] * w[0], y + c[19] * w[1], z + c[20] * w[2]
     if len(c) > 24:
-        x += 0.5 * c[ASYM] * abs(w[0])
-        y += 0.5 * c[ASYM + 1] * abs(w[1])
-        z += 0.5 * c[ASYM + 2] * abs(w[2])
+        x += 0.5 * c[ASYM] * abs(w[0]) + c[WALK]
+        y += 0.5 * c[ASYM + 1] * abs(w[1]) + c[WALK + 1]
+        z += 0.5 * c[ASYM + 2] * abs(w[2]) + c[WALK + 2]
     return x, y, z
 
 
@@ -117,9 +119,9 @@ def rig_accelerometers(f: Vector, w: Vector, c: Array) -> Vector:
     )
     x, y, z = accelerometers(there, c)
     return (
-        x + c[K2] * squared(x - c[12], 0, c),
-        y + c[K2 + 1] * squared(y - c[13], 1, c),
-        z + c[K2 + 2] * squared(z - c[14], 2, c),
+        x + c[K2] * squared(x - c[12], 0, c) + c[WALK + 3],
+        y + c[K2 + 1] * squared(y - c[13], 1, c) + c[WALK + 4],
+        z + c[K2 + 2] * squared(z - c[14], 2, c) + c[WALK + 5],
     )
 
 

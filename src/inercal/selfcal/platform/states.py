@@ -44,6 +44,7 @@ _CHAIN = (
     "R. Paul, Robot Manipulators, MIT Press (1981): a chain of turns, each axis turned against the one before"
 )
 _DELAY = "J. Kelly, G. S. Sukhatme, A general framework for temporal calibration, ISER 2010: delays as states"
+_MARKOV = "A. Gelb (editor), Applied Optimal Estimation, MIT Press (1974), section 3.8: exponentially correlated errors"
 _IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
 
 STATES: Final[Mapping[str, State]] = {
@@ -94,8 +95,17 @@ STATES: Final[Mapping[str, State]] = {
         "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
+    "gyro_walk": State(
+        _by_axis("kg0_walk"), "rad/s", "rate", "0.0005 deg/h", "0.0005 deg/h",
+        "gyro biases at the last row, less their means kg0", source=_MARKOV,
+    ),
+    "accelerometer_walk": State(
+        _by_axis("ka0_walk"), "m/s^2", "acceleration", "1.9 ug", "1.9 ug",
+        "accelerometer biases at the last row, less their means ka0", source=_MARKOV,
+    ),
 }  # fmt: skip
-"""Name of a kind -> its states; the first six are the paper's, the next two the extended model's."""
+"""Name of a kind -> its states; the first six are the paper's, the next two the extended model's. The last two change
+with time: an estimator without them has the same states before."""
 
 ALL: Final[tuple[str, ...]] = tuple(name for state in STATES.values() for name in state.parameters)
 """Names of the full vector, in order."""
@@ -112,10 +122,18 @@ KIND_OF: Final[Mapping[str, str]] = {
 
 PAPER: Final[tuple[str, ...]] = tuple(STATES)[:6]
 EXTENDED_MODEL: Final[tuple[str, ...]] = tuple(STATES)[:8]
-RIG: Final[tuple[str, ...]] = (*EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay")
+BIAS_WALK: Final[tuple[str, ...]] = ("gyro_walk", "accelerometer_walk")
+RIG: Final[tuple[str, ...]] = (
+    *EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay", *BIAS_WALK,
+)  # fmt: skip
 
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {"paper": PAPER, "extended": EXTENDED_MODEL, "rig": RIG}
 """Word for a set of states -> their kinds."""
+
+ADDED: Final[Mapping[str, tuple[str, ...]]] = {
+    kind: (kind,) for kind, state in STATES.items() if state.key
+} | {"bias_walk": BIAS_WALK}
+"""Additions to such a set -> their kinds."""
 
 GAMMA: Final = ALL.index("gamma_x")
 NONORTH: Final = ALL.index("nonorth_xy")
@@ -124,7 +142,9 @@ TAU: Final = ALL.index("tau_enc")
 K2: Final = ALL.index("K2_x")
 LEVER: Final = ALL.index("r_xx")
 ASYM: Final = ALL.index("S_asym_x")
-"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer."""
+WALK: Final = ALL.index("kg0_walk_x")
+"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; of walks gyros,
+accelerometers."""
 
 
 class Layout(NamedTuple):
@@ -162,6 +182,16 @@ class StateVector:
         whole = self.layout.stated.copy()
         whole[self.layout.chosen] = c
         return whole
+
+    @cached_property
+    def walks(self) -> NDArray[np.bool_]:
+        """(p,) true of states that change with time."""
+        return self.index >= WALK
+
+    @property
+    def without_walks(self) -> StateVector:
+        """The states that are constant."""
+        return StateVector(tuple(name for name in self.names if ALL.index(name) < WALK), self.stated)
 
     @property
     def of_rig(self) -> bool:
