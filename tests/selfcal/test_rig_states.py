@@ -23,7 +23,7 @@ from inercal.selfcal.reading import told_apart
 from inercal.selfcal.result.outcome import assemble
 from inercal.selfcal.settings import Model
 
-WHOLE = (*RIG, "k2", "levers", "scale_asymmetry")
+WHOLE = (*RIG, "k2", "levers", "scale_asymmetry", "harmonics")
 MOVES = (("y", 60), ("z", 180), ("x", 90), ("y", -100), ("z", -180), ("x", -120), ("y", 70), ("z", 90))
 """Turns of one joint after the other [deg], each axis of p through the vertical and the level."""
 
@@ -38,8 +38,16 @@ def turned(axis, angle):
     return Rotation.from_rotvec(np.multiply.outer(np.atleast_1d(angle), np.eye(3)[axis]))
 
 
+def harmonics(th, c):
+    """Errors (n, 3) of encoders at angles (n, 3) [rad], orders 1 and 2 of each."""
+    parts = of("harmonics", c)[:12].reshape(3, 2, 2)
+    waves = np.stack([[np.sin(order * th), np.cos(order * th)] for order in (1, 2)])
+    return np.einsum("jop,opnj->nj", parts, waves)
+
+
 def chain(th, c, gimbals):
     """Attitudes of p in e as joints (n, 3) [rad] are read."""
+    th = th - harmonics(th, c)
     (i, j, k), signs = gimbals.index, gimbals.sign
     xy, yz = of("non_orthogonality", c)
     outer = turned(i, signs[0] * th[:, 0]) * turned(k, xy)
@@ -210,7 +218,8 @@ def recorded(settings, c, rng, dt=0.2):
     t = dt * np.arange(int(LONG / dt) + 1)
     base = Rotation.from_rotvec(of("beta", c))
     earth, up = base.apply(world.earth), base.apply(world.up)
-    zero = replace_kind(c, "zero_y", 0.0)  # joints as they are, not as they are read
+    # joints as they are, not as they are read
+    zero = replace_kind(replace_kind(c, "zero_y", 0.0), "harmonics", 0.0)
 
     def attitude(at):
         return chain(moved(at), zero, gimbals)
@@ -221,7 +230,13 @@ def recorded(settings, c, rng, dt=0.2):
         return (attitude(begin).inv() * spin * attitude(end)).as_rotvec() / (end - begin)[:, None]
 
     late, of_acc = of("delay", c)
-    th = moved(t - late) + [0.0, of("zero_y", c)[0], 0.0] + noise.encoder * rng.standard_normal((len(t), 3))
+    th = moved(t - late)
+    th = (
+        th
+        + harmonics(th, c)
+        + [0.0, of("zero_y", c)[0], 0.0]
+        + noise.encoder * rng.standard_normal((len(t), 3))
+    )
     h = 1e-3
     w = rate(t - of_acc - h, t - of_acc)
     acc = accelerometer_outputs(attitude(t - of_acc).inv().apply(up), w, c)
@@ -263,7 +278,7 @@ BASE = study(prior=np.append(study().prior[:18], [100e-6] * 3 + [60 * ARCSEC] * 
 
 
 @pytest.mark.parametrize(
-    "kind", ["gamma", "non_orthogonality", "zero_y", "delay", "k2", "levers", "scale_asymmetry"]
+    "kind", ["gamma", "non_orthogonality", "zero_y", "delay", "k2", "levers", "scale_asymmetry", "harmonics"]
 )
 def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
     """All states within 4.5 u of the truth, and those asked for are worth something; without them all is wrong."""
@@ -313,7 +328,8 @@ def test_sensitivities_are_those_of_the_filter_run_again():
     posed, rng = problem(BASE), np.random.default_rng(14)
     recording = recorded(BASE, drawn(BASE, rng, PAPER_KINDS), rng)
     found = estimate(recording, posed, "error-state")
-    names = ("kg1_z", "gamma_y", "nonorth_yz", "zero_y", "tau_enc", "tau_a", "K2_x", "r_yy", "S_asym_z")
+    names = ("kg1_z", "gamma_y", "nonorth_yz", "zero_y", "tau_enc", "tau_a", "K2_x", "r_yy", "S_asym_z",
+             "harmonic_2_cos", "harmonic_5_sin")  # fmt: skip
     slopes = sensitivities(recording, posed, found.history.attitude, found.coefficients, names)
     u = np.sqrt(np.diag(found.covariance))
     for name, slope in zip(names, slopes.T, strict=True):

@@ -264,7 +264,8 @@ REFUSED = {
     'disturbances.harmonics=[{axis = "z", order = 0, amplitude = "1 deg"}]': "disturbances.harmonics.0.order: ",
     "design.turns=0": "design.turns: ",
     "nois.encoder=1 arcsec": "nois: unknown key, did you mean noise?",
-    "noise.gyro_walk=1e-4 deg/h/sqrt(s)": "noise.gyro_walk: found it where bias_walk is not among the states",
+    "noise.gyro_walk=0 deg/h/sqrt(s)": "noise.gyro_walk: found .*a walk above zero",
+    'model.harmonics=[{axis = "x", order = 1, amplitude = "5 arcsec"}]': "model.harmonics.0.*found '5 arcsec'",
     "model.states=all": 'model.states: found .all., expected "paper", "extended", "rig", or a list',
     'model.states=["rig", "rig"]': "model.states: found 'rig', expected one of gamma, ",
     'model.states=["gamma", "gamma"]': "model.states: .*expected each kind once",
@@ -370,6 +371,11 @@ def test_states_of_the_rig():
     assert asked.kinds == (*RIG[:-2], "k2", "gyro_walk", "accelerometer_walk")
     sigma = dict(zip(ALL, asked.priors, strict=True))["ka0_walk_y"]
     assert sigma == pytest.approx(1e-6 * 9.80665 * math.sqrt(30.0))
+    waves = [{"axis": "z", "order": 8, "amplitude": "0(2) arcsec"}]
+    asked = study(model={"states": ["paper", "harmonics"], "harmonics": waves})
+    assert asked.states.names == (*NAMES, "harmonic_1_sin", "harmonic_1_cos")
+    assert asked.states.harmonics == ((2, 8),)
+    assert asked.priors[asked.states.index][-1] == pytest.approx(2.0 * ARCSEC)
     batch = study(
         model={"states": "rig"}, filter={"kind": "map"}, noise=noise | {"gyro_walk": "1 deg/h/sqrt(s)"}
     )

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from inercal.errors import QuantityError
+from inercal.instruments.platform_terms import PLATFORM
 from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
 
 
@@ -132,35 +133,6 @@ _DRIFT = tuple(
     )
 )
 
-_SELF_CALIBRATION = (
-    *(Term(f"kg0_{i}", f"gyro {i} bias: rate of the platform at zero command", "rad/s") for i in _AXES),
-    Term("eta_pz", "misalignment of accelerometer z: output per specific force along x", "rad"),
-    Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
-    Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
-    *(
-        Term(f"{symbol}_{a}", f"misalignment of gyro {a}: rate about {a} per rate about {b}{way}", "rad")
-        for symbol, way, others in (("ds", "", "yzx"), ("do", ", reversed", "zxy"))
-        for a, b in zip(_AXES, others, strict=True)
-    ),
-    *(
-        Term(f"{symbol}_{i}", name.format(i), unit)
-        for symbol, name, unit, ends in (
-            ("ka0", "accelerometer {} bias: reading at zero specific force", "m/s^2", _AXES),
-            ("ka1", "accelerometer {} scale error", "1", _AXES),
-            ("kg1", "gyro {} scale error", "1", _AXES),
-            ("kg0_walk", "gyro {} bias at the last row less its mean", "rad/s", _AXES),
-            ("ka0_walk", "accelerometer {} bias at the last row less its mean", "m/s^2", _AXES),
-            ("beta", "zero of the encoders: turn of their frame about {} of the base", "rad", _AXES),
-            ("gamma", "turn of the sensors about {} of the platform, against the last gimbal", "rad", _AXES),
-            ("zero", "reading of the encoder {} at zero", "rad", "y"),
-        )
-        for i in ends
-    ),
-    Term("nonorth_xy", "non-orthogonality of the joints: turn of axis y against axis x", "rad"),
-    Term("nonorth_yz", "non-orthogonality of the joints: turn of axis z against axis y", "rad"),
-    Term("tau_enc", "delay of the encoders", "s"),
-)
-
 #: every term, in the order results list them
 TERMS: dict[str, Term] = {
     term.symbol: term
@@ -171,7 +143,7 @@ TERMS: dict[str, Term] = {
         *_RATE_TEST,
         *_ACCELEROMETER_BY_ANGLE,
         *_DRIFT,
-        *_SELF_CALIBRATION,
+        *(Term(*each) for each in PLATFORM),
         *_ON_A_TABLE,
     )
 }

@@ -21,6 +21,7 @@ from inercal.selfcal.platform.states import (
     EXTENDED_MODEL,
     PAPER,
     STATES,
+    USUAL_WAVES,
     WALK,
     StateVector,
     state_vector,
@@ -100,11 +101,13 @@ class Filter:
 class Model:
     """The model of the platform: kinds of ``states`` (None: the paper's, with the extended model where the filter has
     it), and, by name of parameter, what is ``stated`` of those of the rig: value and standard uncertainty [SI].
-    ``left_out``: parameters of these kinds that a recording cannot tell from others."""
+    ``left_out``: parameters of these kinds that a recording cannot tell from others; ``harmonics`` by joint 0, 1, 2 and
+    order, in the order of their parameters."""
 
     states: tuple[str, ...] | None = None
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES
 
 
 @dataclass(frozen=True)
@@ -209,7 +212,7 @@ class SelfcalSettings:
         stated = np.zeros(len(ALL))
         for name, (value, _) in self.model.stated.items():
             stated[ALL.index(name)] = value
-        return state_vector(self.kinds, stated, self.model.left_out)
+        return state_vector(self.kinds, stated, self.model.left_out, self.model.harmonics)
 
     @property
     def priors(self) -> Array:

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, create_model
+from pydantic import BeforeValidator, Field, StrictInt, create_model
 
 from inercal._toml import Strict
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.selfcal.estimators import ESTIMATORS
-from inercal.selfcal.platform.states import ADDED, ALL, BIAS_WALK, EXTENDED_MODEL, PAPER, STATES, WORDS
+from inercal.selfcal.platform.states import (
+    ADDED,
+    ALL,
+    BIAS_WALK,
+    EXTENDED_MODEL,
+    MOST_WAVES,
+    PAPER,
+    STATES,
+    USUAL_WAVES,
+    WORDS,
+)
 from inercal.selfcal.settings import Model
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, refusal
 from inercal.units import Quantity, shown
 
-_KINDS = tuple(kind for kind, state in STATES.items() if state.key)
+_KINDS = tuple(kind for kind, state in STATES.items() if state.key and kind != "harmonics")
 
 #: key of a study -> parameters that it states
 _DELAYS = {"delay_encoder": ("tau_enc",), "delay_accelerometer": ("tau_a",)}
@@ -99,6 +109,16 @@ def _kinds(typed: object) -> object:
 _MODEL: Any = create_model("StatedModel", __base__=Strict, **_stated())
 
 
+class StatedHarmonic(Strict):
+    """An error of an encoder that repeats with its angle: a sin(order th) + b cos(order th)."""
+
+    axis: Literal["x", "y", "z"] = Field(description="the joint")
+    order: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(description="periods in a full turn")
+    amplitude: Annotated[Quantity, QuantityText("angle", "0(5) arcsec")] = Field(
+        description="0 with the standard uncertainty of a, and of b"
+    )
+
+
 class ModelTable(_MODEL):  # type: ignore[misc]
     """Errors of the rig: states that are estimated, and what is stated of those that are not."""
 
@@ -108,6 +128,13 @@ class ModelTable(_MODEL):  # type: ignore[misc]
         "which map leaves out), or a list that may begin with one of these, and goes on with kinds of this table or "
         "bias_walk; that of [filter] if absent",
         examples=[["rig", "k2", "levers"]],
+    )
+    harmonics: list[StatedHarmonic] | None = Field(
+        default=None,
+        max_length=MOST_WAVES,
+        description="errors of the encoders that repeat with their angle, up to 12: priors of what is estimated; of "
+        "what is not, considered in u; orders 1 and 2 of each encoder, 0(5) arcsec, if estimated and absent",
+        examples=[[{"axis": "z", "order": 1, "amplitude": "0(5) arcsec"}]],
     )
 
 
@@ -150,7 +177,16 @@ def model_of(table: Any, filter: Any, where: object) -> Model:
                     where, f"{text}, expected it with an uncertainty, such as {STATES[kind].example}"
                 )
             stated[name] = (each.value, each.u)
-    return Model(states, stated)
+    waves = tuple(("xyz".index(each.axis), each.order) for each in table.harmonics or ()) or USUAL_WAVES
+    if len(set(waves)) < len(waves):
+        raise StudyError(where, "model.harmonics: found an order of a joint twice, expected each once")
+    for k, each in enumerate(table.harmonics or ()):
+        if each.amplitude.value != 0.0 or each.amplitude.u == 0.0:
+            text = f"model.harmonics.{k}.amplitude: found {shown(each.amplitude.text)}"
+            raise StudyError(where, f"{text}, expected 0 with an uncertainty, such as 0(5) arcsec")
+        for name in STATES["harmonics"].parameters[2 * k : 2 * k + 2]:
+            stated[name] = (0.0, each.amplitude.u)
+    return Model(states, stated, harmonics=waves)
 
 
 def on_rig(table: Any) -> Array:

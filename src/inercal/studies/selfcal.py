@@ -17,7 +17,7 @@ from inercal.errors import StudyError
 from inercal.geometry.site import Site
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
 from inercal.selfcal.platform.rig import Base
-from inercal.selfcal.platform.states import BIAS_WALK, STATES
+from inercal.selfcal.platform.states import STATES
 from inercal.selfcal.settings import (
     Disturbances,
     Filter,
@@ -170,7 +170,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
     """
     file = check(SelfcalStudyFile, data, path, StudyError)
     base, limits = base_of(file.rig), limits_of(file.rig, path)
-    settings = SelfcalSettings(
+    return SelfcalSettings(
         site=_site(file.site, path),
         noise=file.noise,
         prior=_prior(file.prior, base),
@@ -189,11 +189,6 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
-    for key in BIAS_WALK:
-        if key in data["noise"] and key not in settings.kinds and file.filter.kind != "map":
-            text = f"noise.{key}: found it where bias_walk is not among the states under [model], expected it there"
-            raise StudyError(path, text)
-    return settings
 
 
 def _site(table: SiteTable, path: str | Path) -> Site:

@@ -278,7 +278,7 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                 if seen[k, 3]:
                     roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
                     wide = encoder_columns(
-                        th[k], at, read, earth_e, c, place, world.axes, world.signs, columns
+                        th[k], at, read, earth_e, c, layout, world.axes, world.signs, columns
                     )
                     for i in range(3):
                         root = roots[i]

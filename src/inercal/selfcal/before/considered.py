@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,7 +41,7 @@ from inercal.selfcal.platform.linearised import (
 )
 from inercal.selfcal.platform.model import Rates, on_the_base, platform_rate, sensing, specific_force
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, WALK, Layout, StateVector
+from inercal.selfcal.platform.states import ALL, WALK, Layout
 
 
 def sensitivities(
@@ -62,13 +63,13 @@ def sensitivities(
     place[[ALL.index(name) for name in names]] = 3 + p + np.arange(m)
     full = states.stated.copy()
     full[states.index] = coefficients
-    whole = StateVector((*states.names, *names), states.stated)
+    whole = replace(states, names=(*states.names, *names))
     wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole)
     P, S = np.diag(np.append(np.full(3, problem.noise.encoder**2), problem.prior**2)), np.zeros((3 + p, m))
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
     first = 0
-    model = problem.model._replace(layout=Layout(states.index, place, full))
+    model = problem.model._replace(layout=Layout(states.index, place, full, whole.layout.waves))
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
         rows, steps = slice(first, last), slice(first, max(last - 1, 0))
@@ -124,7 +125,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
         if updating(gate, near):
             if seen[k, 3]:
                 roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
-                wide = encoder_columns(th[k], at, read, earth_e, c, place, world.axes, world.signs, columns)
+                wide = encoder_columns(th[k], at, read, earth_e, c, layout, world.axes, world.signs, columns)
                 for i in range(3):
                     root = roots[i]
                     for j in range(i + 1):

@@ -215,7 +215,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = encoders_attitude(angles, read, earth_e, c, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, c, layout.waves, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         if history:
@@ -224,7 +224,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
         if take and seen:
             wide = 0
             if rig:
-                wide = encoder_columns(angles, of_encoders, read, earth_e, c, place, axes, signs, columns)
+                wide = encoder_columns(angles, of_encoders, read, earth_e, c, layout, axes, signs, columns)
             if late:
                 sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
             shown = out.innovations[k, 3:] if history else unwanted

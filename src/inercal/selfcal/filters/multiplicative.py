@@ -183,7 +183,7 @@ def _advance(
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             earth_e = on_the_base(world.earth, c)
-            of_encoders = encoders_attitude(angles, read, earth_e, c, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, c, layout.waves, axes, signs)
             watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
         take = updating(gate, near)
         total, count = 0.0, 0
@@ -191,7 +191,7 @@ def _advance(
             for i in range(6):
                 out.innovations[k, i] = math.nan
         if take and seen:
-            wide = encoder_columns(angles, of_encoders, read, earth_e, c, place, axes, signs, of_states)
+            wide = encoder_columns(angles, of_encoders, read, earth_e, c, layout, axes, signs, of_states)
             if late:
                 sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
             shown = out.innovations[k, 3:] if history else unwanted

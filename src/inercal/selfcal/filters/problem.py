@@ -175,9 +175,9 @@ def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tup
     world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
     w, earth = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full)
     read = Rates(w, w)
-    q = encoders_attitude(th, read, earth, full, world.axes, world.signs)
+    q = encoders_attitude(th, read, earth, full, layout.waves, world.axes, world.signs)
     columns = empty_columns()
-    count = encoder_columns(th, q, read, earth, full, layout.place, world.axes, world.signs, columns)
+    count = encoder_columns(th, q, read, earth, full, layout, world.axes, world.signs, columns)
     slope = np.zeros((3, len(c)))
     slope[:, columns.places[:count] - 3] = columns.axes[:count].T
     return np.array(q), slope

@@ -33,7 +33,7 @@ from inercal.selfcal.platform.model import (
     rate_at,
     squared,
 )
-from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, WALK, ZERO_Y
+from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, WALK, WAVE, ZERO_Y, Layout
 
 Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
@@ -43,7 +43,7 @@ FLOOR = LIMITS.encoder_floor
 WALK_TIME = LIMITS.walk_time
 """As kernels take it [s]."""
 
-WIDEST = 20
+WIDEST = 36
 """Most entries of a row of the model, and most columns of states."""
 
 Places: TypeAlias = NDArray[np.int64]
@@ -207,7 +207,7 @@ def encoder_columns(
     read: Rates,
     earth: Vector,
     c: Array,
-    place: Places,
+    layout: Layout,
     axes: Axes,
     signs: Array,
     columns: Columns,
@@ -218,16 +218,26 @@ def encoder_columns(
     """
     if len(c) <= 24:
         return 0
-    gamma = (c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])
+    place, waves, gamma = layout.place, layout.waves, (c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])
     j, count = right_jacobian(gamma), 0
     for i in range(3):
         count = put(columns, count, place[GAMMA + i], (j[0][i], j[1][i], j[2][i]), 1.0)
-    back = multiply(exp((-gamma[0], -gamma[1], -gamma[2])), elementary(axes[2], -signs[2] * th[2]))
+    back = exp((-gamma[0], -gamma[1], -gamma[2]))
+    about_z = rotate(back, unit(axes[2], signs[2]))
+    back = multiply(back, elementary(axes[2], -signs[2] * th[2]))
     count = put(columns, count, place[NONORTH + 1], rotate(back, unit(axes[0], 1.0)), 1.0)
     back = multiply(back, elementary(axes[0], -c[NONORTH + 1]))
-    count = put(columns, count, place[ZERO_Y], rotate(back, unit(axes[1], signs[1])), -1.0)
+    about_y = rotate(back, unit(axes[1], signs[1]))
+    count = put(columns, count, place[ZERO_Y], about_y, -1.0)
     back = multiply(back, elementary(axes[1], -signs[1] * (th[1] - c[ZERO_Y])))
     count = put(columns, count, place[NONORTH], rotate(back, unit(axes[2], 1.0)), 1.0)
+    if len(waves) > 0:
+        about_x = rotate(multiply(back, elementary(axes[2], -c[NONORTH])), unit(axes[0], signs[0]))
+        for k in range(len(waves)):
+            joint, at = waves[k, 0], waves[k, 1] * th[waves[k, 0]]
+            axis = about_x if joint == 0 else about_y if joint == 1 else about_z
+            count = put(columns, count, place[WAVE + 2 * k], axis, -math.sin(at))
+            count = put(columns, count, place[WAVE + 2 * k + 1], axis, -math.cos(at))
     w, v = platform_rate(rate_at(read, c[TAU]), c), rotate((q[0], -q[1], -q[2], -q[3]), earth)
     return put(columns, count, place[TAU], (w[0] - v[0], w[1] - v[1], w[2] - v[2]), 1.0)
 

@@ -52,10 +52,10 @@ def linearise_rows(
         w, later = steps.rate[k], steps.later[k]
         read = Rates((w[0], w[1], w[2]), (later[0], later[1], later[2]))
         angles = (th[k, 0], th[k, 1], th[k, 2])
-        at = encoders_attitude(angles, read, earth_e, c, world.axes, world.signs)
+        at = encoders_attitude(angles, read, earth_e, c, layout.waves, world.axes, world.signs)
         for i in range(4):
             out.of_encoders[k, i] = at[i]
-        count = encoder_columns(angles, at, read, earth_e, c, place, world.axes, world.signs, columns)
+        count = encoder_columns(angles, at, read, earth_e, c, layout, world.axes, world.signs, columns)
         for a in range(count):
             for i in range(3):
                 out.by_encoders[k, i, columns.places[a]] = columns.axes[a, i]

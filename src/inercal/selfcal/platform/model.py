@@ -6,8 +6,9 @@ earth rate and gravity in b turn with beta. With the states of the rig
 
     q_ep = R_i(th_x) qexp(nonorth_xy e_k) R_j(th_y - zero_y) qexp(nonorth_yz e_i) R_k(th_z) qexp(gamma)
 
-for joints about the axes i, j, k of p, and each accelerometer reads ``ka0 + s + K2 s^2 / (1 + ka1)``, s its output
-without them at the specific force ``f + w x (w x r)``, r its place and w the rate against inertial space.
+for joints about the axes i, j, k of p, th the readings without their harmonics; each accelerometer reads
+``ka0 + s + K2 s^2 / (1 + ka1)``, s its output without them at the specific force ``f + w x (w x r)``, r its place and w
+the rate against inertial space.
 
 Biases are ``kg0`` and ``ka0`` in the mean, and walk about them.
 
@@ -18,14 +19,18 @@ will turn until then at the one after it where tau is negative.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.selfcal.platform.kinematics import Axes, attitude, elementary, joint_axes, nearest_turn
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, WALK, ZERO_Y
+from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, WALK, WAVE, ZERO_Y
 
 
 @kernel
@@ -171,12 +176,34 @@ def joints_attitude(th: Vector | Array, c: Array, axes: Axes, signs: Array) -> Q
 
 
 @kernel
+def without_harmonics(th: Vector | Array, c: Array, waves: NDArray[np.int64]) -> Vector:
+    """Angles (3,) [rad] without the harmonics of encoders that read ``th`` (3,) [rad]; ``waves`` as of a layout."""
+    x, y, z = th[0], th[1], th[2]
+    for k in range(len(waves)):
+        joint, at = waves[k, 0], waves[k, 1] * th[waves[k, 0]]
+        error = c[WAVE + 2 * k] * math.sin(at) + c[WAVE + 2 * k + 1] * math.cos(at)
+        if joint == 0:
+            x -= error
+        elif joint == 1:
+            y -= error
+        else:
+            z -= error
+    return x, y, z
+
+
+@kernel
 def encoders_attitude(
-    th: Vector | Array, read: Rates, earth: Vector, c: Array, axes: Axes, signs: Array
+    th: Vector | Array,
+    read: Rates,
+    earth: Vector,
+    c: Array,
+    waves: NDArray[np.int64],
+    axes: Axes,
+    signs: Array,
 ) -> Quaternion:
     """Attitude of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc."""
     if len(c) > 24:
-        q = joints_attitude(th, c, axes, signs)
+        q = joints_attitude(without_harmonics(th, c, waves), c, axes, signs)
         return propagate(q, platform_rate(rate_at(read, c[TAU]), c), earth, c[TAU])
     return attitude(th, axes, signs)
 

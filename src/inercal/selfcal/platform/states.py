@@ -11,7 +11,7 @@ than it is needed: 18, 24 or K numbers.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -95,6 +95,12 @@ STATES: Final[Mapping[str, State]] = {
         "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
+    "harmonics": State(
+        tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "rad", "angle", "5 arcsec",
+        "0(5) arcsec", "errors of the encoders that repeat with their angle, sine and cosine part of each, in the "
+        "order of the study, or orders 1 and 2 of th_x, th_y, th_z", "harmonics",
+        "eccentric and elliptic circles of textbooks on surveying instruments",
+    ),
     "gyro_walk": State(
         _by_axis("kg0_walk"), "rad/s", "rate", "0.0005 deg/h", "0.0005 deg/h",
         "gyro biases at the last row, less their means kg0", source=_MARKOV,
@@ -135,6 +141,11 @@ ADDED: Final[Mapping[str, tuple[str, ...]]] = {
 } | {"bias_walk": BIAS_WALK}
 """Additions to such a set -> their kinds."""
 
+USUAL_WAVES: Final = tuple((joint, order) for joint in range(3) for order in (1, 2))
+"""Joint and order of harmonics where the study names none."""
+
+MOST_WAVES: Final = len(STATES["harmonics"].parameters) // 2
+
 GAMMA: Final = ALL.index("gamma_x")
 NONORTH: Final = ALL.index("nonorth_xy")
 ZERO_Y: Final = ALL.index("zero_y")
@@ -142,26 +153,31 @@ TAU: Final = ALL.index("tau_enc")
 K2: Final = ALL.index("K2_x")
 LEVER: Final = ALL.index("r_xx")
 ASYM: Final = ALL.index("S_asym_x")
+WAVE: Final = ALL.index("harmonic_1_sin")
 WALK: Final = ALL.index("kg0_walk_x")
-"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; of walks gyros,
-accelerometers."""
+"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; of harmonics a
+sine and a cosine of each; of walks gyros, accelerometers."""
 
 
 class Layout(NamedTuple):
     """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
-    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states."""
+    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states; ``waves``
+    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0."""
 
     chosen: NDArray[np.int64]
     place: NDArray[np.int64]
     stated: Array
+    waves: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class StateVector:
-    """States of an estimator: their ``names``, and the ``stated`` (K,) full vector of what is not estimated."""
+    """States of an estimator: their ``names``, the ``stated`` (K,) full vector of what is not estimated, and joint and
+    order of each of the ``harmonics``."""
 
     names: tuple[str, ...]
     stated: Array
+    harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -175,7 +191,10 @@ class StateVector:
         place[index] = 3 + np.arange(len(index))
         longest = max(int(index.max(initial=-1)), int(np.flatnonzero(self.stated).max(initial=-1)))
         size = next(size for size in (18, 24, len(ALL)) if longest < size)
-        return Layout(index, place, self.stated[:size].copy())
+        slots = slice(WAVE, WAVE + 2 * len(self.harmonics))
+        used = (place[slots] >= 0).any() or self.stated[slots].any()
+        waves = np.array(self.harmonics if used else (), dtype=np.int64).reshape(-1, 2)
+        return Layout(index, place, self.stated[:size].copy(), waves)
 
     def full(self, c: Array) -> Array:
         """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
@@ -191,7 +210,7 @@ class StateVector:
     @property
     def without_walks(self) -> StateVector:
         """The states that are constant."""
-        return StateVector(tuple(name for name in self.names if ALL.index(name) < WALK), self.stated)
+        return replace(self, names=tuple(name for name in self.names if ALL.index(name) < WALK))
 
     @property
     def of_rig(self) -> bool:
@@ -221,8 +240,12 @@ def twins(kinds: Sequence[str], fixed: Sequence[int]) -> tuple[str, ...]:
 
 
 def state_vector(
-    kinds: Sequence[str], stated: Array | None = None, left_out: Sequence[str] = ()
+    kinds: Sequence[str],
+    stated: Array,
+    left_out: Sequence[str] = (),
+    harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES,
 ) -> StateVector:
-    """The states of some kinds, in the order of the table, but those ``left_out``."""
-    names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in left_out)
-    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated)
+    """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named."""
+    without = {*left_out, *ALL[WAVE + 2 * len(harmonics) : WALK]}
+    names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in without)
+    return StateVector(names, stated, harmonics)
