@@ -23,6 +23,7 @@ FOLDER = Path(__file__).parent
 
 #: title of each part -> its script
 PARTS = {
+    "Reading": "reading",
     "IMU by hand": "imu_calibration",
     "Ferraris": "ferraris",
     "Noise": "allan",

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inercal.errors import InputError, RecordError
-from inercal.instruments.noise import NoiseModel
+from inercal.instruments.noise import SYMBOLS, NoiseModel
 from inercal.noise.deviation import PRESENT, allan_deviation, regular
 from inercal.noise.dwell_means import overlapping_variance, running_sums
 from rows import for_each
@@ -28,7 +28,7 @@ def plain(x, m):
 
 @pytest.mark.kernels
 @settings(deadline=None, max_examples=40)
-@given(st.integers(3, 90), st.data(), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.03, 0.3]))
+@given(st.integers(3, 300), st.data(), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.03, 0.3]))
 def test_kernels_against_plain_numpy(n, data, seed, missing):
     """With and without gaps, at any averaging time, on any offset."""
     m = data.draw(st.integers(1, n // 2))
@@ -39,6 +39,27 @@ def test_kernels_against_plain_numpy(n, data, seed, missing):
     expected, count = plain(x, m)
     assert found.terms[0, 0] == count
     np.testing.assert_allclose(found.deviation[0, 0] ** 2, expected, rtol=1e-7, atol=1e-18)
+
+
+@pytest.mark.kernels
+@settings(deadline=None, max_examples=20)
+@given(st.integers(30, 200), st.integers(1, 15), st.integers(0, 2**32 - 1), st.sampled_from([0.01, 0.05]))
+def test_gain_of_white_noise_and_of_quantisation_is_that_of_the_weights(n, m, seed, missing):
+    """Squares of the weights of all samples in a difference of means, and of their steps, written out."""
+    there = np.random.default_rng(seed).random(n) >= missing
+    found = allan_deviation(np.where(there, 1.0 * np.arange(n), np.nan), 1.0, [m])
+    white, steps = [], []
+    for i in range(n - 2 * m + 1):
+        halves = there[i : i + m], there[i + m : i + 2 * m]
+        if min(half.sum() for half in halves) >= np.ceil(PRESENT * m):
+            w = m * np.concatenate(
+                [sign * half / half.sum() for sign, half in zip((-1, 1), halves, strict=True)]
+            )
+            white.append(w @ w / (2 * m))
+            steps.append(np.sum(np.diff(w, prepend=0.0, append=0.0) ** 2) / 6)
+    if white:
+        of = [SYMBOLS.index(symbol) for symbol in "NQ"]
+        np.testing.assert_allclose(found.gain[0, 0, of], [np.mean(white), np.mean(steps)], rtol=1e-12)
 
 
 def test_all_channels_and_averaging_times_against_the_definition():

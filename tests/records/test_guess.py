@@ -2,6 +2,7 @@
 
 import gzip
 import re
+import tomllib
 from importlib.resources import files
 from pathlib import Path
 
@@ -136,8 +137,25 @@ def test_on_a_table_columns_without_names_are_not_guessed(tmp_path):
     """Time, two angles and an output look like a time and a triad."""
     path = table(tmp_path / "a.csv", "", np.column_stack([T, np.arange(N) % 7, np.arange(N) % 5, ACC[:, 0]]))
     assert "gyro_x" in guess_map(path)
-    with pytest.raises(RecordError, match="found 4 columns, expected a header such as phi1,phi2,acc_x"):
-        guess_map(path, on_table=True)
+    skeleton = guess_map(path, on_table=True)
+    assert all(line.startswith("#") for line in skeleton.splitlines())
+    assert "# [columns.phi1]" in skeleton
+    assert "likewise t, phi2, acc_x" in skeleton
+    assert "# [columns.a1]" in guess_map(path, of_model=True)
+
+
+def test_a_table_and_a_model_have_names_of_their_own(tmp_path):
+    """Outer and inner axes are phi1 and phi2, with a row a minute; the triad of a model that pitches has numbers."""
+    rows = np.column_stack([60.0 * np.arange(N), np.arange(N) % 7, np.arange(N) % 5, ACC])
+    on_table = table(tmp_path / "a.csv", "time,outer [deg],Inner axis,out_x,Out Y,z", rows)
+    found = tomllib.loads(guess_map(on_table, on_table=True))["columns"]
+    assert {name: column["from"] for name, column in found.items()} == {
+        "t": "time", "phi1": "outer [deg]", "phi2": "Inner axis", "y_x": "out_x", "y_y": "Out Y",
+    }  # fmt: skip
+    assert found["t"]["unit"] == "s"
+    pitching = table(tmp_path / "b.csv", "time,AX,AY,AZ,gyro_y,gyro_z", rows)
+    of_model = tomllib.loads(guess_map(pitching, of_model=True))["columns"]
+    assert list(of_model) == ["t", "a1", "a2", "a3", "gyro", "gyro_yaw"]
 
 
 def test_without_time_or_rate_one_is_asked_for(tmp_path):

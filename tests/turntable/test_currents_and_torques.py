@@ -13,7 +13,7 @@ from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.records.channels import misfit
 from inercal.records.record import record_of
-from inercal.rigs.plans import grid
+from inercal.rigs.plans import grid, named
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.positions.calibration import calibrate_positions
 from inercal.turntable.settings import RateTest
@@ -66,6 +66,15 @@ def test_a_gyrowheel_in_milliamperes_has_the_u_of_least_squares_and_is_applied_b
     )
     left = corrected["rate_x"].values - w[0]
     assert np.abs(left).max() < 1e-4 * noise / PER_RATE
+
+
+def test_the_earth_rate_that_is_subtracted_is_said_with_its_unit():
+    plan = named("24-position")
+    angles = [(f"phi{k + 1}", DEGREES, np.degrees(plan.angles[:, k])) for k in range(2)]
+    record = record_of([*angles, ("y_x", parse_unit("mA"), np.zeros(len(plan)))], np.arange(float(len(plan))))
+    settings = study(plan, unit="mA", coefficients={"k_x": PER_RATE}, noise=2e-6)
+    found = {each.code: each.message for each in calibrate_positions(record, settings).estimate.findings}
+    assert f"k_x = {1e3 * PER_RATE:.6g} mA/(rad/s), k_y = 0 mA/(rad/s)" in found["stated_earth_rate"]
 
 
 def _others(w, y):

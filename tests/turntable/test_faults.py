@@ -133,7 +133,7 @@ def test_a_fault_in_doubt_counts_by_the_probability_that_it_is_there():
         assert each.chance == pytest.approx(p, rel=1e-6)
         supports.append(0.5 / len(examination.asked) / (-np.e * p * np.log(p)))
         u = noise * np.sqrt(np.diag(np.linalg.inv(B.T @ B)))[:12] / length
-        b2 = (u / own_u) ** 2 - 1.0
+        b2 = np.maximum((u / own_u) ** 2 - 1.0, 0.0)
         s = (before - after[:12]) / length / own_u
         most = np.sqrt(chi2.isf(3e-3 / len(examination.asked), m) * b2)
         more += supports[-1] * (s**2 + b2) * (4.0 / np.maximum(most, 4.0)) ** 2

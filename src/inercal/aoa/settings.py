@@ -141,8 +141,8 @@ class Timing:
     """Delays [s], positive where outputs come late.
 
     ``gyro_delay`` of the gyro against the accelerometers, None where it is estimated ``gyro_delay_about`` some value,
-    that of the spectra; ``common_delay`` of all
-    sensors against the stamps, with its standard uncertainty ``common_delay_u``: no sensor sees it.
+    that of the spectra; ``common_delay`` of all sensors against the stamps, with its standard uncertainty
+    ``common_delay_u``: no sensor sees it.
     """
 
     gyro_delay: float | None = None

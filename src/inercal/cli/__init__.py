@@ -11,6 +11,7 @@ import time
 import warnings
 from types import FrameType
 
+from inercal import __version__
 from inercal.errors import InercalError
 
 # The matrices here are small: threads of the linear algebra library cost more than they bring.
@@ -73,9 +74,13 @@ def run(arguments: list[str] | None = None) -> int:
         _settle_streams()
         if sys.stdout is None:
             raise InercalError("standard output: found it closed, expected it open")
+        arguments = sys.argv[1:] if arguments is None else arguments
+        if arguments == ["--version"]:  # what installers ask needs no commands
+            print(__version__)
+            return 0
         from inercal.cli.tree import call  # here, so that an interrupt during loading is caught too
 
-        code = call(sys.argv[1:] if arguments is None else arguments)
+        code = call(arguments)
         sys.stdout.flush()
         return int(code or 0)
     except KeyboardInterrupt:

@@ -11,7 +11,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.earth import earth_rate
 from inercal.geometry.rotations import conjugate, exp, log, multiply, rotate
-from inercal.imu.settings import Disturbances
+from inercal.imu.settings import Disturbances, Simulation
 from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.instruments.triad import TriadModel, triad_from_terms
 from inercal.records.record import Record, record_of
@@ -243,6 +243,15 @@ def with_values(truth: ImuTruth, values: Mapping[str, float]) -> ImuTruth:
         accelerometer=triad_from_terms(whole, "K1", "M", "K0"),
         gyro=triad_from_terms(whole, "S", "T", "D_F"),
         g_sensitivity=g,
+    )
+
+
+def as_stated(truth: ImuTruth, of: Simulation) -> ImuTruth:
+    """The instrument with the coefficients and the noise that a study states."""
+    return replace(
+        with_values(truth, of.coefficients),
+        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
+        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
     )
 
 

@@ -193,15 +193,11 @@ def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
 
 def _by_hand(settings: ImuSettings, latitude: float, rng: np.random.Generator) -> Record:
     """A simulated record of poses held by hand."""
-    from inercal.imu.simulate import Noise, draw_truth, hand_poses, with_values
+    from inercal.imu.simulate import as_stated, draw_truth, hand_poses
     from inercal.imu.simulate import simulate as simulate_poses
 
     of, site = settings.simulation, settings.site
-    truth = replace(
-        with_values(draw_truth(rng), of.coefficients),
-        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
-        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
-    )
+    truth = as_stated(draw_truth(rng), of)
     record, _ = simulate_poses(
         truth,
         hand_poses(rng, of.poses),

@@ -14,6 +14,7 @@ from inercal.noise.covariance import ALPHA, degrees_of_freedom, lag_one
 from inercal.noise.kernels import mean_square, mean_square_with_gaps
 
 Integers = NDArray[np.int64]
+Counts = NDArray[np.int32]
 
 PRESENT = 0.9
 """Share of its samples that a mean needs."""
@@ -214,25 +215,32 @@ def _span(times: Array) -> str:
     return f"{np.min(times):g} s to {np.max(times):g} s" if times.size else "none"
 
 
-def _running_sums(samples: Array) -> tuple[Array, Integers | None]:
+def _running_sums(samples: Array) -> tuple[Array, Counts | None]:
     """Running sums (n+1,) of samples less their mean and, where some are missing, of the number present."""
     there = np.isfinite(samples)
     if there.all():
         return np.concatenate([[0.0], np.cumsum(samples - samples.mean())]), None
     level = samples[there].mean() if there.any() else 0.0
     sums = np.concatenate([[0.0], np.cumsum(np.where(there, samples - level, 0.0))])
-    return sums, np.concatenate([[0], np.cumsum(there)])
+    return sums, _counted(there)
 
 
-def _runs(samples: Array) -> Integers:
+def _runs(samples: Array) -> Counts:
     """Running number (n+1,) of runs of present samples that have begun."""
     there = np.isfinite(samples)
     begun = there & ~np.concatenate([[False], there[:-1]])
-    return np.concatenate([[0], np.cumsum(begun)])
+    return _counted(begun)
+
+
+def _counted(flags: NDArray[np.bool_]) -> Counts:
+    """Running number (n+1,) of those that are true."""
+    counts = np.zeros(len(flags) + 1, np.int32)
+    np.cumsum(flags, out=counts[1:])
+    return counts
 
 
 def _mean_square(
-    sums: Array, present: Integers | None, runs: Integers | None, m: int
+    sums: Array, present: Counts | None, runs: Counts | None, m: int
 ) -> tuple[float, int, float, float]:
     """Mean square of the second differences over ``m`` samples, their number, and the gain of N and of Q by gaps."""
     if present is None or runs is None:
@@ -246,7 +254,7 @@ def _least(m: int) -> int:
     return int(np.ceil(PRESENT * m))
 
 
-def _exponent(sums: Array, present: Integers | None, m: int, last: int) -> int:
+def _exponent(sums: Array, present: Counts | None, m: int, last: int) -> int:
     """Kind of noise of means over ``m`` samples, as an exponent that is not above ``last``; that where they are few."""
     n = len(sums) - 1
     if n // m < FEWEST:
@@ -265,7 +273,7 @@ def _exponent(sums: Array, present: Integers | None, m: int, last: int) -> int:
     return ALPHA[int(np.argmin(np.where(np.array(ALPHA) <= last, away, np.inf)))]
 
 
-def _means(sums: Array, present: Integers | None, m: int, at: Integers) -> Array:
+def _means(sums: Array, present: Counts | None, m: int, at: Integers) -> Array:
     """Means over ``m`` samples from ``at`` on; NaN where too many are missing."""
     total = sums[at + m] - sums[at]
     if present is None:

@@ -12,6 +12,7 @@ from inercal._jit import kernel
 
 Array: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
+Counts: TypeAlias = NDArray[np.int32]
 
 KINDS = 4
 """Kinds of noise in `curvature` and `covariance_sums`: N, B, K and Q."""
@@ -43,7 +44,7 @@ def mean_square(sums: Array, m: int) -> float:
 
 @kernel
 def mean_square_with_gaps(
-    sums: Array, present: Integers, runs: Integers, m: int, least: int
+    sums: Array, present: Counts, runs: Counts, m: int, least: int
 ) -> tuple[float, int, float, float]:
     """The same of D, m times the difference of adjacent means over the samples present, and how many there are.
 
@@ -55,26 +56,45 @@ def mean_square_with_gaps(
     the number of runs begun; both means need ``least`` samples. All 0 where there is none.
     """
     total = white = steps = 0.0
-    pairs = 0
-    for i in range(len(sums) - 2 * m):
+    one = two = 0.0
+    pairs = i = 0
+    count = len(sums) - 2 * m
+    parts = m / np.arange(max(least, 1), m + 1)
+    while i < count:
         k = i + m
+        # eight in a row between gaps: as many samples in each mean, and as many runs
+        even = (
+            i + 8 <= count
+            and present[i + 8] - present[i] == 8
+            and present[k + 8] - present[k - 1] == 9
+            and present[k + m + 7] - present[k + m - 1] == 8
+        )
+        alike = 8 if even else 1
         before = present[k] - present[i]
         after = present[k + m] - present[k]
         if before >= least and after >= least:
-            d = m * ((sums[k + m] - sums[k]) / after - (sums[k] - sums[i]) / before)
-            total += d * d
-            pairs += 1
-            a = m / before
-            b = m / after
-            white += m * (a + b)
+            a = parts[before - least]
+            b = parts[after - least]
+            if even:
+                for h in range(i, i + 8, 2):
+                    p = b * (sums[h + 2 * m] - sums[h + m]) - a * (sums[h + m] - sums[h])
+                    q = b * (sums[h + 1 + 2 * m] - sums[h + 1 + m]) - a * (sums[h + 1 + m] - sums[h + 1])
+                    one += p * p
+                    two += q * q
+            else:
+                d = b * (sums[k + m] - sums[k]) - a * (sums[k] - sums[i])
+                total += d * d
+            pairs += alike
+            white += alike * (m * (a + b))
             # runs begun after a mean's first sample, and one that this belongs to
             here = runs[k] - runs[i + 1] + present[i + 1] - present[i]
             there = runs[k + m] - runs[k + 1] + present[k + 1] - present[k]
             goes_on = (present[k] - present[k - 1]) * (present[k + 1] - present[k])
-            steps += 2.0 * (a * a * here + b * b * there + a * b * goes_on)
+            steps += alike * (2.0 * (a * a * here + b * b * there + a * b * goes_on))
+        i += alike
     if pairs == 0:
         return 0.0, 0, 0.0, 0.0
-    return total / pairs, pairs, white / pairs, steps / pairs
+    return (total + (one + two)) / pairs, pairs, white / pairs, steps / pairs
 
 
 @kernel

@@ -16,12 +16,13 @@ from inercal.records.channels import Origin, of_a_table
 from inercal.records.places import counted_names
 from inercal.records.read import format_of
 from inercal.records.read.table import Sample
-from inercal.records.titles import bare, fits, numbered, titled
+from inercal.records.titles import OF_A_MODEL, bare, fits, numbered, of_table, titled
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
 _LISTED = 40
+_POSITIONS = 1000
 _EVERYDAY = ("s", "m/s^2", "deg/s", "deg", "degC", "1")
 
 
@@ -58,8 +59,8 @@ def guess_map(
     Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``) and units, arrays without a
     header by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
     a unit by the size of gravity. Of a test ``on_table`` columns without names are not guessed, for angles and outputs
-    look alike; nor those ``of_model`` that pitches, whose accelerometers go by their numbers, ``a1`` to ``an``.
-
+    look alike; nor those ``of_model`` that pitches, whose accelerometers are ``a1`` to ``an`` by
+    their numbers or axes.
 
     ``rate`` is the sample rate, as text with its unit, where there is no time column. The map is TOML that reads these
     files, with a comment on each guess and on columns not used. Where no sensor was recognised, there are only
@@ -72,7 +73,9 @@ def guess_map(
         if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
             files += looked
     if not any(_MEASURED.fullmatch(name) for file in files for name in file.guesses):
-        return _skeleton(files)
+        return _skeleton(
+            files, "phi1 phi2 acc_x" if on_table else "a1 a2 gyro" if of_model else "acc_x acc_y gyro_x"
+        )
     names = dict.fromkeys(_quoted(file.path.name) for file in files)
     lines = [
         f"# Guessed from {', '.join(names)}: check each line, above all",
@@ -104,7 +107,7 @@ def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
         named = sample.names or on_table or of_model
-        for guess in _by_header(sample, of_model) if named else _by_shape(sample, path):
+        for guess in _by_header(sample, on_table, of_model) if named else _by_shape(sample, path):
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
@@ -114,8 +117,6 @@ def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
         new = {name: guess for name, guess in guesses.items() if name not in guessed}
         if "t" in new and len(new) > 1:
             files.append(_File(path, new, ()))
-    if on_table and not longest.keys() - {"t", "label"}:
-        raise RecordError(path, f"found {_held(samples)}, expected a header such as phi1,phi2,acc_x")
     if all(np.isnan(sample.values).all() for sample in samples):
         raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
     return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
@@ -145,11 +146,13 @@ def _unused(samples: Sequence[Sample], files: Sequence[_File]) -> tuple[str, ...
     return (*columns[:_LISTED], *more)
 
 
-def _skeleton(files: Sequence[_File]) -> str:
-    """A map that says nothing yet: what to write, and the columns there are."""
+def _skeleton(files: Sequence[_File], names: str) -> str:
+    """A map that says nothing yet: what to write, such as these channels, and the columns there are."""
+    first, *others = names.split()
+    unit = next(unit for unit in _EVERYDAY[1:] if fits(first, unit))
     lines = ["# No accelerometer or gyro was recognised. Give each channel its column and unit, for example"]
-    lines += ["# [columns.acc_x]", "# from = 1", '# unit = "m/s^2"', "#"]
-    lines += ["# and likewise t, acc_y, gyro_x. Without a time column, state the rate:"]
+    lines += [f"# [columns.{first}]", "# from = 1", f"# unit = {_quoted(unit)}", "#"]
+    lines += [f"# and likewise t, {', '.join(others)}. Without a time column, state the rate:"]
     lines += ["# [time]", '# rate = "100 Hz"', "#", "# What there is, with the first numbers:"]
     for file in files:
         held = [f"{_quoted(guess.origin)} (perhaps {name})" for name, guess in file.guesses.items()]
@@ -157,12 +160,15 @@ def _skeleton(files: Sequence[_File]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _by_header(sample: Sample, of_model: bool) -> list[_Guess]:
+def _by_header(sample: Sample, on_table: bool, of_model: bool) -> list[_Guess]:
     """Channels by the names in the header."""
     guesses = []
     for index, title in enumerate(sample.names):
         name, unit = titled(title, sample.units[index] if sample.units else None)
-        name = (numbered(title) if of_model else None) or name
+        if of_model:
+            name = numbered(title) or OF_A_MODEL.get(name or "", name)
+        elif on_table:
+            name = name or of_table(title)
         values = sample.values[:, index]
         # what is no number, as dates, can be a label alone; a time by its unit alone may be some interval
         if name is None or (name != "label" and np.isnan(values).all()):
@@ -249,7 +255,8 @@ def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
             units[name] = (guess.unit, "with this unit")
             continue
         if name == "t":
-            units[name] = _time_unit(guess.values)
+            by_position = of_a_table(guesses) and len(guess.values) < _POSITIONS
+            units[name] = ("s", "a row for each position") if by_position else _time_unit(guess.values)
         elif name.startswith("acc_"):
             units[name] = acc
         elif name[1:].isdigit():

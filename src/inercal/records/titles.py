@@ -83,6 +83,18 @@ _OF_A_MODEL = (
     ("point", r"(?:test )?point(?: (?:no|nr|number|id))?"),
     ("trigger", r"trig|trigger"),
 )
+OF_A_MODEL = {
+    "acc_x": "a1", "acc_y": "a2", "acc_z": "a3", "gyro_x": "gyro_roll", "gyro_y": "gyro", "gyro_z": "gyro_yaw",
+}  # fmt: skip
+"""Channels of a model that pitches about y, for those of a triad."""
+
+#: channels on a turntable, base first -> names
+_OF_A_TABLE = (
+    ("phi1", r"outer|axis 1"),
+    ("phi2", r"inner|axis 2"),
+    ("y_x", r"(?:out|output|reading|signal) x"),
+    ("y_y", r"(?:out|output|reading|signal) y"),
+)
 _LABEL = r"label|part|section|pose"
 _SPELLED = {
     "m/s^2": "m_s2|mps2|ms2|m_s_2",
@@ -131,6 +143,15 @@ def numbered(title: str) -> str | None:
         rf"(?:.* )?(?:{_SENSORS['acc']}) ?([1-9]\d*)", _words(re.sub(r"\s*[\[(].*", "", title))
     )
     return f"a{match[1]}" if match else None
+
+
+def of_table(title: str) -> str | None:
+    """The channel of a table of two axes, or of the instrument on it, by titles such as ``Inner axis`` or ``Out X``."""
+    words = _words(re.sub(r"\s*[\[(].*", "", title[:TITLE]))
+    for channel, names in _OF_A_TABLE:
+        if re.fullmatch(rf"(?:{names})(?: (?:axis|angle|gimbal|position|deg))*", words):
+            return channel
+    return None
 
 
 def fits(name: str, unit: str) -> bool:

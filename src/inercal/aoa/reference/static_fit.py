@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.means import mean_u
@@ -134,24 +135,29 @@ class _Solved(NamedTuple):
 def _solve(sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array, wide: Array) -> _Solved:
     """One step of weighted least squares about ``x``, with readings of the reference off by ``sigma`` [rad]."""
     jacobian, residual, slopes = linear
-    information, pull, whole, determinant = np.diag(wide**-2.0), np.zeros(len(wide)), 0.0, 0.0
-    count = 0
+    rows, rights, determinant = [np.eye(len(wide))], [np.zeros(len(wide))], 0.0
     for J, r, s in zip(jacobian, residual + jacobian @ x, slopes, strict=True):
         seen = np.isfinite(r) & np.isfinite(u)
-        C = np.diag(u[seen] ** 2) + sigma**2 * np.outer(s[seen], s[seen])
-        weighted = np.linalg.solve(C, np.column_stack([J[seen], r[seen]]))
-        information += J[seen].T @ weighted[:, :-1]
-        pull += J[seen].T @ weighted[:, -1]
-        whole += float(r[seen] @ weighted[:, -1])
-        determinant += float(np.linalg.slogdet(C)[1])
-        count += int(seen.sum())
-    scale = np.outer(wide, wide)
-    P = np.linalg.inv(information * scale) * scale
-    solution = P @ pull
-    chi2 = whole - float(solution @ pull)
-    used = len(wide) - float(np.trace(P / scale))
-    likelihood = -0.5 * (determinant + float(np.linalg.slogdet(information * scale)[1]) + chi2)
-    return _Solved(solution, P, chi2, max(count - used, 1.0), likelihood)
+        weighted = np.column_stack([J[seen] * wide, r[seen]]) / u[seen, None]
+        along = s[seen] / u[seen]
+        length = max(float(np.linalg.norm(along)), 1e-300)
+        common = math.hypot(1.0, sigma * length)
+        # rows by C^(-1/2), C = diag(u^2) + sigma^2 s s^T: products of C^-1 would cancel where sigma is far above u
+        weighted -= (1.0 - 1.0 / common) * np.outer(along / length, along @ weighted / length)
+        rows.append(weighted[:, :-1])
+        rights.append(weighted[:, -1])
+        determinant += 2.0 * float(np.log(u[seen]).sum() + np.log(common))
+    Q, R = np.linalg.qr(np.concatenate(rows))
+    right = np.concatenate(rights)
+    inverse = solve_triangular(R, np.eye(len(wide)))
+    solution = inverse @ (Q.T @ right)
+    left = right - np.concatenate(rows) @ solution
+    chi2 = float(left @ left)
+    used = len(wide) - float(np.sum(inverse**2))
+    likelihood = -0.5 * (determinant + 2.0 * float(np.log(np.abs(np.diag(R))).sum()) + chi2)
+    count = len(right) - len(wide)
+    P = inverse @ inverse.T * np.outer(wide, wide)
+    return _Solved(wide * solution, P, chi2, max(count - used, 1.0), likelihood)
 
 
 def _linear(settings: AoaSettings, theta: Array, means: Array, x: Array) -> tuple[Array, Array, Array]:

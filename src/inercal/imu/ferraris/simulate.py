@@ -16,12 +16,12 @@ from inercal.imu.settings import Disturbances, FerrarisSettings, ImuSettings
 from inercal.imu.simulate import (
     ImuTruth,
     Noise,
+    as_stated,
     draw_full_truth,
     indicated,
     record_of_counts,
     trembling,
     wandering_noise,
-    with_values,
 )
 from inercal.instruments.triad import TriadModel
 from inercal.records.record import Record
@@ -196,11 +196,7 @@ def quiet(truth: ImuTruth) -> ImuTruth:
 def simulate_study(settings: ImuSettings, options: FerrarisSettings, rng: np.random.Generator) -> Record:
     """The session of a study; directions and turns are off by the uncertainties that it states."""
     of, site = settings.simulation, settings.site
-    truth = replace(
-        with_values(draw_full_truth(rng), of.coefficients),
-        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
-        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
-    )
+    truth = as_stated(draw_full_truth(rng), of)
     session = Session(
         holds=(of.hold,) * 6,
         turn=options.turn,

@@ -110,13 +110,13 @@ class ArrayFormat:
     """A format whose files hold named arrays: ``opened`` lends those of a file while it is open, in a child process.
 
     ``name`` says what a file of it is, for the error about a damaged one: ``a MAT file``. Whatever a library
-    trips over in such a file becomes a `RecordError`. ``library`` loads what a file is read with,
+    trips over in such a file becomes a `RecordError`. ``imported`` imports what a file is read with,
     once for all children.
     """
 
     name: str
     opened: Callable[[Path], AbstractContextManager[Contents]]
-    library: Callable[[Path], object] = lambda _: None
+    imported: Callable[[Path], object] = lambda _: None
 
     def read(
         self,
@@ -137,8 +137,8 @@ class ArrayFormat:
         return self._in_child(partial(self._peek, path), path)
 
     def _in_child(self, work: Work[T], path: Path, progress: Tell = lambda _: None) -> T:
-        """The result of work in a child, which need not load the library again."""
-        self.library(path)
+        """The result of work in a child, which need not import the library again."""
+        self.imported(path)
         return in_child(work, path, progress)
 
     def _read(

@@ -163,12 +163,14 @@ def _opened(path: Path) -> Iterator[_Bag]:
 
 
 def _library() -> tuple[Any, Any, Any]:
-    """The parts of rosbags that are used; raises `MissingExtraError`."""
+    """The parts of rosbags that are used, its types loaded once for all children; raises `MissingExtraError`."""
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise MissingExtraError("Reading bags", "files") from error
+    for known in (Stores.LATEST, Stores.ROS1_NOETIC):
+        get_typestore(known)
     return AnyReader, Stores, get_typestore
 
 

@@ -23,7 +23,7 @@ from inercal.units import parse_unit, shown
 _CELSIUS = re.compile(r"(?:deg(?:ree)?s?[ _]?)?c(?:elsius)?", re.IGNORECASE)
 
 
-def library(_: Path) -> object:
+def imported(_: Path) -> object:
     """The library of the format."""
     import h5py
 
@@ -200,5 +200,5 @@ def _text(attribute: Any) -> str | None:
     return attribute if isinstance(attribute, str) else None
 
 
-_FORMAT = ArrayFormat("an HDF5 file", opened, library)
+_FORMAT = ArrayFormat("an HDF5 file", opened, imported)
 read, header, peek = _FORMAT.read, _FORMAT.header, _FORMAT.peek

@@ -10,7 +10,8 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from io import BufferedReader
 from itertools import islice
 from pathlib import Path
@@ -26,25 +27,51 @@ _BOM = b"\xef\xbb\xbf"
 
 @dataclass(frozen=True)
 class Block:
-    """Whole lines; ``first`` is the number of the first, counted from 1.
+    """Whole lines, as bytes that end with a ``mark``; ``first`` is the number of the first line, counted from 1.
 
     The last block of a file is ``cut`` if it does not end with a line end, and ``early`` if the compressed
     data ends before its end mark.
     """
 
-    lines: list[str]
+    data: bytes = field(repr=False)
+    mark: bytes
     first: int = 1
     cut: bool = False
     early: bool = False
 
+    @cached_property
+    def lines(self) -> list[str]:
+        """The lines as text: UTF-8, else Latin-1."""
+        try:
+            text = self.data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = self.data.decode("latin-1")
+        if "\r" in text:
+            text = text.replace("\r" if self.mark == b"\r" else "\r\n", "\n")
+        lines = text.split("\n")
+        return lines if self.cut else lines[:-1]
+
+    @cached_property
+    def count(self) -> int:
+        """The number of lines."""
+        return self.data.count(self.mark) + self.cut
+
     def after(self, count: int) -> Block:
         """The block without its first ``count`` lines."""
-        return Block(self.lines[count:], self.first + count, self.cut, self.early)
+        begin = 0
+        for _ in range(count):
+            begin = self.data.find(self.mark, begin) + 1 or len(self.data)
+        return self.part(begin, len(self.data), self.first + count)
+
+    def part(self, begin: int, end: int, first: int) -> Block:
+        """The lines from one byte to another, the first of which has the number ``first``."""
+        cut = self.cut and begin < end == len(self.data)
+        return replace(self, data=self.data[begin:end], first=first, cut=cut)
 
     @property
     def last(self) -> int:
         """Number of the last line."""
-        return self.first + len(self.lines) - 1
+        return self.first + self.count - 1
 
 
 def blocks(file: BufferedReader, path: Path) -> Iterator[Block]:
@@ -70,10 +97,9 @@ def blocks(file: BufferedReader, path: Path) -> Iterator[Block]:
                 raise RecordError(
                     path, f"line {first}: longer than {len(held)} bytes, expected lines of text"
                 )
-            lines = _text(held[:end], first, mark).split("\n")
-            lines.pop()
-            yield Block(lines, first)
-            first += len(lines)
+            block = Block(_unmarked(held[:end], first), mark, first)
+            yield block
+            first += block.count
             del held[:end]
     except EOFError:
         early = True
@@ -82,9 +108,9 @@ def blocks(file: BufferedReader, path: Path) -> Iterator[Block]:
     if not held and first == 1:
         raise RecordError(path, "is empty, expected lines of numbers")
     if held or early:
-        lines = _text(held, first, mark or _line_end(held)).split("\n")
-        cut = lines[-1] != ""
-        yield Block(lines if cut else lines[:-1], first, cut, early)
+        mark = mark or _line_end(held)
+        data = _unmarked(held, first)
+        yield Block(data, mark, first, bool(data) and not data.endswith(mark), early)
 
 
 def _line_end(data: bytearray) -> bytes:
@@ -92,15 +118,9 @@ def _line_end(data: bytearray) -> bytes:
     return b"\r" if b"\r" in data and b"\n" not in data else b"\n"
 
 
-def _text(data: bytearray, first: int, mark: bytes) -> str:
-    """Bytes as text: UTF-8, else Latin-1; line ends as a single newline."""
-    if first == 1 and data.startswith(_BOM):
-        data = data[len(_BOM) :]
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return text.replace("\r" if mark == b"\r" else "\r\n", "\n") if "\r" in text else text
+def _unmarked(data: bytearray, first: int) -> bytes:
+    """The bytes without the mark with which a file may begin."""
+    return bytes(data[len(_BOM) :] if first == 1 and data.startswith(_BOM) else data)
 
 
 _SAMPLE = 100

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray, held
 from inercal.records.read.limits import NESTING
 from inercal.records.read.table import FileOptions, Table
 
+_HEAD = 128
+_ORDERS = {b"IM": "<", b"MI": ">"}
+_KINDS, _MATRIX, _PACKED = range(1, 19), 14, 15
 _HDF5 = (b"MATLAB 7.3", b"\x89HDF\r\n\x1a\n")
 
 
@@ -64,9 +68,45 @@ def _opened(path: Path) -> Iterator[Contents]:
         return
     from scipy.io import loadmat
 
+    _check_structure(path)
     content = loadmat(path, appendmat=False)
     members = ((name, value) for name, value in content.items() if not name.startswith("__"))
     yield Contents(dict(_arrays(members)))
+
+
+def _check_structure(path: Path) -> None:
+    """Refuse a file of MATLAB v5 to v7 whose parts do not fit into each other; raises `RecordError`.
+
+    SciPy crashes on some such files. What is packed is not looked into. Source: MathWorks, "MAT-File Format", 1-5 f.
+    """
+    with path.open("rb") as file:
+        order = file.read(_HEAD)[-2:]
+        if order not in _ORDERS:  # v4
+            return
+        _check_parts(file, path, _HEAD, path.stat().st_size, struct.Struct(_ORDERS[order] + "II"))
+
+
+def _check_parts(file: IO[bytes], path: Path, at: int, end: int, tag: struct.Struct, depth: int = 0) -> None:
+    """Refuse parts from one byte to another that are of no known type or end elsewhere; raises `RecordError`."""
+    while (start := at) + tag.size <= end:
+        file.seek(at)
+        kind, length = tag.unpack(file.read(tag.size))
+        inside = at + tag.size
+        if kind >> 16:  # a small part has its length, and up to four bytes of content, in the tag
+            kind, length, inside = kind & 0xFFFF, kind >> 16, inside - 4
+        if kind not in _KINDS:
+            raise RecordError(
+                path, f"byte {at}: found a part of type {kind}, expected one of 1 to 18: it is damaged"
+            )
+        if inside + length > end:
+            after = inside + length - end
+            raise RecordError(
+                path, f"byte {at}: found a part that ends {after} bytes too late: it is damaged or cut"
+            )
+        if kind == _MATRIX and depth < 2 * NESTING:
+            _check_parts(file, path, inside, inside + length, tag, depth + 1)
+        at = inside + length
+        at += 0 if kind == _PACKED else (start - at) % 8
 
 
 def _arrays(members: Iterable[tuple[str, Any]], depth: int = 0) -> Iterator[tuple[str, NamedArray]]:

@@ -32,7 +32,7 @@ def _is_classic(path: Path) -> bool:
 def _library(path: Path) -> object:
     """The library that reads a file."""
     if not _is_classic(path):
-        return hdf5.library(path)
+        return hdf5.imported(path)
     import scipy.io
 
     return scipy.io

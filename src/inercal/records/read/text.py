@@ -1,7 +1,8 @@
 """Text files: CSV and its many dialects.
 
-NumPy reads a block of lines in one go. Only where it can't, or where something is missing, is the block gone
-through line by line: every row is kept, with NaN for what is no number, and the lines are said.
+NumPy reads the first block of lines in one go, and compiled code those of longer files. Only where these can't, or
+where something is missing, are lines gone through one by one: every row is kept, with NaN for what is no number, and
+the lines are said.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from inercal.units import shown
 UNENDED = "no line end follows: the last number"
 """Beginning of the finding on a last line that may have had more digits."""
 
+_FEW = 4  # blocks that take NumPy, where nothing is missing, no longer than loading what is compiled
+_MOST_ODD = 4096
 _HEADER_LINES = 50
 _LAYOUT_LINES = 400
 
@@ -64,12 +67,13 @@ def read(
         flaws: list[_Flaws] = []
         rounded: dict[str, list[int]] = {name: [] for name in numbers}
         block = head
-        for block in chain([head.after(layout.first)], stream):
-            layout = layout.settled(block.lines)
-            rows = _at_once(block, layout, tuple(numbers.values()))
-            if rows is None:
-                rows, flaw = _line_by_line(block, layout, tuple(numbers.values()))
-                flaws.append(flaw)
+        wanted = tuple(numbers.values())
+        for number, block in enumerate(chain([head.after(layout.first)], stream)):
+            if not layout.decimal and (b"." in block.data or b"," in block.data):
+                layout = layout.settled(block.lines)
+            read_rows = _gone_through if number >= _FEW or (number and flaws) else _looked_at
+            rows, flaw = read_rows(block, layout, wanted)
+            flaws += flaw
             for name, column, piece in zip(numbers, pieces, rows.T, strict=True):
                 column.append(piece.copy())
                 if name != "t":
@@ -167,6 +171,46 @@ def contents(layout: Layout) -> str:
     if not layout.header:
         return f"{layout.width} columns without a header"
     return f"columns {counted_names([shortened(name) for name in layout.header], 20)}"
+
+
+def _gone_through(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
+    """All rows (n, k) of a block by compiled code, those lines apart that are not full of plain numbers."""
+    from inercal.records.read.plain_rows import plain_rows
+
+    places = np.full(layout.width, -1)
+    places[list(indices)] = range(len(indices))
+    marks = [layout.delimiter or "\0", layout.decimal or "\0", *(each[0] for each in layout.comments)]
+    if any(not mark.isascii() for mark in marks) or len(set(indices)) < len(indices):
+        return _looked_at(block, layout, indices)
+    marks.insert(2, block.mark.decode())
+    data = np.frombuffer(block.data, np.uint8)
+    rows, flaws, pieces = np.empty((block.count, len(indices))), [], []
+    at, line, odd = 0, block.first, 1
+    while at < len(data):
+        count, end = plain_rows(data, at, "".join(marks).encode(), places, LARGEST, rows)
+        pieces.append(rows[:count].copy())
+        line += count
+        odd = 1 if count > odd else min(2 * odd, _MOST_ODD)
+        at = end
+        for _ in range(odd):
+            end = block.data.find(block.mark, end) + 1 or len(data)
+        if at < end:
+            part = block.part(at, end, line)
+            apart, flaw = _looked_at(part, layout, indices)
+            pieces.append(apart)
+            flaws += flaw
+            line += part.count
+        at = end
+    return np.concatenate(pieces), flaws
+
+
+def _looked_at(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
+    """All rows (n, k) of a block, by NumPy where it can."""
+    rows = _at_once(block, layout, indices)
+    if rows is not None:
+        return rows, []
+    rows, flaw = _line_by_line(block, layout, indices)
+    return rows, [flaw]
 
 
 def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | None:

@@ -10,6 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.findings import Finding
+from inercal.instruments.terms import TERMS
 from inercal.turntable.model import TableModel, table_model
 from inercal.turntable.positions.drift import Drift, fit_drift
 from inercal.turntable.readings import Readings
@@ -137,20 +138,21 @@ def rate_terms(model: TableModel) -> tuple[str, ...]:
 
 
 def _stated_rates(model: TableModel, settings: TurntableSettings) -> tuple[str, ...]:
-    """The terms of the earth rate that are not fitted, each with its value as ``k_x = 1``.
+    """The terms of the earth rate that are not fitted, each with its value as ``k_x = 1``, or ``k_x = 20 mA/(rad/s)``.
 
     Raises
     ------
     StudyError
         None of them is stated, and the output is in no unit of rate.
     """
-    rates, has_value = [], False
+    rates, has_value, unit = [], False, settings.instrument.unit
     for part in model.stated:
         for symbol, each, value in zip(
             part.channel.symbols, part.channel.monomials, part.values, strict=True
         ):
             if each.of_rate:
-                rates.append(f"{symbol} = {value:.6g}")
+                of = "" if unit.dimension == "rate" else f" {TERMS[symbol].unit_for(unit.symbol)}"
+                rates.append(f"{symbol} = {value / (unit.factor if of else 1.0):.6g}{of}")
                 has_value = has_value or symbol in settings.instrument.coefficients or bool(value)
     if rates and not has_value:
         names = ", ".join(text.partition(" ")[0] for text in rates)

@@ -80,7 +80,8 @@ def simulate(settings: TurntableSettings, rng: np.random.Generator) -> Record:
     angles = np.repeat(plan.angles, per_dwell, axis=0)
     columns = [("position", parse_unit("1"), np.repeat(np.arange(1.0, n + 1.0), per_dwell))]
     columns += [
-        (name, parse_unit("deg"), np.degrees(angles[:, k])) for k, name in enumerate(model.chain.joints)
+        (name, parse_unit("deg"), np.round(np.degrees(angles[:, k]), 12))
+        for k, name in enumerate(model.chain.joints)
     ]
     columns += [
         (channel.channel, instrument.unit, y[..., k].ravel() / instrument.unit.factor)

@@ -112,7 +112,7 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
             ("position", one, numbers),
             *([("joint", one, turning + 1.0)] if test.legs else []),
             ("rate", parse_unit("deg/s"), np.degrees(rate)),
-            *((name, degrees, np.degrees(angles[:, k])) for k, name in enumerate(chain.joints)),
+            *((name, degrees, np.round(np.degrees(angles[:, k]), 12)) for k, name in enumerate(chain.joints)),
             *(
                 (channel, instrument.unit, outputs[:, k] / instrument.unit.factor)
                 for k, channel in enumerate(channels)
