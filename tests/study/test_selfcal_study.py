@@ -15,11 +15,11 @@ from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
 from inercal.errors import StudyError
-from inercal.instruments.terms import TERMS
+from inercal.instruments.terms import term
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
-from inercal.selfcal.platform.states import ALL, BIAS_WALK, RIG
+from inercal.selfcal.platform.states import ALL, BIAS_WALK, RIG, STATES, TEMPERATURE
 from inercal.selfcal.settings import Gating
 from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
 from inercal.studies.schema import json_schema
@@ -266,6 +266,8 @@ REFUSED = {
     "nois.encoder=1 arcsec": "nois: unknown key, did you mean noise?",
     "noise.gyro_walk=0 deg/h/sqrt(s)": "noise.gyro_walk: found .*a walk above zero",
     'model.harmonics=[{axis = "x", order = 1, amplitude = "5 arcsec"}]': "model.harmonics.0.*found '5 arcsec'",
+    "model.sag=3 arcsec": "model.sag: ",
+    'disturbances.temperature=["20 degC"]': "disturbances.temperature: ",
     "model.states=all": 'model.states: found .all., expected "paper", "extended", "rig", or a list',
     'model.states=["rig", "rig"]': "model.states: found 'rig', expected one of gamma, ",
     'model.states=["gamma", "gamma"]': "model.states: .*expected each kind once",
@@ -376,6 +378,21 @@ def test_states_of_the_rig():
     assert asked.states.names == (*NAMES, "harmonic_1_sin", "harmonic_1_cos")
     assert asked.states.harmonics == ((2, 8),)
     assert asked.priors[asked.states.index][-1] == pytest.approx(2.0 * ARCSEC)
+    asked = study(
+        model={
+            "states": ["paper", "temperature", "sag"],
+            "sag": "0(3) arcsec/g",
+            "g_sensitivity": "0(0.1) deg/h/g",
+        }
+    )
+    assert asked.states.names[18:] == (
+        *STATES["sag"].parameters,
+        *(n for k in TEMPERATURE for n in STATES[k].parameters),
+    )
+    known = dict(zip(ALL, asked.priors, strict=True))
+    assert known["sag_y"] == pytest.approx(3.0 * ARCSEC / 9.80665)
+    assert known["G_zx"] == pytest.approx(math.radians(0.1) / 3600 / 9.80665)
+    assert known["ka1_x_T1"] == pytest.approx(20e-6)
     batch = study(
         model={"states": "rig"}, filter={"kind": "map"}, noise=noise | {"gyro_walk": "1 deg/h/sqrt(s)"}
     )
@@ -383,4 +400,4 @@ def test_states_of_the_rig():
 
 
 def test_the_table_of_terms_knows_every_coefficient_with_its_unit():
-    assert tuple(TERMS[name].unit for name in ALL) == units(ALL)
+    assert tuple(term(name).unit_for("rad/s") for name in ALL) == units(ALL)

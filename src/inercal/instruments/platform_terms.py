@@ -33,6 +33,10 @@ PLATFORM: Final[tuple[tuple[str, str, str], ...]] = (
     ("nonorth_xy", "non-orthogonality of the joints: turn of axis y against axis x", "rad"),
     ("nonorth_yz", "non-orthogonality of the joints: turn of axis z against axis y", "rad"),
     *(
+        (f"sag_{i}", f"turn of the sensors by a mass along {i} of the platform, per force", "rad/(m/s^2)")
+        for i in _AXES
+    ),
+    *(
         (
             f"harmonic_{k}_{part}",
             f"error of an encoder, x, y or z, by its angle: {part} part of item {k}",

@@ -280,6 +280,11 @@ _OF_FIELD = {
     "m": "mm",
     "s": "ms",
     "rad/sqrt(s)": "deg/sqrt(h)",
+    "(rad/s)/(m/s^2)": "deg/h/g",
+    "rad/(m/s^2)": "arcsec/g",
+    "rad/s/K": "deg/h/K",
+    "m/s^2/K": "ug/K",
+    "1/K": "ppm/K",
 }
 
 #: unit of the field -> that of larger things, and from how many of the latter on it is taken

@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
-from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
+from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantities, quantity, within
 from inercal.selfcal.estimators import FactorKind, FilterKind
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import Plan
@@ -131,6 +131,10 @@ class Disturbances:
         "the same of the gyros", "rate random walk", "0 deg/h/sqrt(s)", example="1e-4 deg/h/sqrt(s)",
         bounds=within(0.0, math.inf, "a walk of 0 or more"),
     )  # fmt: skip
+    temperature: tuple[float, ...] = quantities(
+        "of the platform, at times evenly from the first row to the last; constant if absent", "temperature",
+        example=["20 degC", "21 degC"], at_least=2,
+    )  # fmt: skip
     substeps: int = 10
 
 
@@ -228,6 +232,18 @@ class SelfcalSettings:
         for name, (_, u) in self.model.stated.items():
             whole[ALL.index(name)] = u or whole[ALL.index(name)]
         return whole
+
+    def warm(self, temperature: Array) -> Array:
+        """Temperatures (n,) [degC] less that of the coefficients: the stated one, else the mean."""
+        of_coefficients = float(np.mean(temperature)) if self.temperature is None else self.temperature.value
+        return temperature - of_coefficients
+
+    def simulated_temperature(self, n: int) -> Array | None:
+        """(n,) [degC] of the rows of a simulation; None where it is constant."""
+        given = self.disturbances.temperature
+        if not given:
+            return None
+        return np.asarray(np.interp(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, len(given)), given))
 
     @property
     def true_values(self) -> Array | None:

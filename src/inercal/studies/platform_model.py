@@ -40,6 +40,11 @@ _BELIEVED = {
     "length": (100.0, "a length within 100 m"),
     "number": (0.5, "a number within 0.5"),
     "quadratic": (0.01, "a coefficient within 0.1 g/g^2"),
+    "rate by force": (5e-3, "a drift within 3 deg/s/g"),
+    "angle by force": (0.02, "a turn within 10 deg/g"),
+    "rate by temperature": (0.02, "a drift within 1 deg/s/K"),
+    "acceleration by temperature": (0.1, "a drift within 10 mg/K"),
+    "number by temperature": (0.01, "a change within 1 %/K"),
 }
 
 
@@ -125,8 +130,8 @@ class ModelTable(_MODEL):  # type: ignore[misc]
     states: Annotated[str | list[str], BeforeValidator(_kinds)] | None = Field(
         default=None,
         description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay, and bias_walk, "
-        "which map leaves out), or a list that may begin with one of these, and goes on with kinds of this table or "
-        "bias_walk; that of [filter] if absent",
+        "which map leaves out), or a list that may begin with one of these, and goes on with kinds of this table, "
+        "temperature (kg0_T1, ka0_T1, ka1_T1) or bias_walk; that of [filter] if absent",
         examples=[["rig", "k2", "levers"]],
     )
     harmonics: list[StatedHarmonic] | None = Field(

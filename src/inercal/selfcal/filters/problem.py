@@ -173,11 +173,11 @@ def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tup
     """Attitude (4,) of p as encoders have it that read ``th`` (3,) [rad], and its change (3, p) [rad, about the axes of
     p] per change of the states ``c`` (p,); ``rate`` (3,) [rad/s] as read about that time."""
     world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
-    w, earth = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full)
+    w, earth, up = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full), on_the_base(world.up, full)
     read = Rates(w, w)
-    q = encoders_attitude(th, read, earth, full, layout.waves, world.axes, world.signs)
+    q = encoders_attitude(th, read, earth, up, full, layout.waves, world.axes, world.signs)
     columns = empty_columns()
-    count = encoder_columns(th, q, read, earth, full, layout, world.axes, world.signs, columns)
+    count = encoder_columns(th, q, read, earth, up, full, layout, world.axes, world.signs, columns)
     slope = np.zeros((3, len(c)))
     slope[:, columns.places[:count] - 3] = columns.axes[:count].T
     return np.array(q), slope

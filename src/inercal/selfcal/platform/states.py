@@ -45,6 +45,7 @@ _CHAIN = (
 )
 _DELAY = "J. Kelly, G. S. Sukhatme, A general framework for temporal calibration, ISER 2010: delays as states"
 _MARKOV = "A. Gelb (editor), Applied Optimal Estimation, MIT Press (1974), section 3.8: exponentially correlated errors"
+_WARM = "IEEE Std 952 and 1293: coefficients of temperature"
 _IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
 
 STATES: Final[Mapping[str, State]] = {
@@ -95,6 +96,28 @@ STATES: Final[Mapping[str, State]] = {
         "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
+    "g_sensitivity": State(
+        tuple(f"G_{i}{j}" for i in "xyz" for j in "xyz"), "(rad/s)/(m/s^2)", "rate by force", "0.02 deg/h/g",
+        "0(0.02) deg/h/g", "drift of gyro x, y, z per specific force along x, y, z", "g_sensitivity",
+        "IEEE Std 952: acceleration-sensitive drift",
+    ),
+    "sag": State(
+        _by_axis("sag"), "rad/(m/s^2)", "angle by force", "2 arcsec/g", "0(2) arcsec/g",
+        "elastic turn of the sensors on the platform per specific force, by a mass off the centre along x, y, z",
+        "sag", "Hooke's law",
+    ),
+    "kg0_T1": State(
+        tuple(f"kg0_{i}_T1" for i in "xyz"), "rad/s/K", "rate by temperature", "0.02 deg/h/K", "0(0.02) deg/h/K",
+        "gyro biases per kelvin", "kg0_T1", _WARM,
+    ),
+    "ka0_T1": State(
+        tuple(f"ka0_{i}_T1" for i in "xyz"), "m/s^2/K", "acceleration by temperature", "50 ug/K", "0(50) ug/K",
+        "accelerometer biases per kelvin", "ka0_T1", _WARM,
+    ),
+    "ka1_T1": State(
+        tuple(f"ka1_{i}_T1" for i in "xyz"), "1/K", "number by temperature", "20 ppm/K", "0(20) ppm/K",
+        "accelerometer scale errors per kelvin", "ka1_T1", _WARM,
+    ),
     "harmonics": State(
         tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "rad", "angle", "5 arcsec",
         "0(5) arcsec", "errors of the encoders that repeat with their angle, sine and cosine part of each, in the "
@@ -128,6 +151,7 @@ KIND_OF: Final[Mapping[str, str]] = {
 
 PAPER: Final[tuple[str, ...]] = tuple(STATES)[:6]
 EXTENDED_MODEL: Final[tuple[str, ...]] = tuple(STATES)[:8]
+TEMPERATURE: Final[tuple[str, ...]] = ("kg0_T1", "ka0_T1", "ka1_T1")
 BIAS_WALK: Final[tuple[str, ...]] = ("gyro_walk", "accelerometer_walk")
 RIG: Final[tuple[str, ...]] = (
     *EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay", *BIAS_WALK,
@@ -137,8 +161,8 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {"paper": PAPER, "extended": EXTEN
 """Word for a set of states -> their kinds."""
 
 ADDED: Final[Mapping[str, tuple[str, ...]]] = {
-    kind: (kind,) for kind, state in STATES.items() if state.key
-} | {"bias_walk": BIAS_WALK}
+    kind: (kind,) for kind, state in STATES.items() if state.key and kind not in TEMPERATURE
+} | {"temperature": TEMPERATURE, "bias_walk": BIAS_WALK}
 """Additions to such a set -> their kinds."""
 
 USUAL_WAVES: Final = tuple((joint, order) for joint in range(3) for order in (1, 2))
@@ -153,10 +177,13 @@ TAU: Final = ALL.index("tau_enc")
 K2: Final = ALL.index("K2_x")
 LEVER: Final = ALL.index("r_xx")
 ASYM: Final = ALL.index("S_asym_x")
+BY_FORCE: Final = ALL.index("G_xx")
+SAG: Final = ALL.index("sag_x")
+WARM: Final = ALL.index("kg0_x_T1")
 WAVE: Final = ALL.index("harmonic_1_sin")
 WALK: Final = ALL.index("kg0_walk_x")
-"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; of harmonics a
-sine and a cosine of each; of walks gyros, accelerometers."""
+"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; by temperature
+kg0, ka0, ka1; of harmonics a sine and a cosine of each; of walks gyros, accelerometers."""
 
 
 class Layout(NamedTuple):
@@ -241,11 +268,11 @@ def twins(kinds: Sequence[str], fixed: Sequence[int]) -> tuple[str, ...]:
 
 def state_vector(
     kinds: Sequence[str],
-    stated: Array,
+    stated: Array | None = None,
     left_out: Sequence[str] = (),
     harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES,
 ) -> StateVector:
     """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named."""
     without = {*left_out, *ALL[WAVE + 2 * len(harmonics) : WALK]}
     names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in without)
-    return StateVector(names, stated, harmonics)
+    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated, harmonics)
