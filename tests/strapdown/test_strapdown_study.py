@@ -48,7 +48,7 @@ list = [["0 s", "10 s"], ["12 s", "20 s"]]
 heading = "30(5) deg"
 [prior]
 size = "5 cm"
-g_sensitivity = "9 deg/h"
+g_sensitivity = "9 deg/h/g"
 [plan]
 turns = [["-y", "90 deg"], ["z", "-180 deg"]]
 [truth]

@@ -106,8 +106,7 @@ class Prior:
         bounds=DEVIATION,
     )  # fmt: skip
     g_sensitivity: float = quantity(
-        "of drifts by specific force, in the unit of rates per g", "rate", "500 deg/h", example="0.05 deg/h",
-        bounds=DEVIATION,
+        "of drifts by specific force", "rate by force", "500 deg/h/g", example="0.05 deg/h/g", bounds=DEVIATION,
     )  # fmt: skip
 
 
@@ -196,7 +195,6 @@ class StrapdownSettings:
         """Prior standard deviations (51,) of the array of coefficients."""
         prior = np.zeros(SIZE)
         for group, places in GROUPS.items():
-            size = getattr(self.prior, group)
-            prior[list(places)] = size / 9.80665 if group == "g_sensitivity" else size
+            prior[list(places)] = getattr(self.prior, group)
         prior[GRAVITY], prior[LATITUDE] = self.gravity_u, self.site.latitude_u
         return prior
