@@ -31,7 +31,7 @@ SETTINGS = StrapdownSettings(
     Site(strapdown.G, (), strapdown.LATITUDE),
     Noise(TEST.angle_walk, TEST.velocity_walk),
     rests=Rests(velocity=TEST.vibration),
-    prior=Prior(30 * DPH, 1e-3, 1e-3, 5e-2, 1e-3, 1e-3, 1e-5, 0.05, 5e-3, 5e-4, 50 * DPH),
+    prior=Prior(30 * DPH, 1e-3, 1e-3, 5e-2, 1e-3, 1e-3, 1e-5, 0.05, 5e-3, 5e-4, 50 * DPH / 9.8),
 )
 #: name -> (fault, change of the unit, change of the study)
 CASES = {

@@ -1,4 +1,4 @@
-"""What the model of a study leaves out and the recording shows: score tests of terms, of drifts, of the latitude.
+"""Effects outside the model that a recording shows: score tests of terms, of drifts, of the latitude.
 
 Each candidate adds columns to the last linear problem of a fit. Elimination of the nodes leaves normal equations of the
 coefficients alone, of which every candidate is a block: how far chi-square falls when it is freed, and how far the
@@ -53,7 +53,7 @@ class Tested(NamedTuple):
 
 
 def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
-    """What a fit may have left out."""
+    """Effects that a fit may have left out."""
     G, prior = fit.sensitivities, settings.deviations()
     for term in (each for each in OPTIONS if each not in settings.terms):
         places = list(GROUPS[term])
