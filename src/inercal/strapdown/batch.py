@@ -22,7 +22,7 @@ from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
 from inercal.strapdown.samples import Samples, freed, gains
 from inercal.strapdown.settings import Noise, StrapdownSettings
-from inercal.strapdown.start import Beginning, beginning, carried_through
+from inercal.strapdown.start import Beginning, beginning, carried_through, first_coefficients
 
 
 @short_repr
@@ -95,7 +95,7 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
     variances = _variances(noise)
     deviations = settings.deviations()
     free = free_places(settings.terms, settings.gravity_u > 0.0, settings.site.latitude_u > 0.0)
-    prior, c = deviations[free], np.zeros(SIZE)
+    prior, c = deviations[free], first_coefficients(samples, nodes)
     motion = freed(samples, c)
     begin = beginning(motion, nodes, settings)
     q = carried_through(motion, nodes, begin)

@@ -53,6 +53,9 @@ class Limits:
     start_heading: float = math.radians(5.0)
     """The same about the vertical where it was found from earth rate."""
 
+    over_earth_rate: float = 10.0
+    """Mean rate at rest, over earth rate, from which on it is the bias that the fit begins with."""
+
     step: float = 0.02
     """Largest step, over the standard uncertainties of the coefficients, at which the iteration ends."""
 

@@ -9,9 +9,11 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import exp, from_matrix, multiply, normalize, rotate
+from inercal.strapdown.coefficients import SIZE, D
 from inercal.strapdown.kernels import Motion, turned
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
+from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import StrapdownSettings
 
 
@@ -45,6 +47,17 @@ def beginning(motion: Motion, nodes: Nodes, settings: StrapdownSettings) -> Begi
     level = from_matrix(np.stack([np.cross(north, up), north, up]))
     heading = np.array([0.0, 0.0, -(start.heading or 0.0)])
     return Beginning(multiply(exp(heading), level), np.array([tilt, tilt, start.heading_u]))
+
+
+def first_coefficients(samples: Samples, nodes: Nodes) -> Array:
+    """Coefficients (51,) to begin with: those of a perfect unit, but for biases of gyros so far beyond earth rate that
+    the rate at rest is theirs."""
+    c, number = np.zeros(SIZE), nodes.rest
+    ends = [nodes.sample[number == each][[0, -1]] for each in np.unique(number)]
+    rate = np.mean([samples.rate[first:last].mean(axis=0) for first, last in ends], axis=0)
+    if np.linalg.norm(rate) > LIMITS.over_earth_rate * EARTH_RATE:
+        c[D] = rate
+    return c
 
 
 def carried_through(motion: Motion, nodes: Nodes, begin: Beginning) -> Array:
