@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from benchmarks.independent.aoa import AXES, CASES, DEG, DELAYS, G, R, Tunnel, simulate
+from independent.aoa import AXES, CASES, DEG, DELAYS, G, R, Tunnel, simulate
 
 from inercal.aoa.diagnosis.choice import decided
 from inercal.aoa.fusion.filter_result import estimate

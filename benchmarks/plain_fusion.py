@@ -26,23 +26,24 @@ class Model:
         self.axes = [tuple(map(float, row)) for row in problem.geometry]
         self.variances = [noise.accelerometer**2] * 3 + [noise.gyro**2]
 
-    def read(self, x, i):
-        """What sensor ``i`` should read, and its derivative (n,)."""
+    def read(self, x, i, before):
+        """What sensor ``i`` should read, and its derivative (n,); by positions and scale at the state ``before``."""
         h = np.zeros(len(x))
         theta, w, al = x[0], x[1], x[2]
         if i == 3:
             k = 1.0 + (x[SCALE] if self.full else 0.0)
             h[1], h[4] = k, 1.0
             if self.full:
-                h[SCALE] = w
+                h[SCALE] = before[1]
             return k * w + x[4], h
         along, down, r, z = self.axes[i]
         up = forward = 0.0
         if self.full:
             r, z = r + x[ARMS + i], z + x[HEIGHTS + i]
             up, forward = x[UP], x[FORWARD]
-            h[ARMS + i] = -along * w * w - down * al
-            h[HEIGHTS + i] = -along * al + down * w * w
+            was, turned = before[1] ** 2, before[2]
+            h[ARMS + i] = -along * was - down * turned
+            h[HEIGHTS + i] = -along * turned + down * was
             h[UP], h[FORWARD] = -down, along
         s, c = self.g * math.sin(theta), self.g * math.cos(theta)
         fx, fz = s - r * w * w - z * al + forward, c + r * al - z * w * w + up
@@ -52,15 +53,16 @@ class Model:
         h[BIASES + i] = 1.0
         return along * fx - down * fz + x[BIASES + i], h
 
-    def row(self, x, P):
+    def row(self, x, before, P):
         """What the four sensors should read at a prediction, and their derivatives (4, n).
 
-        Positions and the gyro's scale are not learned from a motion that is but noise.
+        Positions and the gyro's scale are learned by the motion of the row ``before``, of covariance ``P``, and not
+        where that is but noise.
         """
-        told, H = zip(*(self.read(x, i) for i in range(4)), strict=True)
+        told, H = zip(*(self.read(x, i, before) for i in range(4)), strict=True)
         told, H = np.array(told), np.array(H)
         if self.full:
-            w, al = (max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0 for j in (1, 2))
+            w, al = (max(0.0, 1.0 - 9.0 * P[j, j] / before[j] ** 2) if before[j] else 0.0 for j in (1, 2))
             H[:, ARMS : ARMS + 3] *= max(w, al)
             H[:, HEIGHTS : HEIGHTS + 3] *= max(w, al)
             H[:, SCALE] *= w
@@ -72,10 +74,11 @@ def run_numpy(model, x, P, rows):
     x, P, found = x.copy(), P.copy(), np.empty((len(rows), 2))
     F, Q, Ft = model.F, model.Q, model.F.T
     for k, row in enumerate(rows.tolist()):
+        before, spread = x.copy(), P
         if k:
             x = F @ x
             P = F @ P @ Ft + Q
-        ahead, (told, H) = x.copy(), model.row(x, P)
+        ahead, (told, H) = x.copy(), model.row(x, before, spread)
         for i, h in enumerate(H):
             v, Ph = row[i] - told[i] - h @ (x - ahead), P @ h
             S = float(h @ Ph) + model.variances[i]
@@ -93,9 +96,10 @@ def run_filterpy(model, x, P, rows):
     ekf.x, ekf.P, ekf.F, ekf.Q = x.copy(), P.copy(), model.F, model.Q
     found = np.empty((len(rows), 2))
     for k, row in enumerate(rows):
+        before, spread = ekf.x.copy(), ekf.P.copy()
         if k:
             ekf.predict()
-        ahead, (told, H) = ekf.x.copy(), model.row(ekf.x, ekf.P)
+        ahead, (told, H) = ekf.x.copy(), model.row(ekf.x, before, spread)
         for i, h in enumerate(H):
             expected = told[i] + h @ (ekf.x - ahead)
             v, variance = row[i] - expected, h @ ekf.P @ h

@@ -136,6 +136,7 @@ def test_no_other_speed_is_claimed():
     [
         ("aoa_bands --seeds 1 --draws 4 --scenario base", "smoothed 19"),
         ("aoa_endless --rows 5000", " 0 without an angle"),
+        ("aoa_hours --duration 70 --seeds 1", "then a polar"),
         ("imu_coverage --runs 2", "all together"),
         ("imu_coverage --runs 2 --method ferraris --by-scatter", "all together"),
         ("imu_coverage --runs 2 --method aided", "all together"),

@@ -12,6 +12,8 @@ from scipy.linalg import expm
 
 _STEP = 1e-30
 
+_SHOWN_BY_MOTION = ("dr", "zo", "k", "tau")
+
 
 @dataclass
 class Twin:
@@ -55,8 +57,12 @@ class Twin:
         then = x[1] - tau * x[2] + 0.5 * tau**2 * x[3]
         return (1.0 + self.of(x, "k_g")) * level * then + self.of(x, "b_g")
 
-    def reading(self, x, i, row):
-        """What scalar ``i`` of a row should read, its derivative, its variance."""
+    def reading(self, x, i, row, motion):
+        """What scalar ``i`` of a row should read, its derivative, its variance.
+
+        Derivatives by positions and by the gyro's scale and delay are those at another ``motion``, rate,
+        acceleration and jerk.
+        """
         n, noise = len(self.settings.layout.names), self.settings.noise
 
         def told(x, p, y):
@@ -65,7 +71,9 @@ class Twin:
             return self.gyro(x) if i == n else x[0]
 
         p, y = row[n + 3 :] if self.spatial else (0.0, 0.0)
-        h = np.array([told(_off(x, k), p, y).imag / _STEP for k in range(len(x))])
+        moved = np.concatenate([x[:1], motion, x[4:]])
+        at = [moved if name.partition("_")[0] in _SHOWN_BY_MOTION else x for name in self.names]
+        h = np.array([told(_off(at[k], k), p, y).imag / _STEP for k in range(len(x))])
         variance = (noise.accelerometer, noise.gyro, row[n + 2])[(i >= n) + (i > n)] ** 2
         if self.spatial:
             by = [
@@ -125,9 +133,20 @@ def _off(x, k):
     return off
 
 
+def above_noise(x, P, j):
+    """Share of a state beyond three standard deviations."""
+    return max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0
+
+
+def motion_of(x, P):
+    """Rate, acceleration, and the jerk as far as it is above noise."""
+    return np.array([x[1], x[2], x[3] * above_noise(x, P, 3)])
+
+
 def believed_of(twin, x, P):
-    """(n,) how much of a derivative by each state is kept: of positions, gyro scale and delay as much as moves."""
-    rate, acceleration = (max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0 for j in (1, 2))
+    """(n,) how much of a derivative by each state is kept: of positions, gyro scale and delay as much as moves at a
+    state."""
+    rate, acceleration = (above_noise(x, P, j) for j in (1, 2))
     by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate, "tau": acceleration}
     return np.array([by.get(name.partition("_")[0], 1.0) for name in twin.names])
 
@@ -154,16 +173,17 @@ def run(twin, start, t, rows):
         before = turns.copy()
         turns = np.where(np.isfinite(row[n + 3 :]), row[n + 3 :], turns)
         F = np.eye(len(x))
+        motion, believed = motion_of(x, P), believed_of(twin, x, P)
         if dt > 0.0:
             x, F, Q = twin.transition(x, dt, *(0.5 * (before + turns)))
             P = F @ P @ F.T + Q
         predicted.append((x, P))
         steps.append(F)
-        ahead, believed = x.copy(), believed_of(twin, x, P)
+        ahead = x.copy()
         for i in range(n + 2):
             if math.isnan(row[i]):
                 continue
-            told, h, variance = twin.reading(ahead, i, np.concatenate([row[: n + 3], turns]))
+            told, h, variance = twin.reading(ahead, i, np.concatenate([row[: n + 3], turns]), motion)
             h = h * believed
             variance += beyond(twin, P, believed) if i == n else 0.0
             v, S = row[i] - told - h @ (x - ahead), h @ P @ h + variance

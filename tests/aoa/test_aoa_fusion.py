@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter
-from fusion_twin import Twin, believed_of, beyond, run
+from fusion_twin import Twin, believed_of, beyond, motion_of, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, G, scenario, study
@@ -204,11 +204,12 @@ def test_filterpy_finds_the_same(states):
     theirs.F, theirs.Q = F, Q
     x, u = [], []
     for k, row in enumerate(recording.rows):
+        motion, believed = motion_of(theirs.x, theirs.P), believed_of(twin, theirs.x, theirs.P)
         if k:
             theirs.predict()
-        ahead, believed = theirs.x.copy(), believed_of(twin, theirs.x, theirs.P)
+        ahead = theirs.x.copy()
         for i in range(4):
-            told_of, h, R = twin.reading(ahead, i, row)
+            told_of, h, R = twin.reading(ahead, i, row, motion)
             h = h * believed
             R += beyond(twin, theirs.P, believed) if i == 3 else 0.0
             theirs.update(

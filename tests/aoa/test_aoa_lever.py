@@ -51,7 +51,10 @@ def test_arms_are_those_of_the_model_of_the_fusion(of, level, theta, rate, al):
     fusion = problem(study(8, layout=of, attitude=of_roll))
     x = np.zeros(fusion.size)
     x[:3] = theta, rate, al
-    at, row = model.Prediction(x, math.sin(theta), math.cos(theta), 0.0, 0.0), empty_row(model.WIDEST)
+    at, row = (
+        model.Prediction(x, math.sin(theta), math.cos(theta), 0.0, 0.0, rate, al, 0.0),
+        empty_row(model.WIDEST),
+    )
     read = [model.accelerometer(i, at, fusion.model, row)[0] for i in range(5)]
     level = fusion.constants.roll_cosine
     static = G * axes(of, level) @ [math.sin(theta), math.cos(theta)]

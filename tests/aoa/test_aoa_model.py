@@ -44,11 +44,11 @@ def state(of, seed):
 def read(of, x, i, p=0.0, y=0.0):
     """Value, dense row and variance of accelerometer ``i``, of the gyro for i = N."""
     row = empty_row(model.WIDEST)
+    at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), p, y, *x[1:4])
     if i < of.count:
-        at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), p, y)
         value, noise, size = model.accelerometer(i, at, of.model, row)
     else:
-        value, noise, size = model.gyro(x, of.model, row)
+        value, noise, size = model.gyro(at, of.model, row)
     assert size <= model.WIDEST
     places = row.places[:size]
     assert len(set(places)) == size

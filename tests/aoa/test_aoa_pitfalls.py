@@ -44,9 +44,10 @@ def hard_gated(of, recording):
     model.transition(step, of.model, F, Q)
     theta = []
     for k, z in enumerate(recording.rows):
+        motion = x[1], x[2], x[3]
         if k:
             loop.go_on(belief, model.Step(step, 0.0, 0.0, 0.0), of.model, F, Q, work)
-        at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), 0.0, 0.0)
+        at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), 0.0, 0.0, *motion)
         for i in range(of.count + 1):
             expected, noise, size = loop.reading(i, at, math.nan, of.model, row)
             v, h = z[i] - expected, np.zeros(n)

@@ -160,8 +160,8 @@ def test_a_delay_is_later_earlier_or_not_seen(shown):
     def words(spectra, stated=0.0):
         value, u = spectra
         known = {"stated": stated, "spectra": {"value": value, "u": u, "coherence": 1.0}}
-        timing = result.result["timing"] | {"gyro_delay": known}
-        return delays(replace(result, result=result.result | {"timing": timing})).partition(". ")[0]
+        parts = {"timing": result.result["timing"] | {"gyro_delay": known}, "posterior": {}}
+        return delays(replace(result, result=result.result | parts)).partition(". ")[0]
 
     assert (
         words((2e-3, 1e-5))

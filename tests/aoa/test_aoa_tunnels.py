@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.independent.aoa import CASES, DEG, LINES, G, Tunnel, simulate
+from independent.aoa import CASES, DEG, LINES, G, Tunnel, simulate
 from sting_study import study
 
 from inercal.aoa.diagnosis.choice import decided, of_vibration

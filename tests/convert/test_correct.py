@@ -26,6 +26,7 @@ def estimate(units=None, command="calibrate imu", **values):
         names=tuple(values),
         values=np.array(list(values.values())),
         parameters={name: SimpleNamespace(value=value) for name, value in values.items()},
+        conditions={},
         result={"unit": {} if units is None else units},
     )
 
@@ -127,3 +128,36 @@ def test_a_recording_in_another_unit_of_the_same_kind_is_corrected_alike():
         np.testing.assert_allclose(other[name].values, same[name].values, rtol=1e-12)
     with pytest.raises(InputError, match="acc_x is in count, expected mg"):
         apply_to(recorded("count", "deg/s", acc, gyro), model)
+
+
+def test_rates_beyond_those_of_the_calibration_are_said():
+    """Outputs of -4 to 4 at a bias of 1 and scales of 2, 3 and 4: rates of -2.5 to 1.5, -5/3 to 1 and -1.25 to 0.75."""
+    seen = estimate(D_F_x=1.0, D_F_y=1.0, D_F_z=1.0, S_x=2.0, S_y=3.0, S_z=4.0)
+    seen.conditions["ranges"] = {"gyro_output": [[-4.0] * 3, [4.0] * 3]}
+    seen.result["unit"] = {"acc": "m/s^2", "gyro": "rad/s"}
+    turned = estimate(S_x=-2.0)
+    turned.conditions["ranges"] = {"rate_about_an_axis_rad_s": [[-2.0, -1.0, -1.0], [1.0, 2.0, 2.0]]}
+    np.testing.assert_allclose(imu_model(seen).rates, [[-2.5, -5 / 3, -1.25], [1.5, 1.0, 0.75]])
+    np.testing.assert_array_equal(imu_model(turned).rates, [[-2.0, -1.0, -1.0], [1.0, 2.0, 2.0]])
+    assert imu_model(estimate()).rates is None
+    unit = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
+    t, source = np.arange(2.0), Source("log.csv", "")
+
+    def said(most):
+        columns = {
+            f"{sensor}_{axis}": Column(f"{sensor}_{axis}", unit[sensor], np.array([0.0, most]), t, source)
+            for sensor in unit
+            for axis in "xyz"
+        }
+        return [each.message.split()[0] for each in apply_to(Record(columns), imu_model(seen)).findings]
+
+    assert said(4.0) == []
+    assert said(5.0) == ["gyro_x", "gyro_y", "gyro_z"]
+
+
+@pytest.mark.parametrize("bad", [{"gyro_output": 1.0}, {"gyro_output": [["a"] * 3] * 2}, 7])
+def test_a_range_that_is_none_is_named(bad):
+    damaged = estimate()
+    damaged.conditions["ranges"] = bad
+    with pytest.raises(InputError, match=r"^cal\.json: conditions\.ranges\.\w+ is not two values"):
+        imu_model(damaged, "cal.json")

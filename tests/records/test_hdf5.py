@@ -309,3 +309,24 @@ def test_the_only_matrix_of_a_v7_3_file_needs_no_name(tmp_path):
     record = read(path, record_map)
     np.testing.assert_array_equal(record.triad("acc").values, ACC)
     np.testing.assert_array_equal(record["acc_x"].t, T)
+
+
+@pytest.mark.parametrize("chunks", [None, (7, 2), (50_000, 4)])
+def test_a_large_matrix_is_read_by_blocks(tmp_path, chunks):
+    """Packed by the CF conventions, with a fill value and an infinite one: what h5py gives column by column."""
+    rng = np.random.default_rng(4)
+    n = 70_001
+    table = np.column_stack([np.arange(n), rng.integers(-30_000, 30_000, (n, 3))]).astype(np.int32)
+    table[n // 2, 1] = -99_999
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        made = file.create_dataset("data", data=table, chunks=chunks, compression="gzip" if chunks else None)
+        made.attrs["_FillValue"], made.attrs["scale_factor"] = np.int32(-99_999), 0.125
+    text = '[columns.t]\nfrom = ["data", 0]\nunit = "ms"\n'
+    for k, axis in enumerate("xyz", start=1):
+        text += f'[columns.acc_{axis}]\nfrom = ["data", {k}]\nunit = "m/s^2"\n'
+    record = read(path, mapped(tmp_path / "map.toml", text))
+    wanted = np.where(table == -99_999, np.nan, 0.125 * table)
+    np.testing.assert_allclose(record["acc_x"].t, 1e-3 * wanted[:, 0], rtol=1e-15)
+    for k, axis in enumerate("xyz", start=1):
+        np.testing.assert_array_equal(record[f"acc_{axis}"].values, wanted[:, k])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.independent.aoa import CASES, DEG, Tunnel, simulate
+from independent.aoa import CASES, DEG, Tunnel, simulate
 from sting_study import study
 from streams_that_break import lines_out
 

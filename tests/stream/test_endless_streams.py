@@ -85,6 +85,6 @@ def test_memory_is_flat(name, folder):
         process.stdin.close()
         reader.join()
     print(name, [round(each, 1) for each in memory], taken)
-    assert process.returncode == 0
+    assert process.returncode in (0, 1)  # repeated rows jump, which a verdict may say
     assert taken >= 0.9 * ROWS or name == "selfcal"
     assert max(memory[2:]) < memory[1] + SPARE

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert.correction import Correction, Samples, factor_of
+from inercal.convert.correction import Correction, Samples, factor_of, range_of, widened
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -34,6 +34,7 @@ class ImuModel:
     ``units`` are those of the outputs it was calibrated for, by sensor; ``gyro`` is None where only the
     accelerometers were calibrated; ``g_sensitivity`` (3, 3) [gyro output/(m/s^2)]; ``second_order`` (3,) [1/(m/s^2)]
     is K2 of the accelerometers, whose output is K0 + K1 (s + K2 s^2) at the specific force s along the input axis.
+    ``rates`` (2, 3) [rad/s] are the least and the largest of the calibration, None where it does not say.
     """
 
     accelerometer: TriadModel
@@ -41,6 +42,7 @@ class ImuModel:
     g_sensitivity: Array
     units: dict[str, str]
     second_order: Array = field(default_factory=lambda: np.zeros(3))
+    rates: Array | None = None
 
     def correct(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:
         """Specific force (*batch, 3) [m/s^2] and rate (*batch, 3) [rad/s] from outputs."""
@@ -106,7 +108,11 @@ class ImuModel:
         settings = {**triads, "g": self.g_sensitivity, "units": self.units, "invert": invert}
         if self.second_order.any():
             settings["k2"] = self.second_order
-        return Correction(work, reads, writes, settings)
+        ranges = {}
+        if gyro is not None and self.rates is not None and not invert:
+            ends = zip("xyz", *self.rates.tolist(), strict=True)
+            ranges = {f"gyro_{axis}": widened(low, high, "rad/s") for axis, low, high in ends}
+        return Correction(work, reads, writes, settings, ranges=ranges)
 
     def _straight(self, acc: Array) -> Array:
         """Outputs of the accelerometers as they would be without K2: the root of s + K2 s^2 that is small with it."""
@@ -149,7 +155,7 @@ def imu_model(estimate: Estimate, where: object = "calibration") -> ImuModel:
             )
     for unit in units.values():
         parse_unit(str(unit), where)
-    return model
+    return replace(model, rates=_rates(estimate, model.gyro, where))
 
 
 def imu_of(values: Mapping[str, float] | Mapping[str, Array], units: dict[str, str]) -> ImuModel:
@@ -182,6 +188,16 @@ def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Find
         text = f"{', '.join(other)}: not applied, for a sample by itself does not tell the motion they act on"
         findings.append(Finding("not_held", text, str(where)))
     return tuple(findings)
+
+
+def _rates(estimate: Estimate, gyro: TriadModel | None, where: object) -> Array | None:
+    """The least and the largest rates (2, 3) [rad/s] about the axes that a calibration has seen."""
+    if gyro is None:
+        return None
+    rates = range_of(estimate, "rate_about_an_axis_rad_s", where, (3,))
+    if rates is None and (outputs := range_of(estimate, "gyro_output", where, (3,))) is not None:
+        rates = np.sort((outputs - gyro.bias) / gyro.scale, axis=0)
+    return rates
 
 
 @np.errstate(all="ignore")

@@ -191,14 +191,31 @@ def factor_of(column: Column, wanted: Unit, of: str) -> tuple[float, float]:
     return column.unit.factor / wanted.factor, (column.unit.zero - wanted.zero) / wanted.factor
 
 
+def range_of(estimate: Estimate, name: str, where: object, axes: tuple[int, ...] = ()) -> Array | None:
+    """Least and largest values (2, *axes) of what a calibration was made over; None where it does not say.
+
+    Raises `InputError`: what stands there are no such numbers.
+    """
+    ranges = estimate.conditions.get("ranges") or {}
+    try:
+        if name not in ranges:
+            return None
+        ends = np.array(ranges[name], dtype=float)
+    except (TypeError, ValueError):
+        ends = np.empty(0)
+    if ends.shape != (2, *axes):
+        raise InputError(
+            where, f"conditions.ranges.{name} is not two values, expected the least and the largest"
+        )
+    return ends
+
+
 def temperature_range(estimate: Estimate) -> tuple[float, float, str] | None:
     """Lowest and highest temperature [degC] for which a calibration was made; None where it does not say."""
-    conditions = estimate.conditions
-    ranges = conditions.get("ranges") or {}
-    if "temperature_degC" in ranges:
-        low, high = ranges["temperature_degC"]
-        return float(low), float(high), "degC"
-    stated = conditions.get("temperature")
+    ends = range_of(estimate, "temperature_degC", "calibration")
+    if ends is not None:
+        return float(ends[0]), float(ends[1]), "degC"
+    stated = estimate.conditions.get("temperature")
     if not stated:
         return None
     half = 3.0 * float(stated.get("u") or 0.0) + TEMPERATURE_MARGIN

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert.correction import Correction, Samples, factor_of, one_clock, widened
+from inercal.convert.correction import Correction, Samples, factor_of, one_clock, range_of, widened
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -144,7 +144,8 @@ def rate_gyros(estimate: Estimate, where: object = "calibration") -> RateGyros:
     dead = [f"S_{axis}" for axis in axes if not values[f"S_{axis}"]]
     if dead:
         raise InputError(where, f"{dead[0]} is 0, expected a scale factor that can be inverted")
-    low, high = (estimate.conditions.get("ranges") or {}).get("rate_rad_s", (-np.inf, np.inf))
+    ends = range_of(estimate, "rate_rad_s", where)
+    low, high = (-np.inf, np.inf) if ends is None else ends
     output = parse_unit(str(estimate.result["unit"]["gyro"]), where)
     return RateGyros(axes, values, output, (float(low), float(high)))
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from inercal.convert.correction import range_of
 from inercal.convert.table import TableInstrument
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
@@ -45,11 +46,8 @@ def table_instrument(estimate: Estimate, where: object = "calibration") -> Table
     units = {str(unit) for unit in result["unit"].values()}
     output = parse_unit(units.pop(), where)
     attitude = tuple(result["attitude"])
-    ranges = estimate.conditions.get("ranges") or {}
-    readings = {}
-    for channel in (c for c in channels if f"reading_of_{c}" in ranges):
-        low, high = ranges[f"reading_of_{channel}"]
-        readings[channel] = (float(low), float(high))
+    ends = {channel: range_of(estimate, f"reading_of_{channel}", where) for channel in channels}
+    readings = {c: (float(each[0]), float(each[1])) for c, each in ends.items() if each is not None}
     instrument = TableInstrument(
         kind, channels, values, output, float(result["gravity_m_s2"]), attitude, readings
     )

@@ -42,9 +42,7 @@ _ACCELEROMETER = (
 )
 _ON_A_TABLE = (
     *(
-        Term(
-            f"r_{i}{j}", f"lever arm: place of accelerometer {i} along {j} from the crossing of the axes", "m"
-        )
+        Term(f"r_{i}{j}", f"lever arm: place of accelerometer {i} along {j} from the origin of b", "m")
         for i in _AXES
         for j in _AXES
     ),

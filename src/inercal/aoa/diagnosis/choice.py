@@ -108,7 +108,7 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
 def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:
     """``command_shift``: a delay of the gyro by the spectra that is not that of the fusion, and costs more than u.
 
-    In a band whose rows are few the fusion alone may not learn it.
+    The fusion may not learn one that is far from the study's.
     """
     k = problem.places.delay
     if delay is None or k < 0:

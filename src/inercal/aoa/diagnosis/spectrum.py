@@ -13,8 +13,6 @@ from inercal.arrays import Array
 def powers(t: Array, values: Array) -> tuple[Array, Array]:
     """Frequencies (k,) [Hz] and the spectral densities (k, c) of columns (n, c), by segments of `Limits.line_segment`;
     columns with missing samples count with these held, one without a number as zero."""
-    from scipy.signal import welch
-
     step = float(np.median(np.diff(t)))
     row = np.arange(len(t))
     columns = []
@@ -22,8 +20,21 @@ def powers(t: Array, values: Array) -> tuple[Array, Array]:
         finite = np.isfinite(column)
         columns.append(np.interp(row, row[finite], column[finite]) if finite.any() else np.zeros(len(t)))
     size = min(len(t), round(LIMITS.line_segment / step))
-    frequency, density = welch(np.column_stack(columns), 1.0 / step, nperseg=size, axis=0)
-    return np.asarray(frequency), np.asarray(density)
+    return np.asarray(np.fft.rfftfreq(size, step)), _welch(np.column_stack(columns), size) * step
+
+
+def _welch(values: Array, size: int) -> Array:
+    """One-sided spectral densities (size // 2 + 1, c) of columns (n, c) of samples at 1 Hz: Hann's window, half
+    overlapping, means removed (Welch 1967, IEEE Trans. Audio Electroacoust. 15). Loading SciPy's took 0.7 s."""
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
+    starts = range(0, len(values) - size + 1, size - size // 2)
+    density = np.zeros((size // 2 + 1, values.shape[1]))
+    for start in starts:
+        part = values[start : start + size]
+        density += np.square(np.abs(np.fft.rfft(window[:, None] * (part - part.mean(axis=0)), axis=0)))
+    density /= len(starts) * float(window @ window)
+    density[1 : -1 if size % 2 == 0 else None] *= 2.0
+    return density
 
 
 def highest_motion(recording: Recording, settings: AoaSettings) -> float:
@@ -76,7 +87,8 @@ def lines(recording: Recording, motion: float, low_pass: float) -> tuple[float, 
 
 def _running_median(density: Array, frequency: Array) -> Array:
     """The median of densities (k,) or (k, c) over some Hz about each frequency."""
-    from scipy.ndimage import median_filter
-
-    width = 2 * max(2, round(0.5 * LIMITS.line_surroundings / frequency[1])) + 1
-    return np.asarray(median_filter(density, size=(width, 1)[: density.ndim], mode="nearest"))
+    half = max(2, round(0.5 * LIMITS.line_surroundings / frequency[1]))
+    padded = np.pad(density, [(half, half), (0, 0)][: density.ndim], mode="edge")
+    return np.asarray(
+        np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=-1)
+    )

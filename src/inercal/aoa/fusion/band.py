@@ -89,23 +89,34 @@ def filter_of(band: Band) -> BandFilter | None:
     sections = band.sections
     if not len(sections):
         return None
-    from scipy.signal import sosfilt, sosfilt_zi
-
     b, a = sections[:, :3], sections[:, 3:]
     k = np.arange(3)
     delay = float(((b @ k) / b.sum(axis=1) - (a @ k) / a.sum(axis=1)).sum())
-    pulse = np.zeros(max(64, int(40.0 * delay)))
-    pulse[0] = 1.0
-    left = np.cumsum(np.abs(sosfilt(sections, pulse))[::-1])[::-1]
+    pulse = _passed(sections, max(64, int(40.0 * delay)))
+    left = np.cumsum(np.abs(pulse)[::-1])[::-1]
     memory = int(np.argmax(left < _LEFT * left[0])) or len(pulse)
+    gain = b.sum(axis=1) / a.sum(axis=1)
+    before = np.concatenate([[1.0], np.cumprod(gain)[:-1]])
+    still = before[:, None] * np.column_stack([gain - b[:, 0], b[:, 2] - a[:, 2] * gain])
     return BandFilter(
         np.ascontiguousarray(sections),
-        np.ascontiguousarray(sosfilt_zi(sections)),
+        still,
         1.0 / band.rate,
         delay,
         band.every,
         memory,
     )
+
+
+def _passed(sections: Array, size: int) -> Array:
+    """The answer (``size``,) of sections, one after the other, to a pulse."""
+    x = [1.0] + [0.0] * (size - 1)
+    for b0, b1, b2, _, a1, a2 in sections.tolist():
+        first, second = 0.0, 0.0
+        for k, value in enumerate(x):
+            x[k] = y = b0 * value + first
+            first, second = b1 * value - a1 * y + second, b2 * value - a2 * y
+    return np.array(x)
 
 
 def initial(of: BandFilter, width: int) -> BandState:

@@ -214,7 +214,7 @@ def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> t
     if i < n:
         return accelerometer(i, at, model, out)
     if i == n:
-        return gyro(at.x, model, out)
+        return gyro(at, model, out)
     out.places[0], out.values[0] = 0, 1.0
     return at.x[0], angle_u * angle_u, 1
 
@@ -337,6 +337,8 @@ def _advance(
         if dt != last:
             transition(dt, model, F, Q)
             last, snap = dt, Q[0, 0]
+        rate, acceleration, jerk = x[1], x[2], x[3] * significant(x[3], P[3, 3])
+        of_rate, of_acceleration = significant(rate, P[1, 1]), significant(acceleration, P[2, 2])
         if dt > 0.0:
             go_on(belief, Step(dt, p, y, snap), model, F, Q, work)
         if surprised or not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
@@ -345,8 +347,7 @@ def _advance(
             p, y = turns[0], turns[1]
         for i in range(n):
             ahead[i] = x[i]
-        at = Prediction(ahead, math.sin(x[0]), math.cos(x[0]), p, y)
-        of_rate, of_acceleration = significant(x[1], P[1, 1]), significant(x[2], P[2, 2])
+        at = Prediction(ahead, math.sin(x[0]), math.cos(x[0]), p, y, rate, acceleration, jerk)
         for i in range(count + 2):
             surprise, variance, v, entries = math.nan, 0.0, 0.0, 0
             if abs(z[k, i]) < _READING:

@@ -97,14 +97,22 @@ class Model(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """A state ``x`` (n,), sine and cosine of its theta, and the indications ``p``, ``y`` [rad/s] of the roll and yaw
-    gyros, which are not used without a state of roll."""
+    """A state ``x`` (n,), sine and cosine of its theta, the indications ``p``, ``y`` [rad/s] of the roll and yaw gyros,
+    which are not used without a state of roll.
+
+    ``rate`` [rad/s], ``acceleration`` [rad/s^2] and ``jerk`` [rad/s^3] are the motion in the derivatives by positions
+    and by the gyro's scale and delay: that after the row before, which all sensors have corrected, the jerk as far as
+    it is above noise. The noise of a prediction would teach these errors, and always in the same sense.
+    """
 
     x: Array
     sine: float
     cosine: float
     p: float
     y: float
+    rate: float
+    acceleration: float
+    jerk: float
 
 
 class Step(NamedTuple):
@@ -185,6 +193,13 @@ def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float
         places[count], row[count] = res + 1, -sa
         places[count + 1], row[count + 1] = res + 3, ca
         count += 2
+    w, al = at.rate, at.acceleration
+    if roll >= 0:
+        by_rx, by_zx = -(w * w + y * y), -(al - p * y)
+        by_rz, by_zz = al + p * y, -(w * w + p * p)
+    else:
+        by_rx, by_zx = -w * w, -cp * al
+        by_rz, by_zz = cp * al, -cp * cp * w * w
     if levers >= 0:
         places[count], row[count] = levers + i, ca * by_rx - sa * by_rz
         count += 1
@@ -195,10 +210,10 @@ def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float
 
 
 @kernel
-def gyro(x: Array, model: Model, out: Row) -> tuple[float, float, int]:
+def gyro(at: Prediction, model: Model, out: Row) -> tuple[float, float, int]:
     """Reading of the gyro [rad/s] at a state, as of `accelerometer`."""
     _, of, constants = model
-    places, row = out.places, out.values
+    places, row, x = out.places, out.values, at.x
     scale, delay = of.scale, of.delay
     tau = x[delay] if delay >= 0 else constants.gyro_delay
     c = 1.0 if of.roll >= 0 else constants.roll_cosine
@@ -208,10 +223,10 @@ def gyro(x: Array, model: Model, out: Row) -> tuple[float, float, int]:
     row[0], row[1], row[2], row[3] = k, -k * tau, 0.5 * k * tau * tau, 1.0
     count = 4
     if scale >= 0:
-        places[count], row[count] = scale, c * then
+        places[count], row[count] = scale, c * (at.rate - tau * at.acceleration + 0.5 * tau * tau * at.jerk)
         count += 1
     if delay >= 0:
-        places[count], row[count] = delay, k * (tau * x[3] - x[2])
+        places[count], row[count] = delay, k * (tau * at.jerk - at.acceleration)
         count += 1
     return k * then + x[GYRO_BIAS], constants.gyro_noise, count
 

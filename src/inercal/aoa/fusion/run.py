@@ -6,15 +6,15 @@ with the prior where sensors kept contradicting it. Each row must be later than 
 
 Fading: a row is linearised at a motion that is itself estimated, so it says a little too much about the constants,
 always in the same sense. Within a minute that is small beside u. But a combination that a motion hardly shows (under
-one sine the gyro's scale, positions and heights together, which only harmonics separate) is carried away, and the
-angle with it: in 600 s of 10 deg at 1 Hz by one standard deviation of the prior at 1 kHz, by eight at 100 Hz. So from
-`memory_time` (`inercal.aoa.limits.Limits`) on the information of the data on the constants fades with that time
-constant, and that of the prior does not; in information, each `fading_interval`,
+one sine the gyro's scale, positions and heights together, which only harmonics separate) would be carried away over
+hours. So from `memory_time` (`inercal.aoa.limits.Limits`) on the information of the data on the constants fades with
+that time constant, and that of the prior does not; in information, each `fading_interval`,
 
     P'^-1 = (1 - e) P^-1 + e P0^-1        P'^-1 x' = (1 - e) P^-1 x + e P0^-1 x0
 
-with x0, P0 the prior. A constant that the data show well stays as sure as the memory makes it, one that they hardly
-show stays at its prior, and a bias that wanders is followed.
+with x0, P0 the prior. What is known of the motion, given the constants, stays: otherwise readings would contradict that
+these have moved, and teach the filter that they were at their prior all the time. A constant that the data show well
+stays as sure as the memory makes it, one that they hardly show stays at its prior, and a bias that wanders is followed.
 """
 
 from __future__ import annotations
@@ -234,21 +234,27 @@ def next_fading(t: Array, at: int, since: float) -> int:
 def fade(x: Array, P: Array, problem: FilterProblem, steps: int) -> Array:
     """Let the constants of the state ``x`` (n,), ``P`` (n, n) fade by so many steps, in place.
 
-    Returns F (n, n) of x' = F x + the part of the prior. States that move do not change.
+    Returns F (n, n) of x' = F x + the part of the prior. Of the other states what is known given the constants stays.
     """
     kept = math.exp(-_STEP * steps / LIMITS.memory_time)
     prior, F = problem.covariance, np.eye(len(x))
     at = np.array([k for k in problem.nuisances.values() if prior[k, k] > 0.0], dtype=int)
     if not len(at):
         return F
-    scale, own = np.sqrt(np.diag(prior)[at]), np.ix_(at, at)
+    rest = np.setdiff1d(np.arange(len(x)), at)
+    scale, own, beside = np.sqrt(np.diag(prior)[at]), np.ix_(at, at), np.ix_(rest, at)
     units = np.outer(scale, scale)
-    current, given = P[own] / units, prior[own] / units
-    mixed = current @ np.linalg.pinv(kept * given + (1.0 - kept) * current, hermitian=True)
-    F[own] -= (1.0 - kept) * mixed * np.outer(scale, 1.0 / scale)
-    x[at] = problem.mean[at] + F[own] @ (x[at] - problem.mean[at])
-    P[at] = F[own] @ P[at]
-    P[:, at] = P[at].T
-    faded = mixed @ given * units
+    current, given, across = P[own] / units, prior[own] / units, P[beside] / scale
+    lost = 1.0 - kept
+    mixed = np.linalg.pinv(kept * given + lost * current, hermitian=True)
+    shown = np.linalg.pinv(current, hermitian=True)
+    F[own] -= lost * (current @ mixed) * np.outer(scale, 1.0 / scale)
+    F[beside] = -lost * (across @ mixed) / scale
+    x[:] = x + (F - np.eye(len(x)))[:, at] @ (x[at] - problem.mean[at])
+    motion = P[np.ix_(rest, rest)] + lost * across @ shown @ (given - current) @ mixed @ across.T
+    P[np.ix_(rest, rest)] = 0.5 * (motion + motion.T)
+    P[beside] = across @ mixed @ given * scale
+    P[np.ix_(at, rest)] = P[beside].T
+    faded = current @ mixed @ given * units
     P[own] = 0.5 * (faded + faded.T)
     return F

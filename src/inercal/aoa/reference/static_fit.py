@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.means import mean_u
@@ -149,7 +148,7 @@ def _solve(sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array,
         determinant += 2.0 * float(np.log(u[seen]).sum() + np.log(common))
     Q, R = np.linalg.qr(np.concatenate(rows))
     right = np.concatenate(rights)
-    inverse = solve_triangular(R, np.eye(len(wide)))
+    inverse = np.linalg.inv(R)
     solution = inverse @ (Q.T @ right)
     left = right - np.concatenate(rows) @ solution
     chi2 = float(left @ left)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -34,7 +34,8 @@ _LISTED = 20
 
 @dataclass(frozen=True)
 class NamedArray:
-    """An array (rows, columns) of an open file; ``load`` reads one of its columns (rows,).
+    """An array (rows, columns) of an open file; ``load`` reads one of its columns (rows,), ``several`` some at once
+    where that takes less time.
 
     A column holds numbers, dates or durations (NumPy's, taken as seconds, of dates since 1970), or, if ``text``,
     strings. ``unit`` is the one the file states, of dates and durations s; ``clock`` names the array of the file
@@ -47,6 +48,7 @@ class NamedArray:
     text: bool = False
     unit: str | None = None
     clock: str | None = None
+    several: Callable[[Sequence[int]], list[NDArray[Any]]] | None = None
 
 
 def held(values: NDArray[Any], unit: str | None = None, clock: str | None = None) -> NamedArray:
@@ -275,9 +277,8 @@ def _table(
     labels: tuple[str, ...] = ()
     rows: dict[str, int] = {}
     long: list[Finding] = []
-    for channel, (name, column) in places.items():
+    for channel, (name, loaded) in _loaded(contents, places).items():
         array = contents.arrays[name]
-        loaded = array.load(column)
         rows[channel.name] = len(loaded)
         if channel.name == "label":
             labels = _texts(loaded)
@@ -302,6 +303,23 @@ def _table(
         tuple(places), values, contents.words, max(rows.values()), labels,
         (*contents.findings, *missing(values), *long), stamps,
     )  # fmt: skip
+
+
+def _loaded(
+    contents: Contents, places: Mapping[Channel, tuple[str, int]]
+) -> dict[Channel, tuple[str, NDArray[Any]]]:
+    """Channels with the name of their array and their columns."""
+    together: dict[str, list[int]] = {}
+    for name, column in places.values():
+        together.setdefault(name, []).append(column)
+    read = {}
+    for name, columns in together.items():
+        array = contents.arrays[name]
+        if array.several is not None and len(columns) > 1:
+            read[name] = dict(zip(columns, array.several(columns), strict=True))
+        else:
+            read[name] = {column: array.load(column) for column in columns}
+    return {channel: (name, read[name][column]) for channel, (name, column) in places.items()}
 
 
 def _place(channel: Channel, contents: Contents, options: FileOptions, path: Path) -> tuple[str, int] | None:
@@ -350,6 +368,8 @@ def _numbers(column: NDArray[Any]) -> Array:
         whole, rest = np.divmod(column.astype(kind).astype(np.int64), 10**9)
         return np.where(dated, whole + 1e-9 * rest, np.nan)
     numbers = np.ascontiguousarray(column, dtype=np.float64)
+    if numbers.size and numbers.min() > -LARGEST and numbers.max() < LARGEST:
+        return numbers
     return np.where(np.abs(numbers) < LARGEST, numbers, np.nan)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -19,6 +19,9 @@ from inercal.records.places import counted_names
 from inercal.records.read.arrays import ArrayFormat, Contents, NamedArray
 from inercal.records.read.limits import FIELDS, NESTING, TITLE
 from inercal.units import parse_unit, shown
+
+_BLOCK = 1 << 17
+"""Numbers that are read at a time."""
 
 _CELSIUS = re.compile(r"(?:deg(?:ree)?s?[ _]?)?c(?:elsius)?", re.IGNORECASE)
 
@@ -123,12 +126,32 @@ def _arrays(dataset: Any) -> Iterator[tuple[str, NamedArray]]:
         single = rows == 1
         load = partial(_column, dataset, attributes, along=int((matlab is not None) != single))
         unit = stated_unit(attributes)
-        yield name, NamedArray(columns if single else rows, 1 if single else columns, load, unit=unit)
+        several = (
+            partial(_columns, dataset, attributes) if matlab is None and columns > 1 and not single else None
+        )
+        yield (
+            name,
+            NamedArray(
+                columns if single else rows, 1 if single else columns, load, False, unit, None, several
+            ),
+        )
 
 
 def _is_bare_dimension(attributes: Mapping[str, Any]) -> bool:
     """True for what NetCDF-4 keeps in place of a dimension without values."""
     return (_text(attributes.get("NAME")) or "").startswith("This is a netCDF dimension but not")
+
+
+def _columns(dataset: Any, attributes: Mapping[str, Any], columns: Sequence[int]) -> list[NDArray[Any]]:
+    """Some columns of numbers (rows, columns), by blocks of rows: a column alone is read element by element."""
+    numbers = [np.empty(len(dataset), dataset.dtype) for _ in columns]
+    chunk = dataset.chunks[0] if dataset.chunks else 1  # unpacked once
+    step = chunk * max(1, _BLOCK // (dataset.shape[1] * chunk))
+    for start in range(0, len(dataset), step):
+        block = _stored(dataset)[start : start + step]
+        for column, out in zip(columns, numbers, strict=True):
+            out[start : start + step] = block[:, column]
+    return [unpacked(each, attributes) for each in numbers]
 
 
 def _column(dataset: Any, attributes: Mapping[str, Any], column: int, along: int) -> NDArray[Any]:
