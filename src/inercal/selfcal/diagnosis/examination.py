@@ -22,6 +22,7 @@ from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, sound, 
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
 from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
+from inercal.selfcal.diagnosis.rig_errors import WANDERING
 from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
 from inercal.selfcal.filters.filter_result import FilterResult
@@ -80,9 +81,10 @@ def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Fin
     fair = (recording, meant)
     errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), systematic)
     now = filtered(corrected)
-    # what is no constant error looks like many, none of which makes innovations white
-    if errors and not white(corrected, now):
-        walk = restless_gyros(fair) or needed_states(fair)
+    # what is no constant error looks like many, none of which makes innovations white, or like biases that wander
+    unexplained = bool(errors) and not white(corrected, now)
+    if unexplained or any(each.hypothesis.name in WANDERING.values() for each in errors):
+        walk = restless_gyros(fair) or (needed_states(fair) if unexplained else None)
         if walk is not None:
             return [walk]
     rest = misstated(corrected, now)

@@ -50,6 +50,9 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "ka1_T1": ("the accelerometer scales change with temperature", ""),
 }
 
+WANDERING: Final = {"ka0": "accelerometer biases wander", "kg0": "gyro biases wander"}
+"""Biases -> the hypothesis that they wander."""
+
 #: parameter of a delay -> its sensors
 _LATE: Final = {"tau_enc": "encoders", "tau_a": "accelerometers"}
 
@@ -72,7 +75,7 @@ def rig_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     for name in late:
         yield _delay(name, columns)
     yield _asymmetry()
-    for of, words in (("ka0", "accelerometer"), ("kg0", "gyro")):
+    for of, words in WANDERING.items():
         if f"{of}_walk_x" not in problem.names:
             yield _wander(of, words)
 
@@ -210,9 +213,9 @@ def _wander(of: str, words: str) -> Hypothesis[Case]:
         course = _waves(fit.case[0]) @ fit.values.reshape(-1, 3)
         worst = int(np.argmax(np.ptp(course, axis=0)))
         about = f"{of}_{'xyz'[worst]} by {np.ptp(course[:, worst]) / size:.2g} {unit}"
-        return f"{words} biases wander, {about}: name bias_walk, or temperature, in states under [model]"
+        return f"{words}, {about}: name bias_walk, or temperature, in states under [model]"
 
-    return Hypothesis(f"wander of {of}", "unmodelled", says, without, parameters, derivative=derivative)
+    return Hypothesis(words, "unmodelled", says, without, parameters, derivative=derivative)
 
 
 def _waves(recording: Recording) -> Array:
