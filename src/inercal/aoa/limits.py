@@ -30,6 +30,12 @@ class Limits:
     far_ratio: float = 1.5
     """Times what is expected at most, from which a coefficient contradicts its prior."""
 
+    prior_chance: float = 1e-4
+    """Chance of a sound recording by which its coefficients together may be as far from their priors as they are."""
+
+    shown_share: float = 0.1
+    """Share of the prior's variance of a combination of coefficients that a recording must have taken away."""
+
     lost_starts: int = 10
     """New starts of the fusion, beside one in ten rows, from which it is given up."""
 

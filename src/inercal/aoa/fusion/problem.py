@@ -143,6 +143,8 @@ def _constants(settings: AoaSettings) -> Constants:
         accelerometer_noise=noise.accelerometer**2 / every,
         gyro_noise=noise.gyro**2 / every,
         turn_noise=noise.gyro**2 / every,
+        accelerometer_walk=noise.accelerometer_walk**2,
+        gyro_walk=noise.gyro_walk**2,
         gyro_delay=timing.gyro_delay or 0.0,
         common_delay=timing.common_delay,
         common_delay_u=timing.common_delay_u,

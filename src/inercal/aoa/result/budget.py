@@ -157,11 +157,18 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource
         )
     if zero is not None:
         of_inputs.append(BudgetSource("stated zero", "B", zero.u, "rad", zero=True))
+    of_walks = (
+        BudgetSource(
+            "accelerometer walk", "B", noise.accelerometer_walk, "m/s^2/sqrt(s)", ("accelerometer_walk",)
+        ),
+        BudgetSource("gyro walk", "B", noise.gyro_walk, "rad/s/sqrt(s)", ("gyro_walk",)),
+    )
     return (
         BudgetSource("accelerometer noise", "A", noise.accelerometer, "m/s^2", ("accelerometer_noise",)),
         BudgetSource("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
         *(each for each in of_states if each.states),
         *of_inputs,
+        *(each for each in of_walks if each.u),
         BudgetSource("motion between samples", "B", 1.0, "1", ("snap",)),
     )
 
