@@ -239,6 +239,13 @@ class Limits:
     line_power: float = 30.0
     """Spectral density of a line over that beside it."""
 
+    common_k2: float = 1e-4 / STANDARD_GRAVITY
+    """Second-order coefficient [s^2/m] of an accelerometer, 100 ug/g^2, by which vibration is judged where the study
+    states none."""
+
+    told_offset: float = 0.25
+    """Offset of the angle by it, over u, from which it is said; from 1 on it harms."""
+
     lowest_line: float = 20.0
     """Frequency [Hz] below which a line may be flexure of the sting, which is a state of the filter."""
 

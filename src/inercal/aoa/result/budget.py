@@ -139,8 +139,14 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource
         levels = ("heave_level", "axial_level") if begin == ("s_", "flexure_") else ()
         return BudgetSource(name, "B", u, unit, levels=levels, states=states)
 
+    of_bias = ("accelerometer bias", noise.accelerometer_bias)
+    if prior.rectified:
+        of_bias = (
+            "accelerometer bias with rectified vibration",
+            float(np.hypot(of_bias[1], prior.rectified)),
+        )
     of_states = (
-        of_prior("accelerometer bias", noise.accelerometer_bias, "m/s^2", *accelerometers),
+        of_prior(*of_bias, "m/s^2", *accelerometers),
         of_prior("gyro bias", noise.gyro_bias, "rad/s", "b_g", "b_roll", "b_yaw"),
         of_prior("lever arms", lever, "m", "dr_"),
         of_prior("heights", prior.height, "m", "zo_"),
