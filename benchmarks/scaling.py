@@ -1,4 +1,4 @@
-"""What work costs against its size: positions, errors, samples, poses and states, on log-log pictures.
+"""What work costs against its size: rows, positions, errors, samples, poses and states, on log-log pictures.
 
     python benchmarks/scaling.py [--quick]
 
@@ -10,8 +10,10 @@ import argparse
 import json
 import os
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -19,7 +21,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
 
 import allan
 import numpy as np
+import pandas
 import plain_fusion
+import polars
+import reading
 from aoa_fusion import plain
 from measure import in_turn, named
 from sting_study import BASE, study
@@ -30,16 +35,28 @@ from inercal.aoa.fusion import smoother
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.settings import Timing
 from inercal.aoa.simulate import simulate
+from inercal.designs.candidates import Candidates
+from inercal.designs.criteria import D
+from inercal.designs.exchange import exchange
+from inercal.designs.spherical import NAMES, basis
+from inercal.examples import FOLDER
 from inercal.geometry.site import Site
 from inercal.imu.multiposition.calibration import calibrate_multiposition
 from inercal.imu.settings import ImuSettings
 from inercal.imu.simulate import draw_truth, hand_poses
 from inercal.imu.simulate import simulate as simulate_imu
 from inercal.noise.deviation import allan_deviation
+from inercal.records.read import read
 from inercal.report.style import COLOURS, figure, powers_of_ten, svg
 from inercal.rigs.chain import Chain, Error
+from inercal.rigs.outputs import gravity_reference
 from inercal.rigs.plans import grid
+from inercal.selfcal.before.simulate import experiment
+from inercal.selfcal.before.simulate import simulate as simulate_platform
+from inercal.selfcal.filters.problem import problem as platform_problem
+from inercal.selfcal.filters.run import estimate as estimate_platform
 from inercal.sensitivities.exact import analyse
+from inercal.studies.load import load_selfcal_study
 
 
 @dataclass(frozen=True)
@@ -178,7 +195,49 @@ def of_rows(quick: bool) -> list[Curve]:
     return measured("Angle of attack, 19 states", "rows", 1 if quick else 3, works)
 
 
-PANELS = (of_positions, of_errors, of_samples, of_poses, of_rows, of_states)
+def of_text(quick: bool) -> list[Curve]:
+    """A recording of seven columns read from text, by ours with all checks."""
+    sizes = (500, 1000) if quick else (10_000, 40_000, 160_000, 640_000)
+    with tempfile.TemporaryDirectory() as folder:
+        works: dict[str, list] = {"inercal, checked": [], named("pandas"): [], named("polars"): []}
+        readers = (read, pandas.read_csv, polars.read_csv)
+        for n in sizes:
+            path = Path(folder) / f"{n}.csv"
+            path.write_text(reading.recording(n))
+            for name, reader in zip(works, readers, strict=True):
+                works[name].append((n, lambda reader=reader, path=path: reader(path), 1))
+        return measured("Reading, 7 columns", "rows", 1 if quick else 3, works)
+
+
+def of_steps(quick: bool) -> list[Curve]:
+    """Self-calibration of a platform with 18 coefficients, by the length of its path."""
+    settings = load_selfcal_study(FOLDER / "selfcal.toml")
+    works: dict[str, list] = {"error-state": [], "map": []}
+    for times in (1,) if quick else (1, 4, 16, 64):
+        plan = replace(settings.plan, moves=settings.plan.moves * times)
+        recording = simulate_platform(
+            experiment(replace(settings, plan=plan)), np.random.default_rng(1)
+        ).recording
+        of = platform_problem(settings)
+        for name, each in works.items():
+            work = partial(estimate_platform, recording, of, name, history=False)
+            each.append((len(recording.t), work, 1))
+    return measured("Self-calibration, 18 coefficients", "rows", 1 if quick else 3, works)
+
+
+def of_designs(quick: bool) -> list[Curve]:
+    """The nine functions of gravity in a drift: the best positions among 1296, one start."""
+    at = grid((12, 12) if quick else (36, 36)).angles
+    rows = basis(gravity_reference() @ sensitivity.CHAIN.attitude(at))[:, None]
+    table = Candidates(NAMES, rows, np.ones((len(at), 1)))
+    sizes = (14, 16) if quick else (14, 28, 56, 112, 224)
+    works = [(n, lambda n=n: exchange(table, n, D, np.random.default_rng(1), starts=1), 1) for n in sizes]
+    return measured("Choice of positions", "positions", 1 if quick else 3, {"inercal, one start": works})
+
+
+PANELS = (
+    of_positions, of_errors, of_samples, of_poses, of_rows, of_states, of_text, of_steps, of_designs,
+)  # fmt: skip
 
 
 def curves(quick: bool) -> list[Curve]:
@@ -189,8 +248,8 @@ def curves(quick: bool) -> list[Curve]:
 def drawn(found: list[Curve]) -> str:
     """The picture of all panels, SVG."""
     panels = list(dict.fromkeys(curve.panel for curve in found))
-    with figure(7.1, 5.0) as page:
-        for axes, panel in zip(page.subplots(2, 3).ravel(), panels, strict=True):
+    with figure(7.1, 7.5) as page:
+        for axes, panel in zip(page.subplots(3, 3).ravel(), panels, strict=True):
             own = [curve for curve in found if curve.panel == panel]
             for curve, colour, marker in zip(own, COLOURS, "osD^", strict=False):
                 slope = "" if np.isnan(curve.slope) else f", slope {curve.slope:.2f}"

@@ -89,7 +89,7 @@ def _meaning(argument: Any) -> str:
 
 
 def study(kind: str) -> str:
-    """Every key of one kind of study (``imu``, ``turntable``, ``selfcal``, ``aoa``), table by table."""
+    """Every key of one kind of study (``imu``, ``strapdown``, ``turntable``, ``selfcal``, ``aoa``), table by table."""
     from inercal.studies.schema import json_schema
 
     whole = json_schema()

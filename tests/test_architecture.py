@@ -30,7 +30,7 @@ FLOORS = [
     {"noise"},
     {"sensitivities"},
     {"designs"},
-    {"imu", "turntable", "selfcal", "aoa"},
+    {"imu", "strapdown", "turntable", "selfcal", "aoa"},
     {"convert"},
     {"studies"},
     {"report"},
@@ -40,7 +40,7 @@ FLOORS = [
     {"face"},
     {"cli", "__main__"},
 ]
-SYSTEMS = {"imu", "turntable", "selfcal", "aoa"}
+SYSTEMS = {"imu", "strapdown", "turntable", "selfcal", "aoa"}
 FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 SOURCES = {
     ".".join(("inercal", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__"): path
@@ -151,6 +151,10 @@ WITHIN = {
     "imu": (
         "limits identified rest recording rows turns settings second_order simulate multiposition means known_rates "
         "known_turns ferraris aided temperature task figures"
+    ),
+    "strapdown": (
+        "limits coefficients settings kernels samples arrow simulate rests start batch budget reading outcome task "
+        "figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "

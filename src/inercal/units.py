@@ -75,6 +75,16 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
          "mg/sqrt(h)": 1e-3 * _G / 60},
     ),
     "quadratic": ("s^2/m", {"s^2/m": 1.0, "ug/g^2": 1e-6 / _G, "mg/g^2": 1e-3 / _G}),
+    "rate by force": (
+        "rad*s/m",
+        {"rad*s/m": 1.0, "deg/h/g": _DEG / 3600 / _G, "deg/s/g": _DEG / _G},
+    ),
+    "angle by force": (
+        "rad*s^2/m", {"rad*s^2/m": 1.0, "arcsec/g": _DEG / 3600 / _G, "arcmin/g": _DEG / 60 / _G},
+    ),
+    "rate by temperature": ("rad/s/K", {"rad/s/K": 1.0, "deg/h/K": _DEG / 3600, "deg/s/K": _DEG}),
+    "acceleration by temperature": ("m/s^2/K", {"m/s^2/K": 1.0, "ug/K": 1e-6 * _G, "mg/K": 1e-3 * _G}),
+    "number by temperature": ("1/K", {"ppm/K": 1e-6, "ppb/K": 1e-9}),
     "acceleration ramp": (
         "m/s^3",
         {"m/s^3": 1.0, "ug/s": 1e-6 * _G, "ug/h": 1e-6 * _G / 3600, "mg/h": 1e-3 * _G / 3600},
@@ -314,4 +324,5 @@ _EXAMPLES = {
     "frequency": "100 Hz",
     "number": "10 ppm",
     "length": "120 m",
+    "number by temperature": "10 ppm/K",
 }

@@ -194,7 +194,7 @@ def test_spoiled_files_of_other_tools_end_with_a_calibration_or_one_line(folder,
     rng = np.random.default_rng(6)
     (name, *more) = FILES[tool]
     whole = (folder / name).read_bytes()
-    for _ in range(150):
+    for _ in range(50):
         spoiled = bytearray(whole)
         match rng.integers(4):
             case 0:

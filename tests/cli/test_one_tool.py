@@ -16,22 +16,37 @@ from inercal.cli.package import script
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES
 from inercal.instruments.terms import term
-from inercal.studies.load import load_aoa_study, load_imu_study, load_selfcal_study, load_turntable_study
+from inercal.studies.load import (
+    load_aoa_study,
+    load_imu_study,
+    load_selfcal_study,
+    load_strapdown_study,
+    load_turntable_study,
+)
 
 BAD_VERDICT = 1
 OPTION = re.compile(r"^ {2}(--[\w-]+)(?: (PATH|STR\.\.\.|STR|INT|CHOICE))?: (.*)$", re.MULTILINE)
 READ_A_RECORD = {
-    *("inspect", "calibrate imu", "calibrate turntable", "selfcal", "aoa"),
+    *("inspect", "calibrate imu", "calibrate strapdown", "calibrate turntable", "selfcal", "aoa"),
     *("allan", "temperature", "apply", "monitor"),
 }
 READ_A_STUDY = {
-    *("calibrate imu", "calibrate turntable", "selfcal", "aoa", "sensitivity", "design positions"),
+    *(
+        "calibrate imu",
+        "calibrate strapdown",
+        "calibrate turntable",
+        "selfcal",
+        "aoa",
+        "sensitivity",
+        "design positions",
+    ),
     *("design tolerances", "design selfcal", "design aoa"),
-    *("simulate imu", "simulate turntable", "simulate selfcal", "simulate aoa"),
+    *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor"}
 TEMPLATES = {
     "imu": (partial(filled, "imu"), load_imu_study),
+    "strapdown": (partial(filled, "strapdown"), load_strapdown_study),
     "turntable": (partial(filled, "turntable"), load_turntable_study),
     "selfcal": (partial(filled, "selfcal"), load_selfcal_study),
     "aoa": (partial(filled, "aoa"), load_aoa_study),
@@ -151,7 +166,7 @@ def test_a_key_of_several_templates_has_one_form():
 def results(tmp_path_factory):
     """JSON and report of every command that can write a report, on what ships with the package."""
     folder = tmp_path_factory.mktemp("all")
-    for name in ("xsens", "sting", "selfcal", "thermal", "lasergyro"):
+    for name in ("xsens", "strapdown", "sting", "selfcal", "thermal", "lasergyro"):
         assert run(["examples", name, "--out", str(folder / name), "--quiet", "--json"]) == 0
     at = {name: EXAMPLES[name].command(str(folder / name)).split()[1:] for name in EXAMPLES}
     with pytest.MonkeyPatch.context() as patch:
@@ -162,6 +177,7 @@ def results(tmp_path_factory):
         assert run(["simulate", "turntable", "turntable.toml", *small, "--out", "tt.csv", "--quiet"]) == 0
         commands = {
             "calibrate imu": at["xsens"],
+            "calibrate strapdown": at["strapdown"],
             "inspect": ["inspect", str(folder / "sting/sting.csv.gz")],
             "selfcal": at["selfcal"],
             "aoa": at["sting"],
@@ -347,7 +363,7 @@ def test_bash_completes_verbs_kinds_options_and_choices(tmp_path, scripts):
     path.write_text(scripts["bash"], encoding="utf-8")
     asked = {
         "inercal cal": {"calibrate"},
-        "inercal simulate ''": {"imu", "turntable", "selfcal", "aoa"},
+        "inercal simulate ''": {"imu", "strapdown", "turntable", "selfcal", "aoa"},
         "inercal aoa --sta": {"--static", "--states"},
         "inercal selfcal --filter ''": {
             "error-state",

@@ -217,7 +217,7 @@ def test_each_line_is_answered_before_the_next_is_sent(command, folder):
 
 @pytest.mark.slow
 @POSIX
-@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize("seed", [11, *(pytest.param(k, marks=pytest.mark.campaign) for k in (12, 13))])
 def test_the_monitor_killed_at_any_moment_and_restarted(seed, folder, tmp_path):
     """Killed without warning three times, while it works: each row is answered, and always with the same digits."""
     whole = inercal(folder, "monitor", "--quiet")[1].splitlines(keepends=True)

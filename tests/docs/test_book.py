@@ -19,6 +19,7 @@ from inercal.imu import limits as imu
 from inercal.instruments.terms import NOISE_TERMS, TERMS
 from inercal.records.channels import _EXAMPLES
 from inercal.selfcal import limits as selfcal
+from inercal.strapdown import limits as strapdown
 from inercal.turntable import limits as turntable
 
 ROOT = Path(__file__).parents[2]
@@ -181,7 +182,9 @@ def test_the_reference_has_every_command_term_code_channel_and_limit(book):
         "results": [f">{name}</span>" for name in [*TERMS, *NOISE_TERMS, *CODES]],
         "records": [f">{name}</span>" for name in _EXAMPLES if not re.fullmatch(r"a[34]", name)],
         "limits": [
-            f">{name}</span>" for module in (aoa, imu, selfcal, turntable) for name in vars(module.LIMITS)
+            f">{name}</span>"
+            for module in (aoa, imu, selfcal, strapdown, turntable)
+            for name in vars(module.LIMITS)
         ],
     }
     for page, names in wanted.items():

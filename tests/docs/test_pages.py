@@ -141,6 +141,7 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
         load_aoa_study,
         load_imu_study,
         load_selfcal_study,
+        load_strapdown_study,
         load_turntable_study,
     )
 
@@ -154,7 +155,8 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
             continue
         kind = keys.get("rig", {}).get("kind", "")
         special = {"": load_imu_study, "three_axis_gimbals": load_selfcal_study, "sting": load_aoa_study}
-        special.get(kind, load_turntable_study)(tmp_path / "study.toml")
+        load = load_strapdown_study if "strapdown" in keys else special.get(kind, load_turntable_study)
+        load(tmp_path / "study.toml")
 
 
 def test_every_link_between_pages_leads_somewhere():

@@ -211,7 +211,10 @@ def test_arrays_become_a_record():
             "imu.metod: unknown key, did you mean method?",
         ),
         (lambda: ic.study("imu", latitude="45 m"), "site.latitude"),
-        (lambda: ic.study("iimu"), "expected one, or a kind of study: imu, turntable, selfcal, aoa"),
+        (
+            lambda: ic.study("iimu"),
+            "expected one, or a kind of study: imu, strapdown, turntable, selfcal, aoa",
+        ),
         (lambda: ic.study("imu", latitude="1 deg", site={"latitude": "1 deg"}), "expected it once"),
         (lambda: ic.calibrate("log.csv", "imu.toml"), "records: found str, expected a record: ic.read(path)"),
         (lambda: ic.calibrate(ic.record(acc_x=[1.0], rate=1.0)), 'latitude="48 deg"'),

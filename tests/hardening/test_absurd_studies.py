@@ -12,12 +12,13 @@ from rows import for_each
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("studies")
-    for kind in ("turntable", "selfcal", "aoa"):
+    for kind in ("strapdown", "turntable", "selfcal", "aoa"):
         assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet", *FILL]) == 0
     return path
 
 
-SIMULATE = {kind: f"simulate {kind} {kind}.toml --out out.csv" for kind in ("turntable", "selfcal", "aoa")}
+KINDS = ("strapdown", "turntable", "selfcal", "aoa")
+SIMULATE = {kind: f"simulate {kind} {kind}.toml --out out.csv" for kind in KINDS}
 SENSITIVITY = "sensitivity turntable.toml"
 POSITIONS = "design positions turntable.toml"
 PATH = "design selfcal selfcal.toml"
@@ -31,6 +32,9 @@ PATH = "design selfcal selfcal.toml"
             "positions.grid={ phi1 = 1000000000, phi2 = 1000000000 }",
             "positions, expected at most",
         ),
+        (SIMULATE["strapdown"], "plan.sample_rate=1e15 Hz", "samples, expected 100 to"),
+        (SIMULATE["strapdown"], "plan.dwell=1e9 s", "samples, expected 100 to"),
+        (SIMULATE["strapdown"], "plan.sample_rate=1e-9 Hz", "samples, expected 100 to"),
         (SIMULATE["turntable"], "instrument.sample_rate=1e5 Hz", "samples in all, expected at most"),
         (SIMULATE["turntable"], "instrument.sample_rate=1e15 Hz", "samples in a dwell, expected at most"),
         (SIMULATE["turntable"], "instrument.sample_rate=1e300 Hz", "out of range"),

@@ -38,12 +38,14 @@ LIMIT = 400
 SMALL = "--set design.turns=1 --set design.time='300 s' --set design.angle='180 deg'"
 COMMANDS = {
     "new imu": "new imu --out NEW.toml",
+    "new strapdown": "new strapdown --out NEW.toml",
     "new turntable": "new turntable --out NEW.toml",
     "new selfcal": "new selfcal --out NEW.toml",
     "new aoa": "new aoa --out NEW.toml",
     "inspect": "inspect log.csv --report NEW.html",
     "inspect result": "inspect log.csv --out NEW.json",
     "calibrate imu": "calibrate imu log.csv --study imu.toml --out NEW.json --report NEW.html",
+    "calibrate strapdown": "calibrate strapdown unit.csv --study strapdown.toml --out NEW.json --report NEW.html",
     "calibrate turntable": "calibrate turntable table.csv --study turntable.toml --out NEW.toml --report NEW.html",
     "selfcal": "selfcal platform.csv --study selfcal.toml --out NEW.json --report NEW.html",
     "selfcal histories": "selfcal platform.csv --study selfcal.toml --out NEW.npz",
@@ -56,6 +58,7 @@ COMMANDS = {
     "design aoa": "design aoa aoa.toml --set design.places=2 --set motion.duration='4 s' --out NEW.json",
     "design tolerances": "design tolerances turntable.toml --set goal.DX_F='10 deg/h' --out NEW.json",
     "simulate imu": "simulate imu imu.toml --set site.latitude='39.1 deg' --out NEW.csv",
+    "simulate strapdown": "simulate strapdown strapdown.toml --out NEW.csv",
     "simulate turntable": "simulate turntable turntable.toml --out NEW.csv",
     "simulate selfcal": "simulate selfcal selfcal.toml --out NEW.csv",
     "simulate selfcal campaign": "simulate selfcal selfcal.toml --runs 2 --out NEW.json",
@@ -90,13 +93,22 @@ def folder(tmp_path_factory) -> Path:
     )
     write_record(record, path / "log.csv")
     (path / "imu.toml").write_text('[site]\ngravity = "9.81(1) m/s^2"\n[imu]\nstatic_start = "10 s"\n')
-    for kind in ("turntable", "selfcal", "aoa"):
+    for kind in ("strapdown", "turntable", "selfcal", "aoa"):
         assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet", *FILL]) == 0
-    smaller = {"turntable": ("phi1 = 36, phi2 = 36", "phi1 = 5, phi2 = 5"), "selfcal": ('"0.2 s"', '"2 s"')}
+    smaller = {
+        "strapdown": ('dwell = "20 s"', 'dwell = "2 s"\nsample_rate = "50 Hz"'),
+        "turntable": ("phi1 = 36, phi2 = 36", "phi1 = 5, phi2 = 5"),
+        "selfcal": ('"0.2 s"', '"2 s"'),
+    }
     for kind, (old, new) in smaller.items():
         text = (path / f"{kind}.toml").read_text("utf-8")
         (path / f"{kind}.toml").write_text(text.replace(old, new), "utf-8")
-    simulated = {"turntable": "table.csv", "selfcal": "platform.csv", "aoa": "model.csv"}
+    simulated = {
+        "strapdown": "unit.csv",
+        "turntable": "table.csv",
+        "selfcal": "platform.csv",
+        "aoa": "model.csv",
+    }
     for kind, name in simulated.items():
         study, short = str(path / f"{kind}.toml"), ["--set", "motion.duration=3 s"] if kind == "aoa" else []
         assert run(["simulate", kind, study, "--out", str(path / name), "--quiet", *short]) == 0

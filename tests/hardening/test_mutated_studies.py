@@ -19,6 +19,7 @@ from inercal.studies.aoa import aoa_study
 from inercal.studies.imu import imu_study
 from inercal.studies.load import load_aoa_study, load_selfcal_study
 from inercal.studies.selfcal import selfcal_study
+from inercal.studies.strapdown import strapdown_study
 from inercal.studies.turntable import turntable_study
 
 # the seed of the examples is fixed: that of each test's own source
@@ -27,6 +28,7 @@ FIXED = settings(
 )
 KINDS = {
     "imu": (partial(filled, "imu"), imu_study),
+    "strapdown": (partial(filled, "strapdown"), strapdown_study),
     # the grid is made small: what is checked is the reading
     "turntable": (lambda: filled("turntable").replace("36", "6"), turntable_study),
     "selfcal": (partial(filled, "selfcal"), selfcal_study),

@@ -58,6 +58,19 @@ def test_the_pose_turns_as_the_attitude_does(seed):
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 2**32 - 1))
+def test_errors_are_exchanged_one_after_the_other(seed):
+    chain, angles, errors = any_chain(seed)
+    others = errors[::-1] + 0.3
+    exchanged = chain.exchanged(angles, errors, others)
+    assert exchanged.shape == (len(chain.errors), 5, 3, 3)
+    for k, C_nb in enumerate(exchanged):
+        mixed = errors.copy()
+        mixed[:, k] = others[:, k]
+        assert_allclose(C_nb, chain.attitude(angles, mixed), atol=1e-13)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 2**32 - 1))
 def test_slopes_are_the_derivatives_of_the_attitude(seed):
     """Central differences, error step^2 / 6 times the third derivative (of size one)."""
     chain, angles, _ = any_chain(seed)

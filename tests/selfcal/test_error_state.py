@@ -182,7 +182,7 @@ def test_the_transition_is_the_derivative_of_the_step(seed, turn):
     P = A @ A.T
     expected = F @ P @ F.T + np.diag(np.r_[np.full(3, 0.4), np.zeros(24)])
     rate, earth_e = model.platform_rate(w, c), model.on_the_base(earth, c)
-    taken = linearised.Step(tuple(w), rate, earth_e, tuple(base), dt)
+    taken = linearised.Step(tuple(w), rate, earth_e, tuple(base), dt, (0.0, 0.0, 0.0), 0.0)
     linearised.propagate_covariance(P, c, PLACE, taken, 0.4, np.empty((3, 27)), linearised.empty_columns())
     # the kernel takes the earth's turn within a step for small
     assert np.abs(P - expected).max() < 10.0 * turn * np.abs(expected).max()
@@ -204,7 +204,7 @@ def test_accelerometer_rows_are_derivatives(seed):
     differences = np.stack([(read(e) - read(-e)) / (2 * h) for e in h * np.eye(27)], axis=1)
     up_e = model.on_the_base(up, c)
     still = (0.0, 0.0, 0.0)
-    sensed = model.sensing(tuple(q), model.Rates(still, still), still, up_e, c)
+    sensed = model.sensing(tuple(q), model.Rates(still, still), still, up_e, 0.0, c)
     for i in range(3):
         row = empty_row(linearised.WIDEST)
         size = linearised.accelerometer_row(i, sensed, c, PLACE, up_e, row)

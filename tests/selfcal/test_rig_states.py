@@ -18,12 +18,12 @@ from inercal.selfcal.platform import linearised, model
 from inercal.selfcal.platform.coefficients import to_linear, to_product
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import Gimbals
-from inercal.selfcal.platform.states import ALL, RIG, STATES
+from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, RIG, STATES, TEMPERATURE, WALK
 from inercal.selfcal.reading import told_apart
 from inercal.selfcal.result.outcome import assemble
 from inercal.selfcal.settings import Model
 
-WHOLE = (*RIG, "k2", "levers", "scale_asymmetry")
+WHOLE = (*RIG, "k2", "levers", "scale_asymmetry", "g_sensitivity", "sag", *TEMPERATURE, "harmonics")
 MOVES = (("y", 60), ("z", 180), ("x", 90), ("y", -100), ("z", -180), ("x", -120), ("y", 70), ("z", 90))
 """Turns of one joint after the other [deg], each axis of p through the vertical and the level."""
 
@@ -38,13 +38,22 @@ def turned(axis, angle):
     return Rotation.from_rotvec(np.multiply.outer(np.atleast_1d(angle), np.eye(3)[axis]))
 
 
-def chain(th, c, gimbals):
-    """Attitudes of p in e as joints (n, 3) [rad] are read."""
+def harmonics(th, c):
+    """Errors (n, 3) of encoders at angles (n, 3) [rad], orders 1 and 2 of each."""
+    parts = of("harmonics", c)[:12].reshape(3, 2, 2)
+    waves = np.stack([[np.sin(order * th), np.cos(order * th)] for order in (1, 2)])
+    return np.einsum("jop,opnj->nj", parts, waves)
+
+
+def chain(th, c, gimbals, up):
+    """Attitudes of p in e as joints (n, 3) [rad] are read; specific force ``up`` (3,) in e bends the platform."""
+    th = th - harmonics(th, c)
     (i, j, k), signs = gimbals.index, gimbals.sign
     xy, yz = of("non_orthogonality", c)
     outer = turned(i, signs[0] * th[:, 0]) * turned(k, xy)
     inner = turned(j, signs[1] * (th[:, 1] - of("zero_y", c)[0])) * turned(i, yz)
-    return outer * inner * turned(k, signs[2] * th[:, 2]) * Rotation.from_rotvec(of("gamma", c))
+    stiff = outer * inner * turned(k, signs[2] * th[:, 2]) * Rotation.from_rotvec(of("gamma", c))
+    return stiff * Rotation.from_rotvec(np.cross(of("sag", c), stiff.inv().apply(up)))
 
 
 def gyro_matrix(c):
@@ -57,14 +66,23 @@ def gyro_matrix(c):
     )
 
 
-def accelerometer_outputs(f, w, c):
-    """Outputs (n, 3) at specific force (n, 3) at the centre and rate (n, 3), product form, term by term."""
+def accelerometer_outputs(f, w, c, warm):
+    """Outputs (n, 3) at specific force (n, 3) at the centre and rate (n, 3), product form, term by term; ``warm`` [K],
+    (n, 1) or one."""
     c = to_product(c)
     arm = of("levers", c).reshape(3, 3)
     f = f + np.stack([np.cross(w, np.cross(w, arm[i]))[:, i] for i in range(3)], axis=-1)
     pz, oy, oz = of("eta", c)
     along = np.stack([f[:, 0], f[:, 1] - oy * f[:, 0], f[:, 2] + pz * f[:, 0] - oz * f[:, 1]], axis=-1)
-    return of("ka0", c) + (1 + of("ka1", c)) * (along + of("k2", c) * along**2)
+    momentary = of("ka0", c) + of("accelerometer_walk", c) + warm * of("ka0_T1", c)
+    scale = 1 + of("ka1", c) + warm * of("ka1_T1", c)
+    return momentary + scale * (along + of("k2", c) * along**2)
+
+
+def bias(c, f=(0.0, 0.0, 0.0), warm=0.0):
+    """Biases of the gyros now, at specific force ``f`` (3,) or (n, 3) in p and ``warm`` [K] above."""
+    by_force = np.asarray(f) @ of("g_sensitivity", c).reshape(3, 3).T
+    return of("kg0", c) + of("gyro_walk", c) + by_force + warm * of("kg0_T1", c)
 
 
 def random_vector(rng, settings):
@@ -83,12 +101,12 @@ def test_columns_of_the_encoders_are_derivatives(gimbals):
     def attitude(states):
         full = c.copy()
         full[posed.states.index] = states
-        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
-        earth = Rotation.from_rotvec(of("beta", full)).apply(world.earth)
-        tau = of("delay", full)[0]
+        rate = gyro_matrix(full) @ w + bias(full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        base = Rotation.from_rotvec(of("beta", full))
+        earth, tau = base.apply(world.earth), of("delay", full)[0]
         return (
             Rotation.from_rotvec(-earth * tau)
-            * chain(th[None], full, gimbals)[0]
+            * chain(th[None], full, gimbals, base.apply(world.up))[0]
             * Rotation.from_rotvec(rate * tau)
         )
 
@@ -101,9 +119,9 @@ def test_columns_of_the_encoders_are_derivatives(gimbals):
     for k, name in enumerate(posed.names):
         step = 0.1 * posed.prior[k] * np.eye(len(x))[k]
         expected = (attitude(x - step).inv() * attitude(x + step)).as_rotvec() / (0.2 * posed.prior[k])
-        # the turn within a delay, and what other states do to it, are left out of the columns: so much less than 0.05"
+        # the turn within a delay, and what other states do to it, are left out of the columns: so much less than 0.2"
         off = np.abs(slope[:, k] - expected).max() * posed.prior[k]
-        assert off < 1e-3 * np.abs(slope[:, k]).max() * posed.prior[k] + 0.05 * ARCSEC, name
+        assert off < 1e-3 * np.abs(slope[:, k]).max() * posed.prior[k] + 0.2 * ARCSEC, name
 
 
 @pytest.mark.kernels
@@ -119,15 +137,15 @@ def test_rows_of_the_accelerometers_are_derivatives(seed):
         full = c.copy()
         full[posed.states.index] += error[3:]
         base, tau = Rotation.from_rotvec(of("beta", full)), of("delay", full)[1]
-        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        rate = gyro_matrix(full) @ w + bias(full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
         at = start * Rotation.from_rotvec(error[:3])
         then = Rotation.from_rotvec(base.apply(world.earth) * tau) * at * Rotation.from_rotvec(-rate * tau)
-        return accelerometer_outputs(then.inv().apply(base.apply(world.up))[None], rate[None], full)[0]
+        return accelerometer_outputs(then.inv().apply(base.apply(world.up))[None], rate[None], full, 0.7)[0]
 
     n = 3 + len(posed.names)
     earth, up = (model.on_the_base(v, c) for v in (world.earth, world.up))
     q = np.roll(start.as_quat(), 1)
-    sensed = model.sensing(tuple(q), read, earth, up, c)
+    sensed = model.sensing(tuple(q), read, earth, up, 0.7, c)
     np.testing.assert_allclose(model.outputs(sensed, c), outputs(np.zeros(n)), atol=1e-8)
     size = np.append(np.full(3, 1e-4), posed.prior)
     rows = np.zeros((3, n))
@@ -150,23 +168,28 @@ def test_columns_of_a_step_are_derivatives():
     posed, rng = problem(settings), np.random.default_rng(7)
     c, w, dt = random_vector(rng, settings), 0.3 * rng.standard_normal(3), 0.2
     start, place = Rotation.random(random_state=1), posed.states.layout.place
+    force, warm = (3.0, -6.0, 7.0), -0.7
 
     def after(states):
         full = c.copy()
         full[posed.states.index] = states
-        rate = gyro_matrix(full) @ w + of("kg0", full) + 0.5 * of("scale_asymmetry", full) * np.abs(w)
+        momentary = bias(full, force, warm)
+        rate = gyro_matrix(full) @ w + momentary + 0.5 * of("scale_asymmetry", full) * np.abs(w)
         earth = Rotation.from_rotvec(of("beta", full)).apply(posed.world.earth)
         return Rotation.from_rotvec(-earth * dt) * start * Rotation.from_rotvec(rate * dt)
 
     x = c[posed.states.index]
     q = tuple(np.roll(after(x).as_quat(), 1))
-    rate, earth = model.platform_rate(tuple(w), c), model.on_the_base(posed.world.earth, c)
+    rate = model.drifting(model.platform_rate(tuple(w), c), force, warm, c)
+    earth = model.on_the_base(posed.world.earth, c)
     columns = linearised.empty_columns()
-    count = linearised.dynamics_columns(c, place, linearised.Step(tuple(w), rate, earth, q, dt), columns)
+    taken = linearised.Step(tuple(w), rate, earth, q, dt, force, warm)
+    count = linearised.dynamics_columns(c, place, taken, columns)
     found = dict(zip(columns.places[:count].tolist(), columns.axes[:count], strict=True))
     for k, name in enumerate(posed.names[18:], start=18):
-        step = 0.1 * posed.prior[k] * np.eye(len(x))[k]
-        expected = (after(x - step).inv() * after(x + step)).as_rotvec() / (0.2 * posed.prior[k])
+        size = max(0.1 * posed.prior[k], 1e-7)
+        step = size * np.eye(len(x))[k]
+        expected = (after(x - step).inv() * after(x + step)).as_rotvec() / (2.0 * size)
         np.testing.assert_allclose(
             found.get(3 + k, np.zeros(3)), expected, rtol=1e-4, atol=1e-8, err_msg=name
         )
@@ -186,16 +209,28 @@ def moved(t):
 LONG = 5.0 + sum(abs(by) for _, by in MOVES) / 2.0 + 5.0
 
 
+def walked(settings, n, dt, rng):
+    """Biases (n, 6) of gyros and accelerometers about their means: first order, 60 s, step by step."""
+    walk = np.repeat([settings.noise.gyro_walk, settings.noise.accelerometer_walk], 3)
+    sigma, keep = walk * np.sqrt(30.0), np.exp(-dt / 60.0)
+    rows = [sigma * rng.standard_normal(6)]
+    for _ in range(n - 1):
+        rows.append(keep * rows[-1] + sigma * np.sqrt(1.0 - keep**2) * rng.standard_normal(6))
+    return np.array(rows)
+
+
 def recorded(settings, c, rng, dt=0.2):
-    """A recording by joints that move as `moved`, read by sensors of the full vector ``c`` (linear form)."""
+    """A recording by joints that move as `moved`, read by sensors of the full vector ``c`` (linear form); where the
+    study has biases that walk they do, and what they are in the end is put into ``c``."""
     noise, world, gimbals = settings.noise, settings.world, settings.gimbals
     t = dt * np.arange(int(LONG / dt) + 1)
     base = Rotation.from_rotvec(of("beta", c))
     earth, up = base.apply(world.earth), base.apply(world.up)
-    zero = replace_kind(c, "zero_y", 0.0)  # joints as they are, not as they are read
+    # joints as they are, not as they are read
+    zero = replace_kind(replace_kind(c, "zero_y", 0.0), "harmonics", 0.0)
 
     def attitude(at):
-        return chain(moved(at), zero, gimbals)
+        return chain(moved(at), zero, gimbals, up)
 
     def rate(begin, end):
         """Mean rates against inertial space, in p."""
@@ -203,18 +238,33 @@ def recorded(settings, c, rng, dt=0.2):
         return (attitude(begin).inv() * spin * attitude(end)).as_rotvec() / (end - begin)[:, None]
 
     late, of_acc = of("delay", c)
-    th = moved(t - late) + [0.0, of("zero_y", c)[0], 0.0] + noise.encoder * rng.standard_normal((len(t), 3))
+    th = moved(t - late)
+    th = (
+        th
+        + harmonics(th, c)
+        + [0.0, of("zero_y", c)[0], 0.0]
+        + noise.encoder * rng.standard_normal((len(t), 3))
+    )
     h = 1e-3
     w = rate(t - of_acc - h, t - of_acc)
-    acc = accelerometer_outputs(attitude(t - of_acc).inv().apply(up), w, c)
+    warm = 10.0 * (t / t[-1] - 0.5)
+    acc = accelerometer_outputs(attitude(t - of_acc).inv().apply(up), w, c, warm[:, None])
     acc += noise.accelerometer * rng.standard_normal(acc.shape)
+    drift = np.zeros((len(t), 6))
+    if "gyro_walk" in settings.kinds:
+        drift = walked(settings, len(t), dt, rng)
+        c[WALK:] = drift[-1]
+    acc += drift[:, 3:]
     true = rate(t[:-1], t[1:]) + noise.angle_random_walk / np.sqrt(dt) * rng.standard_normal((len(t) - 1, 3))
     # w_p = (1 + M) w + |w| asymmetry / 2 + kg0, for w
     read = true
+    momentary = bias(
+        replace_kind(c, "gyro_walk", 0.0), attitude(t[:-1] + 0.5 * dt).inv().apply(up), warm[:-1, None]
+    )
     for _ in range(5):
-        fixed = true - of("kg0", c) - 0.5 * of("scale_asymmetry", c) * np.abs(read)
+        fixed = true - momentary - drift[:-1, :3] - 0.5 * of("scale_asymmetry", c) * np.abs(read)
         read = np.linalg.solve(gyro_matrix(c), fixed.T).T
-    return Recording(t, read, th, acc, measured=True)
+    return Recording(t, read, th, acc, measured=True, warm=warm)
 
 
 def replace_kind(c, kind, value):
@@ -228,6 +278,8 @@ def drawn(settings, rng, kinds, delay=1.0):
     """A full vector, linear form, with values drawn from the priors of some kinds."""
     c = np.zeros(len(ALL))
     for kind in kinds:
+        if kind in BIAS_WALK:
+            continue
         at = [ALL.index(name) for name in STATES[kind].parameters]
         c[at] = settings.priors[at] * rng.standard_normal(len(at)) * (delay if kind == "delay" else 1.0)
     return to_linear(c)
@@ -237,9 +289,7 @@ PAPER_KINDS = tuple(STATES)[:6]
 BASE = study(prior=np.append(study().prior[:18], [100e-6] * 3 + [60 * ARCSEC] * 3))
 
 
-@pytest.mark.parametrize(
-    "kind", ["gamma", "non_orthogonality", "zero_y", "delay", "k2", "levers", "scale_asymmetry"]
-)
+@pytest.mark.parametrize("kind", [kind for kind in WHOLE if kind not in (*EXTENDED_MODEL, *BIAS_WALK)])
 def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
     """All states within 4.5 u of the truth, and those asked for are worth something; without them all is wrong."""
     settings = replace(BASE, model=Model((*PAPER_KINDS, kind)))
@@ -259,8 +309,9 @@ def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
 
 @pytest.mark.parametrize("kind", ["error-state", "map", "mukf"])
 def test_estimators_agree_on_a_rig_with_all_errors(kind):
-    settings = replace(BASE, model=Model(WHOLE))
-    posed, rng = problem(settings), np.random.default_rng(12)
+    kinds = tuple(each for each in WHOLE if kind != "map" or each not in BIAS_WALK)
+    settings = replace(BASE, model=Model(kinds))
+    posed, rng = problem(settings).for_kind(kind), np.random.default_rng(12)
     c = drawn(settings, rng, STATES, delay=0.1)
     found = estimate(recorded(settings, c, rng), posed, kind, history=False)
     error = found.coefficients - c[posed.states.index]
@@ -287,7 +338,8 @@ def test_sensitivities_are_those_of_the_filter_run_again():
     posed, rng = problem(BASE), np.random.default_rng(14)
     recording = recorded(BASE, drawn(BASE, rng, PAPER_KINDS), rng)
     found = estimate(recording, posed, "error-state")
-    names = ("kg1_z", "gamma_y", "nonorth_yz", "zero_y", "tau_enc", "tau_a", "K2_x", "r_yy", "S_asym_z")
+    names = ("kg1_z", "gamma_y", "nonorth_yz", "zero_y", "tau_enc", "tau_a", "K2_x", "r_yy", "S_asym_z", "G_xx",
+             "G_yz", "sag_z", "kg0_y_T1", "ka0_x_T1", "ka1_y_T1", "harmonic_2_cos", "harmonic_5_sin")  # fmt: skip
     slopes = sensitivities(recording, posed, found.history.attitude, found.coefficients, names)
     u = np.sqrt(np.diag(found.covariance))
     for name, slope in zip(names, slopes.T, strict=True):
@@ -340,7 +392,7 @@ def test_joints_that_stand_still_leave_states_out():
     th[:, 2] = np.linspace(0.0, 2.0, 10)
     settings, said = told_apart(replace(BASE, model=Model(RIG)), th)
     assert not {"nonorth_xy", "nonorth_yz"} & set(settings.states.names)
-    assert len(settings.states.names) == 30
+    assert len(settings.states.names) == 36
     assert said[0].message.startswith("nonorth_xy, nonorth_yz: th_y stands still")
     assert told_apart(BASE, th) == (BASE, ())
     th[:, 1] = np.linspace(0.0, 0.5, 10)

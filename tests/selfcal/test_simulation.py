@@ -89,7 +89,7 @@ def test_noise_is_integrated_at_the_finer_step_as_in_plain_numpy():
     c = to_linear(LARGE)
     q, acc = np.empty((n, 4)), np.empty((n, 3))
     q0 = normalize(rng.normal(size=4))
-    simulate_truth(q0, w, dt, noise, c, place, Truth(q, acc, np.empty((n, 3))))
+    simulate_truth(q0, w, dt, noise, np.zeros(n), c, place, Truth(q, acc, np.empty((n, 3))))
     zero = exp(c[BETA])
     earth, up, M, at = rotate(zero, place.earth), rotate(zero, place.up), error_matrix(c), q0
     pz, oy, oz = c[ETA]

@@ -63,8 +63,20 @@ def dimensions(schema):
     return {parse_unit(unit).dimension if unit else "number" for unit in units}
 
 
-KINDS = {kind: keys(kind) for kind in ("Imu", "Turntable", "Selfcal", "Aoa")}
-OWN_TABLES = ("rig", "model", "noise", "prior", "disturbances", "design", "timing", "goal")
+KINDS = {kind: keys(kind) for kind in ("Imu", "Strapdown", "Turntable", "Selfcal", "Aoa")}
+OWN_TABLES = (
+    "plan",
+    "truth",
+    "motion",
+    "rig",
+    "model",
+    "noise",
+    "prior",
+    "disturbances",
+    "design",
+    "timing",
+    "goal",
+)
 """Tables that are of each kind of study what its rig, instruments and search need."""
 
 TWO_DIMENSIONS = {

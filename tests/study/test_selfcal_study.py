@@ -15,11 +15,11 @@ from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
 from inercal.errors import StudyError
-from inercal.instruments.terms import TERMS
+from inercal.instruments.terms import term
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
-from inercal.selfcal.platform.states import ALL
+from inercal.selfcal.platform.states import ALL, BIAS_WALK, RIG, STATES, TEMPERATURE
 from inercal.selfcal.settings import Gating
 from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
 from inercal.studies.schema import json_schema
@@ -264,6 +264,13 @@ REFUSED = {
     'disturbances.harmonics=[{axis = "z", order = 0, amplitude = "1 deg"}]': "disturbances.harmonics.0.order: ",
     "design.turns=0": "design.turns: ",
     "nois.encoder=1 arcsec": "nois: unknown key, did you mean noise?",
+    "noise.gyro_walk=0 deg/h/sqrt(s)": "noise.gyro_walk: found .*a walk above zero",
+    'model.harmonics=[{axis = "x", order = 1, amplitude = "5 arcsec"}]': "model.harmonics.0.*found '5 arcsec'",
+    "model.sag=3 arcsec": "model.sag: ",
+    'disturbances.temperature=["20 degC"]': "disturbances.temperature: ",
+    "model.states=all": 'model.states: found .all., expected "paper", "extended", "rig", or a list',
+    'model.states=["rig", "rig"]': "model.states: found 'rig', expected one of gamma, ",
+    'model.states=["gamma", "gamma"]': "model.states: .*expected each kind once",
 }  # fmt: skip
 
 
@@ -288,6 +295,22 @@ def test_one_sentence_for_what_is_wrong(write, override, words):
         ({"plan": {}}, "plan: found neither turns nor path"),
         ({"plan": {"path": "best", "turns": [["x", "90 deg"]]}}, "plan: found both turns and path"),
         ({"plan": {"turns": "best"}}, "plan.turns: found 'best', expected a list"),
+        (
+            {"model": {"states": ["rig", "bias_walk"]}, "filter": {"kind": "map"}},
+            "model.states: found bias_walk for map",
+        ),
+        (
+            {"model": {"states": "rig"}, "filter": {"kind": "lm"}},
+            "model.states: found gamma, .* for lm, which has none",
+        ),
+        (
+            {"model": {"states": "rig"}, "filter": {"extended": True}},
+            "model.states: found it beside filter.extended",
+        ),
+        (
+            {"model": {"states": ["gamma"], "gamma": "5 arcsec"}},
+            "model.gamma: found '5 arcsec' for a state that is estimated, expected it with an uncertainty",
+        ),
     ],
 )
 def test_what_is_missing_or_too_much(tables, words):
@@ -343,5 +366,38 @@ def test_whatever_a_key_holds_it_is_a_study_or_one_sentence(place, value):
     assert "\n" not in said
 
 
+def test_states_of_the_rig():
+    """A word or a list; what map leaves out; the prior of a walk is how far biases are from their means."""
+    noise = tomllib.loads(CONTRACT)["noise"]
+    asked = study(model={"states": ["rig", "k2"]}, noise=noise | {"accelerometer_walk": "1 ug/sqrt(s)"})
+    assert asked.kinds == (*RIG[:-2], "k2", "gyro_walk", "accelerometer_walk")
+    sigma = dict(zip(ALL, asked.priors, strict=True))["ka0_walk_y"]
+    assert sigma == pytest.approx(1e-6 * 9.80665 * math.sqrt(30.0))
+    waves = [{"axis": "z", "order": 8, "amplitude": "0(2) arcsec"}]
+    asked = study(model={"states": ["paper", "harmonics"], "harmonics": waves})
+    assert asked.states.names == (*NAMES, "harmonic_1_sin", "harmonic_1_cos")
+    assert asked.states.harmonics == ((2, 8),)
+    assert asked.priors[asked.states.index][-1] == pytest.approx(2.0 * ARCSEC)
+    asked = study(
+        model={
+            "states": ["paper", "temperature", "sag"],
+            "sag": "0(3) arcsec/g",
+            "g_sensitivity": "0(0.1) deg/h/g",
+        }
+    )
+    assert asked.states.names[18:] == (
+        *STATES["sag"].parameters,
+        *(n for k in TEMPERATURE for n in STATES[k].parameters),
+    )
+    known = dict(zip(ALL, asked.priors, strict=True))
+    assert known["sag_y"] == pytest.approx(3.0 * ARCSEC / 9.80665)
+    assert known["G_zx"] == pytest.approx(math.radians(0.1) / 3600 / 9.80665)
+    assert known["ka1_x_T1"] == pytest.approx(20e-6)
+    batch = study(
+        model={"states": "rig"}, filter={"kind": "map"}, noise=noise | {"gyro_walk": "1 deg/h/sqrt(s)"}
+    )
+    assert batch.kinds == tuple(kind for kind in RIG if kind not in BIAS_WALK)
+
+
 def test_the_table_of_terms_knows_every_coefficient_with_its_unit():
-    assert tuple(TERMS[name].unit for name in ALL) == units(ALL)
+    assert tuple(term(name).unit_for("rad/s") for name in ALL) == units(ALL)

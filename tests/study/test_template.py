@@ -18,6 +18,7 @@ from inercal.studies.imu import imu_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
 from inercal.studies.starting import PATHS, POSITIONS
+from inercal.studies.strapdown import strapdown_study
 from inercal.studies.template import template
 from inercal.studies.turntable import turntable_study
 from inercal.units import parse_unit
@@ -38,7 +39,13 @@ INSTRUMENTS = {
 }
 
 
-READ = {"imu": imu_study, "turntable": turntable_study, "selfcal": selfcal_study, "aoa": aoa_study}
+READ = {
+    "imu": imu_study,
+    "strapdown": strapdown_study,
+    "turntable": turntable_study,
+    "selfcal": selfcal_study,
+    "aoa": aoa_study,
+}
 #: tables that hold one of several keys, and what stands beside a key
 INSTEAD = {"positions": POSITIONS, "plan": PATHS, "sensors.a1": ("axis", "angle")}
 
@@ -127,7 +134,7 @@ def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
     data = tomllib.loads(filled(kind))
     key = line.split()[1]
     place = data
-    for part in table.split("."):
+    for part in filter(None, table.split(".")):
         place = place[part]
     for other in INSTEAD.get(table, ()) if key in INSTEAD.get(table, ()) else ():
         place.pop(other, None)

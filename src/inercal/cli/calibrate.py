@@ -43,6 +43,20 @@ def calibrate_imu(
     return _calibrated("imu", files, study, map_file, span, overrides, output, in_rows)
 
 
+def calibrate_strapdown(
+    files: RunFiles,
+    /,
+    *,
+    study: StudyFile,
+    map_file: MapFile = None,
+    span: Span = Span(),  # noqa: B008  (frozen)
+    overrides: Overrides = None,
+    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Calibrate a strapdown unit from rests and coarse turns."""
+    return _calibrated("strapdown", files, study, map_file, span, overrides, output)
+
+
 def calibrate_turntable(
     files: RunFiles,
     /,
@@ -79,6 +93,11 @@ def _calibrated(
     records = read_repeats(files, map_file, output, span, in_rows(the_study.settings))
     read_s = time.perf_counter() - clock
     system = import_module(f"inercal.face.{kind}")
+    if hasattr(system, "prepare"):
+        from inercal._jit import compiling
+
+        with compiling(kind, output.say):
+            system.prepare(the_study)
     with working(output) as progress:
         result = system.calibrate(records, the_study, progress=progress)
     return give(result, output, read_s)

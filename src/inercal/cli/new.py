@@ -35,6 +35,18 @@ def new_imu(
     _new("imu", files or [], overrides or [], output, rate)
 
 
+def new_strapdown(
+    files: Recordings = None,
+    /,
+    *,
+    rate: Rate = None,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Write a study of a strapdown unit, and a map guessed from recordings that do not say what they hold."""
+    _new("strapdown", files or [], overrides or [], output, rate)
+
+
 def new_turntable(
     files: Recordings = None,
     /,
@@ -84,6 +96,7 @@ def _described(
     channels: Mapping[str, Unit | None] = {} if kind == "imu" else canonical_units(files) or {}
     plain = {
         "imu": False,
+        "strapdown": {"acc_x", "gyro_x"} <= channels.keys(),
         "turntable": of_a_table(channels),
         "selfcal": "th_x" in channels,
         "aoa": "a1" in channels,

@@ -47,6 +47,18 @@ def simulate_imu(
     _simulated("imu", study, seed, overrides, output)
 
 
+def simulate_strapdown(
+    study: Study,
+    /,
+    *,
+    seed: Seed = 1,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Simulate a strapdown unit that rests and is turned."""
+    _simulated("strapdown", study, seed, overrides, output)
+
+
 def simulate_selfcal(
     study: Study,
     /,

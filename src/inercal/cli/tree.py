@@ -26,6 +26,13 @@ COMMANDS = {
         "is overwritten.",
         'inercal new imu log.csv --set site.latitude="48.1 deg" --out imu.toml',
     ),
+    ("new", "strapdown"): (
+        "inercal.cli.new:new_strapdown",
+        "Write a commented study of a strapdown unit: of its simulation and its calibration.\n\nGiven a recording "
+        "whose header does not say quantities and units, also a column map guessed from it. The study goes to --out "
+        "(strapdown.toml if absent), the map beside it (strapdown-map.toml). Nothing that exists is overwritten.",
+        "inercal new strapdown --out strapdown.toml",
+    ),
     ("new", "turntable"): (
         "inercal.cli.new:new_turntable",
         "Write a commented study of a turntable: of its sensitivity, design, simulation and calibration.\n\nGiven a "
@@ -63,6 +70,15 @@ COMMANDS = {
         "--out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: done, but the verdict is "
         "not ok.",
         "inercal calibrate imu log.csv --study imu.toml --report cal.html",
+    ),
+    ("calibrate", "strapdown"): (
+        "inercal.cli.calibrate:calibrate_strapdown",
+        "Calibrate a strapdown unit from rests and coarse turns, without a table.\n\nThe unit stands still, is turned "
+        "by hand or on a coarse frame, stands still again; no angle is known. The zero velocity at rest gives bias, "
+        "scale factor and misalignment of both triads, second-order coefficients, lever arms and the delay between the "
+        "triads, with uncertainties. --out saves them (.json or .toml), --report writes a page to hand over. Exit code "
+        "1: done, but the verdict is not ok.",
+        "inercal calibrate strapdown log.csv --study unit.toml --out cal.json",
     ),
     ("calibrate", "turntable"): (
         "inercal.cli.calibrate:calibrate_turntable",
@@ -154,6 +170,13 @@ COMMANDS = {
         "consumer-grade unit with outputs in counts), and under [disturbances] what real recordings add. The recording "
         "goes to --out (.csv, .npz, .h5, .parquet or .nc).",
         "inercal simulate imu imu.toml --seed 1 --out log.csv",
+    ),
+    ("simulate", "strapdown"): (
+        "inercal.cli.simulate:simulate_strapdown",
+        "Simulate a strapdown unit that rests and is turned.\n\nThe study states rests and turns under [plan], the "
+        "true coefficients under [truth], and under [motion] how unsteadily it is turned. The recording goes to --out "
+        "(.csv, .npz, .h5, .parquet or .nc): rates and specific forces.",
+        "inercal simulate strapdown strapdown.toml --seed 1 --out log.csv",
     ),
     ("simulate", "selfcal"): (
         "inercal.cli.simulate:simulate_selfcal",

@@ -14,6 +14,7 @@ positions as coefficients is no special case.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +25,15 @@ from inercal.designs.candidates import Candidates
 from inercal.designs.criteria import Criterion, covariance
 from inercal.errors import InputError
 
+if TYPE_CHECKING:
+    from inercal.designs.exchange_kernel import State
+
 Indices = NDArray[np.intp]
 
-_GAIN = 1e-9
-"""Relative improvement below which an exchange is rounding."""
+_TIE = 1e-9
+"""Relative difference below which values are equal but for rounding."""
 _SINGULAR = 1e-9
-"""Factor of the determinant below which a design is singular to working precision."""
+"""Smallest singular value, over the largest, of a direction that a start has seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,18 +154,21 @@ def _start(rows: Array, n: int, repeats: bool, rng: np.random.Generator) -> Indi
 
 def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: bool) -> Indices:
     """The design (n,) at the end of all exchanges that improve it."""
+    from inercal.designs.exchange_kernel import best_exchange, improves
+
+    rows = np.ascontiguousarray(np.moveaxis(W, 0, 2))
     chosen, n = first.copy(), len(first)
-    state = _state(W, p, weights, chosen)
+    state = _state(rows, p, weights, chosen)
+    taken = np.zeros(len(W), dtype=bool)
+    taken[chosen] = not repeats
     k, unchanged = 0, 0
     while unchanged < n:
-        factor = _factors(state, int(chosen[k]))
-        if not repeats:
-            factor[chosen] = np.inf
-        best = _first_least(factor)
+        best, factor = best_exchange(state, int(chosen[k]), taken)
         unchanged += 1
-        if factor[best] < 1.0 - _GAIN:
+        if improves(factor):
+            taken[chosen[k]], taken[best] = False, not repeats
             chosen[k], unchanged = best, 0
-            state = _state(W, p, weights, chosen)
+            state = _state(rows, p, weights, chosen)
         k = (k + 1) % n
     return chosen
 
@@ -169,90 +176,22 @@ def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: 
 def _first_least(values: Array) -> int:
     """Index of the first value that is least but for rounding, so that ties end alike on every machine."""
     least = float(values.min())
-    return int(np.argmax(values <= least + _GAIN * abs(least)))
+    return int(np.argmax(values <= least + _TIE * abs(least)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Update:
-    """All that an exchange needs of one information matrix: P (d, d), W and G = W P (m, c, d), F = (I + S_jj)^-1."""
+def _state(rows: Array, p: int, weights: Array | None, chosen: Indices) -> State:
+    """Quantities that the exchanges of a design use; ``rows`` (c, d, m) of the candidates."""
+    from inercal.designs.exchange_kernel import State, along, own_products, update
 
-    P: Array
-    W: Array
-    G: Array
-    F: Array
-    added: Array  # det(I + S_jj) (m,)
-
-    def removed(self, i: int) -> tuple[Array, Array, Array]:
-        """After adding each j: A = F S_ji (m, c, c), the inverse of E, and the factor of the determinant (m,)."""
-        S_ji = _times(self.G, self.W[i].T)
-        A = self.F @ S_ji
-        E = np.eye(len(self.W[i])) - self.G[i] @ self.W[i].T + np.swapaxes(S_ji, 1, 2) @ A
-        inverse, det = _inverse(E)
-        return A, inverse, self.added * det
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """A design on its way: of the whole information, of the constant errors alone, and for the trace."""
-
-    whole: _Update
-    common: _Update | None
-    H: Array | None  # G weights (m, c, d)
-    K: Array | None  # G_j weights G_j^T (m, c, c)
-    trace: float
-
-
-def _state(W: Array, p: int, weights: Array | None, chosen: Indices) -> _State:
-    """Quantities that the exchanges of a design use."""
-    d = W.shape[-1]
-    taken = W[chosen].reshape(-1, d)
+    c, d, _ = rows.shape
+    taken = np.moveaxis(rows[..., chosen], 1, 2).reshape(-1, d)
     M = taken.T @ taken + np.diag(np.repeat([0.0, 1.0], [p, d - p]))
-    whole = _update(W, M)
-    if weights is not None:
-        H = _times(whole.G, weights)
-        return _State(whole, None, H, H @ np.swapaxes(whole.G, 1, 2), float(np.sum(whole.P * weights)))
-    common = _update(W[..., p:], M[p:, p:]) if d > p else None
-    return _State(whole, common, None, None, 0.0)
-
-
-def _factors(state: _State, i: int) -> Array:
-    """Factor (m,) of the determinant or trace of the covariance when each candidate takes the place of i."""
-    A, inverse, ratio = state.whole.removed(i)
-    safe = ratio > _SINGULAR
-    if state.H is None or state.K is None:
-        common = 1.0 if state.common is None else state.common.removed(i)[2]
-        return np.asarray(np.where(safe, common / np.where(safe, ratio, 1.0), np.inf))
-    K_ji = _times(state.H, state.whole.G[i].T)
-    cross = np.swapaxes(K_ji, 1, 2) @ A
-    K_ii = state.H[i] @ state.whole.G[i].T - cross - np.swapaxes(cross, 1, 2)
-    K_ii = K_ii + np.swapaxes(A, 1, 2) @ state.K @ A
-    less, more = np.sum(state.whole.F * state.K, axis=(1, 2)), np.sum(inverse * K_ii, axis=(1, 2))
-    return np.asarray(np.where(safe, 1.0 + (more - less) / state.trace, np.inf))
-
-
-def _update(W: Array, M: Array) -> _Update:
-    """The update about an information matrix M (d, d)."""
     P = np.asarray(np.linalg.inv(M), dtype=float)
-    G = _times(W, P)
-    F, added = _inverse(np.eye(W.shape[1]) + G @ np.swapaxes(W, 1, 2))
-    return _Update(P, W, G, F, added)
-
-
-def _times(stack: Array, matrix: Array) -> Array:
-    """``stack @ matrix``, (m, c, d) times (d, e), in one product."""
-    flat = stack.reshape(-1, stack.shape[-1]) @ matrix
-    return np.asarray(flat.reshape(*stack.shape[:-1], matrix.shape[1]))
-
-
-def _inverse(S: Array) -> tuple[Array, Array]:
-    """Inverses (m, c, c) and determinants (m,) of small symmetric matrices; a singular one has the inverse zero."""
-    if S.shape[-1] == 1:
-        det, adjugate = S[:, 0, 0], np.ones_like(S)
-    elif S.shape[-1] == 2:
-        det = S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] * S[:, 1, 0]
-        adjugate = np.eye(2) * np.trace(S, axis1=1, axis2=2)[:, None, None] - S
-    else:
-        det = np.linalg.det(S)
-        regular = np.where((det != 0.0)[:, None, None], S, np.eye(S.shape[-1]))
-        return np.linalg.inv(regular), det
-    return np.asarray(adjugate / np.where(det == 0.0, 1.0, det)[:, None, None]), det
+    whole = update(rows, P)
+    errors = np.ascontiguousarray(rows[:, p:])
+    common = update(errors, np.asarray(np.linalg.inv(M[p:, p:]), dtype=float))
+    if weights is None:
+        none = np.empty((c, d, 0))
+        return State(whole, common, none, none, 0.0)
+    H = along(whole.G, weights)
+    return State(whole, common, H, own_products(H, whole.G), float(np.sum(P * weights)))

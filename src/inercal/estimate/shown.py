@@ -25,8 +25,8 @@ _STATISTICS = {
     "starts": "starts of the filter",
 }
 
-_IN_SI = ("selfcal", "aoa")
-"""Commands whose coefficients are in SI whatever the units of the recording."""
+_IN_SI = ("selfcal", "aoa", "calibrate strapdown")
+"""Commands whose coefficients, or most of them, are in SI whatever the units of the recording."""
 
 
 def units_shown(command: str, units: Sequence[str]) -> list[tuple[str, float]]:

@@ -88,6 +88,15 @@ EXAMPLES: dict[str, Example] = {
             study="table.toml",
         ),
         Example(
+            "strapdown",
+            "strapdown unit in 19 positions, turned by 90 deg between them, 982 s at 100 Hz, simulated by PSINS",
+            ("strapdown.bin.gz",),
+            "licences/PSINS.txt",
+            "strapdown-map.toml",
+            "strapdown.toml",
+            verb="calibrate strapdown",
+        ),
+        Example(
             "lasergyro",
             "ring-laser IMU at rest, 31 min at 100 Hz, angles and velocities gained per sample (PSINS)",
             ("lasergyro.txt.gz",),

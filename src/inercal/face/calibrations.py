@@ -123,11 +123,12 @@ def apply(
 def worth_saying(record: Record, estimate: Estimate) -> tuple[Finding, ...]:
     """Findings of a record, but for the rate and the accelerometers that nobody needs of a platform."""
     from inercal.convert.platform import COMMAND
+
+    if estimate.command != COMMAND:
+        return record.findings
     from inercal.selfcal.reading import worth_saying as of_platform
 
-    if estimate.command == COMMAND:
-        return tuple(of_platform(record, record.columns.values()))
-    return record.findings
+    return tuple(of_platform(record, record.columns.values()))
 
 
 def load(path: str | Path) -> Result:

@@ -84,7 +84,8 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 
     with study.at_fault():
         made = simulate_run(experiment(study.settings), rng)
-        return to_record(made.recording, made.attitude)
+        temperature = study.settings.simulated_temperature(len(made.recording.t))
+        return to_record(made.recording, made.attitude, temperature)
 
 
 def prepare_design(study: Study) -> None:

@@ -18,11 +18,12 @@ from inercal.records.places import counted_names
 from inercal.records.record import Record
 from inercal.units import shown
 
-KINDS = ("imu", "turntable", "selfcal", "aoa")
+KINDS = ("imu", "strapdown", "turntable", "selfcal", "aoa")
 """The kinds of study, one for each system, as the commands name them."""
 
 _LOAD = {
     "imu": "load_imu_study",
+    "strapdown": "load_strapdown_study",
     "turntable": "load_turntable_study",
     "selfcal": "load_selfcal_study",
     "aoa": "load_aoa_study",
@@ -96,7 +97,8 @@ def study(path_or_kind: str | Path, /, **keys: Any) -> Study:
     Parameters
     ----------
     path_or_kind : str or Path
-        A TOML file; or the kind ``"imu"``, ``"turntable"``, ``"selfcal"`` or ``"aoa"`` of a study by keywords.
+        A TOML file; or the kind ``"imu"``, ``"strapdown"``, ``"turntable"``, ``"selfcal"`` or ``"aoa"`` of a study by
+        keywords.
     **keys
         Tables of the study with the keys of its file, quantities as texts with a unit: ``site={"latitude": "45 deg"}``.
         ``latitude``, ``height`` and ``gravity`` may stand without their table ``site``, and of an IMU all keys of the
@@ -144,15 +146,19 @@ def study_of(given: Study | str | Path) -> Study:
 
 
 def kind_of(path: Path) -> str:
-    """The kind of study that a file is, told by ``rig.kind``; raises `StudyError` where it cannot be read."""
+    """The kind of study that a file is, told by ``rig.kind`` or the table ``strapdown``.
+
+    Raises `StudyError` where it cannot be read.
+    """
     from inercal._toml import read_toml
 
     if not path.suffix and not path.is_file():
         raise StudyError(path, f"found no such file, expected one, or a kind of study: {', '.join(KINDS)}")
-    rig = read_toml(path, StudyError).get("rig")
+    data = read_toml(path, StudyError)
+    rig = data.get("rig")
     kind = rig.get("kind") if isinstance(rig, Mapping) else None
     if rig is None:
-        return "imu"
+        return "strapdown" if "strapdown" in data else "imu"
     return {"three_axis_gimbals": "selfcal", "sting": "aoa"}.get(str(kind), "turntable")
 
 

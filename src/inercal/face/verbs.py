@@ -33,10 +33,10 @@ def calibrate(
     Parameters
     ----------
     records : Record or sequence of Record
-        One run; several are repeat runs of an IMU, a table or a platform, which are combined, or of the methods
-        ``known_rates`` and ``known_turns`` of an IMU one for each rate or turn, in order.
+        One run; several are repeat runs of an IMU, a strapdown unit, a table or a platform, which are combined, or of
+        the methods ``known_rates`` and ``known_turns`` of an IMU one for each rate or turn, in order.
     study : Study or path, optional
-        Needed for a turntable, a platform and an angle of attack; of an IMU, ``latitude`` (and ``height``) or
+        Needed for all but an IMU; of that, ``latitude`` (and ``height``) or
         ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.
     method : str, optional
         Of an IMU without a study: ``"multiposition"``, ``"ferraris"``, ``"aided"`` or ``"means"``; absent,
@@ -156,7 +156,8 @@ def _imu_study(record: Record, given: dict[str, str]) -> Study:
 
 
 def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
-    """Simulate a recording of the test that a study plans: of an IMU, a turntable, a platform, or a model on a sting.
+    """Simulate a recording of the test that a study plans: of an IMU, a strapdown unit, a turntable, a platform, or a
+    model on a sting.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
     study = study_of(study)
     if not isinstance(rng, np.random.Generator):
         raise InputError("rng", f"found {type(rng).__name__}, expected numpy.random.default_rng(seed)")
-    made: Record = _of_system(study, "simulate", "imu, turntable, selfcal or aoa")(study, rng)
+    made: Record = _of_system(study, "simulate", "imu, strapdown, turntable, selfcal or aoa")(study, rng)
     return made
 
 

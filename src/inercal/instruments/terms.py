@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from inercal.errors import QuantityError
+from inercal.instruments.platform_terms import PLATFORM
 from inercal.units import STANDARD_GRAVITY, Unit, parse_unit
 
 
@@ -41,9 +42,7 @@ _ACCELEROMETER = (
 )
 _ON_A_TABLE = (
     *(
-        Term(
-            f"r_{i}{j}", f"lever arm: place of accelerometer {i} along {j} from the crossing of the axes", "m"
-        )
+        Term(f"r_{i}{j}", f"lever arm: place of accelerometer {i} along {j} from the origin of b", "m")
         for i in _AXES
         for j in _AXES
     ),
@@ -132,37 +131,6 @@ _DRIFT = tuple(
     )
 )
 
-_SELF_CALIBRATION = (
-    *(Term(f"kg0_{i}", f"gyro {i} bias: rate of the platform at zero command", "rad/s") for i in _AXES),
-    Term("eta_pz", "misalignment of accelerometer z: output per specific force along x", "rad"),
-    Term("eta_oy", "misalignment of accelerometer y: output per specific force along x, reversed", "rad"),
-    Term("eta_oz", "misalignment of accelerometer z: output per specific force along y, reversed", "rad"),
-    *(
-        Term(
-            f"{symbol}_{p[0]}",
-            f"misalignment of gyro {p[0]}: rate about {p[0]} per rate about {p[1]}{way}",
-            "rad",
-        )
-        for symbol, way, pairs in (("ds", "", "xy yz zx"), ("do", ", reversed", "xz yx zy"))
-        for p in pairs.split()
-    ),
-    *(
-        Term(f"{symbol}_{i}", name.format(i), unit)
-        for symbol, name, unit, ends in (
-            ("ka0", "accelerometer {} bias: reading at zero specific force", "m/s^2", _AXES),
-            ("ka1", "accelerometer {} scale error", "1", _AXES),
-            ("kg1", "gyro {} scale error", "1", _AXES),
-            ("beta", "zero of the encoders: turn of their frame about {} of the base", "rad", _AXES),
-            ("gamma", "turn of the sensors about {} of the platform, against the last gimbal", "rad", _AXES),
-            ("zero", "reading of the encoder {} at zero", "rad", "y"),
-        )
-        for i in ends
-    ),
-    Term("nonorth_xy", "non-orthogonality of the joints: turn of axis y against axis x", "rad"),
-    Term("nonorth_yz", "non-orthogonality of the joints: turn of axis z against axis y", "rad"),
-    Term("tau_enc", "delay of the encoders", "s"),
-)
-
 #: every term, in the order results list them
 TERMS: dict[str, Term] = {
     term.symbol: term
@@ -173,7 +141,7 @@ TERMS: dict[str, Term] = {
         *_RATE_TEST,
         *_ACCELEROMETER_BY_ANGLE,
         *_DRIFT,
-        *_SELF_CALIBRATION,
+        *(Term(*each) for each in PLATFORM),
         *_ON_A_TABLE,
     )
 }
@@ -310,6 +278,11 @@ _OF_FIELD = {
     "m": "mm",
     "s": "ms",
     "rad/sqrt(s)": "deg/sqrt(h)",
+    "(rad/s)/(m/s^2)": "deg/h/g",
+    "rad/(m/s^2)": "arcsec/g",
+    "rad/s/K": "deg/h/K",
+    "m/s^2/K": "ug/K",
+    "1/K": "ppm/K",
 }
 
 #: unit of the field -> that of larger things, and from how many of the latter on it is taken

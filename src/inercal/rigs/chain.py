@@ -262,8 +262,28 @@ class Chain:
         batch = np.broadcast_shapes(angles.shape[:-1], errors.shape[:-1])
         C_nb = np.broadcast_to(np.eye(3), (*batch, 3, 3))
         for element, value in self._values(angles, errors):
-            if not (isinstance(element, Error) and element.is_offset):
-                C_nb = C_nb @ _rotation(element, value)
+            C_nb = C_nb @ _rotation(element, value)
+        return C_nb
+
+    def exchanged(self, angles: ArrayLike, errors: ArrayLike, others: ArrayLike) -> Array:
+        """Attitudes (k, n, 3, 3) with one of the ``errors`` (n, k) after the other taken from ``others`` (n, k).
+
+        What stands before and behind an error in the chain is multiplied once, not for each error.
+        """
+        angles, errors = self._checked(angles, errors)
+        _, others = self._checked(angles, others)
+        C_nb = np.repeat(self.attitude(angles, errors)[None], len(self.errors), axis=0)
+        turns = [_rotation(*each) for each in self._values(angles, errors)]
+        behind = [np.eye(3)]
+        for turn in reversed(turns[1:]):
+            behind.insert(0, turn @ behind[0])
+        before, k = np.eye(3), 0
+        for (element, other), turn, after in zip(self._values(angles, others), turns, behind, strict=True):
+            if isinstance(element, Error):
+                if not element.is_offset:
+                    C_nb[k] = before @ _rotation(element, other) @ after
+                k += 1
+            before = before @ turn
         return C_nb
 
     def slopes(self, angles: ArrayLike) -> Array:
@@ -360,7 +380,9 @@ def about(axis: ArrayLike, element: Joint | Error) -> tuple[Element, ...]:
 
 
 def _rotation(element: Element, value: Array) -> Array:
-    """Rotation (*batch, 3, 3) of an element that is no offset."""
+    """Rotation (*batch, 3, 3) of an element; an offset has none."""
+    if isinstance(element, Error) and element.is_offset:
+        return np.eye(3)
     return element.rotation if isinstance(element, Fixed) else elementary(element.axis, value)
 
 

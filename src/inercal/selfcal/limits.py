@@ -80,6 +80,10 @@ class Limits:
     base_prior_ratio: float = 10.0
     """Prior of beta about the base found, in its standard uncertainties: a hundredth of what the recording tells."""
 
+    walk_time: float = 60.0
+    """Time [s] over which a bias that walks is correlated: within it a random walk, beyond it as far from its mean as
+    before. A walk of 0.35 ug/sqrt(s) is then like 1/f noise whose Allan deviation has its floor at 1 ug."""
+
     still_joint: float = math.radians(1.0 / 60.0)
     """Range [rad] of a joint's angle below which it stands still: non-orthogonality of 20 arcsec then turns the
     platform by less than 0.01 arcsec otherwise than gamma and beta."""

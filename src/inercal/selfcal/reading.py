@@ -24,7 +24,7 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.platform.states import twins
+from inercal.selfcal.platform.states import TEMPERATURE, twins
 from inercal.selfcal.settings import SelfcalSettings
 
 _REFERENCE = ("q_ref_0", "q_ref_1", "q_ref_2", "q_ref_3")
@@ -67,11 +67,14 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
     recorded_rate = rate
     rate, held = with_held(t, rate, th, settings.world, all(increment))
-    warm = recorded_temperature(record)
+    temperature = recorded_temperature(record)
     measured = sensor == "gyro"
     walk = walked(t, recorded_rate, held) if measured and held else None
     true = np.stack([column.values for column in reference], axis=-1)[rows] if reference else None
-    recording = Recording(t, rate, th, acc, measured, (), record.sources, held, warm, walk, true)
+    recording = Recording(
+        t, rate, th, acc, measured, (), record.sources, held, temperature, walk, true,
+        _warm(record, settings, t, where),
+    )  # fmt: skip
     of_record = [  # without extremes beyond which no motion goes on
         each
         for each in (*worth_saying(record, columns), *findings)
@@ -85,6 +88,22 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
         began = float(time[np.argmax(np.isfinite(time))])
         findings += off_the_path(recording, settings.plan, settings.world, began, rows)
     return replace(recording, findings=(*of_record, *findings))
+
+
+def _warm(record: Record, settings: SelfcalSettings, t: Array, where: str) -> Array | None:
+    """The temperature at times ``t`` (n,) [s], above that of the coefficients; None without one, which is refused where
+    coefficients are to change with it."""
+    if recorded_temperature(record) is None:
+        if asked := [kind for kind in settings.kinds if kind in TEMPERATURE]:
+            text = (
+                f"found no temperature in degC or K, expected one for {', '.join(asked)} under model.states"
+            )
+            raise RecordError(where, text)
+        return None
+    column = record["temperature"]
+    values = column.si()
+    known = np.isfinite(values + column.t)
+    return settings.warm(np.interp(t, column.t[known], values[known]))
 
 
 def told_apart(settings: SelfcalSettings, th: Array) -> tuple[SelfcalSettings, tuple[Finding, ...]]:

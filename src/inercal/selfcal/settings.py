@@ -11,11 +11,21 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.geometry.site import Site
-from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantity, within
+from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantities, quantity, within
 from inercal.selfcal.estimators import FactorKind, FilterKind
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.rig import Base, Gimbals, World, world
-from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, STATES, StateVector, state_vector
+from inercal.selfcal.platform.states import (
+    ALL,
+    EXTENDED_MODEL,
+    PAPER,
+    STATES,
+    USUAL_WAVES,
+    WALK,
+    StateVector,
+    state_vector,
+)
 from inercal.units import Quantity, parse_quantity
 
 _OF_A_SAMPLE = above_zero("a standard deviation of a sample")
@@ -40,6 +50,24 @@ class Noise:
         example="2 arcsec",
         bounds=_OF_A_SAMPLE,
     )
+    gyro_walk: float = quantity(
+        "of the gyros' biases about their means, within 60 s, where bias_walk is among the states",
+        "rate random walk", "1e-4 deg/h/sqrt(s)", bounds=above_zero("a walk"),
+    )  # fmt: skip
+    accelerometer_walk: float = quantity(
+        "the same of the accelerometers' biases", "acceleration random walk", "0.35 ug/sqrt(s)",
+        bounds=above_zero("a walk"),
+    )  # fmt: skip
+
+    @property
+    def gyro_walk_sigma(self) -> float:
+        """Standard deviation [rad/s] of the gyros' biases about their means."""
+        return self.gyro_walk * math.sqrt(0.5 * LIMITS.walk_time)
+
+    @property
+    def accelerometer_walk_sigma(self) -> float:
+        """Standard deviation [m/s^2] of the accelerometers' biases about their means."""
+        return self.accelerometer_walk * math.sqrt(0.5 * LIMITS.walk_time)
 
 
 @dataclass(frozen=True)
@@ -73,11 +101,13 @@ class Filter:
 class Model:
     """The model of the platform: kinds of ``states`` (None: the paper's, with the extended model where the filter has
     it), and, by name of parameter, what is ``stated`` of those of the rig: value and standard uncertainty [SI].
-    ``left_out``: parameters of these kinds that a recording cannot tell from others."""
+    ``left_out``: parameters of these kinds that a recording cannot tell from others; ``harmonics`` by joint 0, 1, 2 and
+    order, in the order of their parameters."""
 
     states: tuple[str, ...] | None = None
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES
 
 
 @dataclass(frozen=True)
@@ -92,6 +122,18 @@ class Disturbances:
     command_delay: float = quantity(
         "by which the platform acts later than commanded", "time", "0 s", example="0.2 s",
         bounds=within(0.0, math.inf, "a time of 0 or more"),
+    )  # fmt: skip
+    accelerometer_walk: float = quantity(
+        "of their biases about their means, within 60 s", "acceleration random walk", "0 ug/sqrt(s)",
+        example="0.35 ug/sqrt(s)", bounds=within(0.0, math.inf, "a walk of 0 or more"),
+    )  # fmt: skip
+    gyro_walk: float = quantity(
+        "the same of the gyros", "rate random walk", "0 deg/h/sqrt(s)", example="1e-4 deg/h/sqrt(s)",
+        bounds=within(0.0, math.inf, "a walk of 0 or more"),
+    )  # fmt: skip
+    temperature: tuple[float, ...] = quantities(
+        "of the platform, at times evenly from the first row to the last; constant if absent", "temperature",
+        example=["20 degC", "21 degC"], at_least=2,
     )  # fmt: skip
     substeps: int = 10
 
@@ -174,7 +216,7 @@ class SelfcalSettings:
         stated = np.zeros(len(ALL))
         for name, (value, _) in self.model.stated.items():
             stated[ALL.index(name)] = value
-        return state_vector(self.kinds, stated, self.model.left_out)
+        return state_vector(self.kinds, stated, self.model.left_out, self.model.harmonics)
 
     @property
     def priors(self) -> Array:
@@ -185,9 +227,23 @@ class SelfcalSettings:
             for _ in state.parameters
         ]
         whole = np.append(self.prior, usual[len(self.prior) :])
+        whole[WALK : WALK + 3] = self.noise.gyro_walk_sigma
+        whole[WALK + 3 :] = self.noise.accelerometer_walk_sigma
         for name, (_, u) in self.model.stated.items():
             whole[ALL.index(name)] = u or whole[ALL.index(name)]
         return whole
+
+    def warm(self, temperature: Array) -> Array:
+        """Temperatures (n,) [degC] less that of the coefficients: the stated one, else the mean."""
+        of_coefficients = float(np.mean(temperature)) if self.temperature is None else self.temperature.value
+        return temperature - of_coefficients
+
+    def simulated_temperature(self, n: int) -> Array | None:
+        """(n,) [degC] of the rows of a simulation; None where it is constant."""
+        given = self.disturbances.temperature
+        if not given:
+            return None
+        return np.asarray(np.interp(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, len(given)), given))
 
     @property
     def true_values(self) -> Array | None:

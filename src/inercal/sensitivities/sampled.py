@@ -156,12 +156,13 @@ def analyse(
     parts, ideal = [], []
     for done, at in enumerate(positions, start=1):
 
-        def function(errors: Array, at: Array = at) -> Array:
-            C_nb = chain.attitude(at, errors)
+        def values(C_nb: Array) -> Array:
             return np.stack([each.value(C_nb) for each in outputs], axis=-1)
 
-        parts.append(_parts(function, distributions, samples, rng, sampling))
-        ideal.append(function(np.zeros((1, len(distributions))))[0])
+        A, B = draw(distributions, rows(samples, sampling), sampling, rng)
+        both = values(chain.attitude(at, A)), values(chain.attitude(at, B))
+        parts.append(estimate(*both, values(chain.exchanged(at, A, B)), RESAMPLES, rng))
+        ideal.append(values(chain.attitude(at)))
         if progress is not None:
             progress(done, len(positions))
     return _indices(

@@ -29,6 +29,7 @@ from inercal.selfcal.filters.second_pass import Kept
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import KA1
 from inercal.selfcal.platform.recording import Steps
+from inercal.selfcal.platform.states import KIND_OF, TEMPERATURE
 from inercal.selfcal.result.columns import columns, rows
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Alarms, Output, Slots
@@ -165,7 +166,7 @@ class Selfcal:
         state, over, walked = self._rate(state, sample.t, over)
         doubt, seen = walked is not None or state.doubt, bool(np.isfinite(th).all())
         walk, later = dt if walked is None else walked, np.where(np.isfinite(following), following, over)
-        step = Steps(np.array([dt]), over[None], acc[None], th[None], later[None])
+        step = Steps(np.array([dt]), over[None], acc[None], th[None], later[None], np.zeros(1))
         filter_, trace = advance(
             self._module,
             state.filter,
@@ -309,6 +310,9 @@ def filter_of(problem: FilterProblem) -> ModuleType:
             f"found {problem.filter.kind}, which works on whole recordings, expected error-state, mukf, svd-qukf or "
             "gimbal-ukf for a stream",
         )
+    if any(KIND_OF[name] in TEMPERATURE for name in problem.names):
+        text = "found temperature, whose mean is that of a whole recording, expected states without it for a stream"
+        raise StudyError("model.states", text)
     return module
 
 

@@ -135,7 +135,7 @@ def coefficient_of(
     (site gravity / 9.80665 m/s^2)^n, and a term in the output's unit alone is taken as it is.
     """
     forms, example = _forms(symbol, kind, unit)
-    for form in forms:
+    for form in sorted(forms, key=lambda each: not each.below):  # a unit with a bar is none that pint knows
         parsed = _parse(text, form)
         if parsed is None:
             continue
@@ -172,6 +172,10 @@ def _forms(symbol: str, kind: str, unit: Unit) -> tuple[list[_Form], str]:
             return [_Form("angle")], '"20 arcsec"'
         case "1":
             return [_Form("number")], '"50 ppm"'
+        case "m":
+            return [_Form("length")], '"2 cm"'
+        case "s":
+            return [_Form("time")], '"1 ms"'
         case "1/(rad/s)":
             return [_Form("number", "rate", 1)], '"5 ppm/(deg/s)"'
         case "1/(rad/s)^2":

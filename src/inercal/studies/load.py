@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings
     from inercal.imu.settings import ImuSettings
     from inercal.selfcal.settings import SelfcalSettings
+    from inercal.strapdown.settings import StrapdownSettings
     from inercal.turntable.settings import TurntableSettings
 
 #: rig.kind -> the command whose studies have it; those of a turntable serve several
@@ -32,6 +33,7 @@ _COMMANDS = {
 
 _EXPECTED = {
     "calibrate imu": "one for `inercal calibrate imu`",
+    "calibrate strapdown": "one of a strapdown unit",
     "calibrate turntable": "one of a turntable",
     "selfcal": "one for `inercal selfcal`",
     "aoa": "one for `inercal aoa`",
@@ -58,7 +60,7 @@ _OPEN = {"site.latitude": "48.1 deg"}
 
 
 def reader(kind: str) -> Callable[[Mapping[str, Any], str | Path], Any]:
-    """Readers of a study's parsed TOML: of ``imu``, ``turntable``, ``selfcal`` or ``aoa``."""
+    """Readers of a study's parsed TOML: of ``imu``, ``strapdown``, ``turntable``, ``selfcal`` or ``aoa``."""
     module = importlib.import_module(f"inercal.studies.{kind}")
     read: Callable[[Mapping[str, Any], str | Path], Any] = getattr(module, f"{kind}_study")
     return read
@@ -77,6 +79,16 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
     from inercal.studies.imu import imu_study
 
     return imu_study(_read(path, overrides, "calibrate imu"), path)
+
+
+def load_strapdown_study(path: str | Path, overrides: Iterable[str] = ()) -> StrapdownSettings:
+    """Read the study of a strapdown unit: of its simulation and calibration.
+
+    Parameters and errors as of `load_imu_study`.
+    """
+    from inercal.studies.strapdown import strapdown_study
+
+    return strapdown_study(_read(path, overrides, "calibrate strapdown"), path)
 
 
 def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> TurntableSettings:
@@ -129,7 +141,7 @@ def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
     """The file with the overrides put in; refused where it is a study for another command."""
     data = read_toml(path, StudyError)
-    if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig"}:
+    if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig", "strapdown"}:
         raise StudyError(path, "found a column map, which goes behind --map, expected a study")
     rig = data.get("rig")
     kind = rig.get("kind") if isinstance(rig, dict) else None
@@ -139,10 +151,22 @@ def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str,
             path,
             f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, expected {_EXPECTED[command]}",
         )
-    if rig is None and "imu" in data and command != "calibrate imu":
+    own = [f"calibrate {table}" for table in ("imu", "strapdown") if table in data]
+    if rig is None and own and command not in own:
+        needed = (
+            "strapdown"
+            if command == "calibrate strapdown"
+            else "imu"
+            if command == "calibrate imu"
+            else "rig"
+        )
         raise StudyError(
             path,
-            f"found a study for `inercal calibrate imu`, expected {_EXPECTED[command]}, with a table [rig]",
+            f"found a study for `inercal {own[0]}`, expected {_EXPECTED[command]}, with a table [{needed}]",
+        )
+    if len(own) > 1:
+        raise StudyError(
+            path, "found the tables [imu] and [strapdown], expected one of them: they tell the kind of study"
         )
     for override in sorted(overrides, key=lambda each: not each.startswith("motion.kind")):  # it makes room
         put(data, override, Path(path).parent)

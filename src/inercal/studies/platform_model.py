@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, create_model
+from pydantic import BeforeValidator, Field, StrictInt, create_model
 
 from inercal._toml import Strict
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.selfcal.estimators import ESTIMATORS
-from inercal.selfcal.platform.states import ALL, PAPER, STATES, WORDS
+from inercal.selfcal.platform.states import (
+    ADDED,
+    ALL,
+    BIAS_WALK,
+    EXTENDED_MODEL,
+    MOST_WAVES,
+    PAPER,
+    STATES,
+    USUAL_WAVES,
+    WORDS,
+)
 from inercal.selfcal.settings import Model
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, refusal
 from inercal.units import Quantity, shown
 
-_KINDS = tuple(kind for kind, state in STATES.items() if state.key)
+_KINDS = tuple(kind for kind, state in STATES.items() if state.key and kind != "harmonics")
 
 #: key of a study -> parameters that it states
 _DELAYS = {"delay_encoder": ("tau_enc",), "delay_accelerometer": ("tau_a",)}
@@ -30,6 +40,11 @@ _BELIEVED = {
     "length": (100.0, "a length within 100 m"),
     "number": (0.5, "a number within 0.5"),
     "quadratic": (0.01, "a coefficient within 0.1 g/g^2"),
+    "rate by force": (5e-3, "a drift within 3 deg/s/g"),
+    "angle by force": (0.02, "a turn within 10 deg/g"),
+    "rate by temperature": (0.02, "a drift within 1 deg/s/K"),
+    "acceleration by temperature": (0.1, "a drift within 10 mg/K"),
+    "number by temperature": (0.01, "a change within 1 %/K"),
 }
 
 
@@ -83,14 +98,14 @@ def _kinds(typed: object) -> object:
     listed = typed if isinstance(typed, list) else [typed]
     words = ", ".join(f'"{word}"' for word in WORDS)
     first, *rest = listed or [None]
-    if first not in (*WORDS, *_KINDS) or (not isinstance(typed, list) and first not in WORDS):
-        others = ", ".join(f'"{kind}"' for kind in _KINDS)
+    if first not in (*WORDS, *ADDED) or (not isinstance(typed, list) and first not in WORDS):
+        others = ", ".join(f'"{kind}"' for kind in ADDED)
         raise refusal(
             f"found {shown(typed)}, expected {words}, or a list that may begin with one, of {others}"
         )
     for kind in rest:
-        if kind not in _KINDS:
-            raise refusal(f"found {shown(kind)}, expected one of {', '.join(_KINDS)}")
+        if kind not in ADDED:
+            raise refusal(f"found {shown(kind)}, expected one of {', '.join(ADDED)}")
     if len(set(listed)) < len(listed):
         raise refusal(f"found {shown(typed)}, expected each kind once")
     return typed
@@ -99,14 +114,32 @@ def _kinds(typed: object) -> object:
 _MODEL: Any = create_model("StatedModel", __base__=Strict, **_stated())
 
 
+class StatedHarmonic(Strict):
+    """An error of an encoder that repeats with its angle: a sin(order th) + b cos(order th)."""
+
+    axis: Literal["x", "y", "z"] = Field(description="the joint")
+    order: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(description="periods in a full turn")
+    amplitude: Annotated[Quantity, QuantityText("angle", "0(5) arcsec")] = Field(
+        description="0 with the standard uncertainty of a, and of b"
+    )
+
+
 class ModelTable(_MODEL):  # type: ignore[misc]
     """Errors of the rig: states that are estimated, and what is stated of those that are not."""
 
     states: Annotated[str | list[str], BeforeValidator(_kinds)] | None = Field(
         default=None,
-        description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay), or a list "
-        "that may begin with one of these, and goes on with kinds of this table; that of [filter] if absent",
+        description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay, and bias_walk, "
+        "which map leaves out), or a list that may begin with one of these, and goes on with kinds of this table, "
+        "temperature (kg0_T1, ka0_T1, ka1_T1) or bias_walk; that of [filter] if absent",
         examples=[["rig", "k2", "levers"]],
+    )
+    harmonics: list[StatedHarmonic] | None = Field(
+        default=None,
+        max_length=MOST_WAVES,
+        description="errors of the encoders that repeat with their angle, up to 12: priors of what is estimated; of "
+        "what is not, considered in u; orders 1 and 2 of each encoder, 0(5) arcsec, if estimated and absent",
+        examples=[[{"axis": "z", "order": 1, "amplitude": "0(5) arcsec"}]],
     )
 
 
@@ -121,9 +154,16 @@ def model_of(table: Any, filter: Any, where: object) -> Model:
         if filter.extended:
             raise StudyError(where, "model.states: found it beside filter.extended, expected one of them")
         listed = table.states if isinstance(table.states, list) else [table.states]
-        kinds = {kind for each in listed for kind in WORDS.get(each, (*PAPER, each))}
+        kinds = {kind for each in listed for kind in WORDS.get(each) or (*PAPER, *ADDED[each])}
+        if filter.kind == "map":
+            if "bias_walk" in listed:
+                text = (
+                    "model.states: found bias_walk for map, to which biases are constant, expected it without"
+                )
+                raise StudyError(where, text)
+            kinds -= {*BIAS_WALK}
         states = tuple(kind for kind in STATES if kind in kinds)
-        beyond = [kind for kind in states if STATES[kind].key]
+        beyond = [kind for kind in states if kind not in EXTENDED_MODEL]
         if beyond and not ESTIMATORS[filter.kind].rig:
             having = ", ".join(kind for kind, each in ESTIMATORS.items() if each.rig)
             raise StudyError(
@@ -142,7 +182,16 @@ def model_of(table: Any, filter: Any, where: object) -> Model:
                     where, f"{text}, expected it with an uncertainty, such as {STATES[kind].example}"
                 )
             stated[name] = (each.value, each.u)
-    return Model(states, stated)
+    waves = tuple(("xyz".index(each.axis), each.order) for each in table.harmonics or ()) or USUAL_WAVES
+    if len(set(waves)) < len(waves):
+        raise StudyError(where, "model.harmonics: found an order of a joint twice, expected each once")
+    for k, each in enumerate(table.harmonics or ()):
+        if each.amplitude.value != 0.0 or each.amplitude.u == 0.0:
+            text = f"model.harmonics.{k}.amplitude: found {shown(each.amplitude.text)}"
+            raise StudyError(where, f"{text}, expected 0 with an uncertainty, such as 0(5) arcsec")
+        for name in STATES["harmonics"].parameters[2 * k : 2 * k + 2]:
+            stated[name] = (0.0, each.amplitude.u)
+    return Model(states, stated, harmonics=waves)
 
 
 def on_rig(table: Any) -> Array:

@@ -11,10 +11,17 @@ from inercal._toml import Strict
 from inercal.studies.aoa import AoaStudyFile
 from inercal.studies.imu import ImuStudyFile
 from inercal.studies.selfcal import SelfcalStudyFile
+from inercal.studies.strapdown import StrapdownStudyFile
 from inercal.studies.turntable import TurntableStudyFile
 
 #: a study is one of these
-STUDY_FILES: tuple[type[Strict], ...] = (ImuStudyFile, TurntableStudyFile, SelfcalStudyFile, AoaStudyFile)
+STUDY_FILES: tuple[type[Strict], ...] = (
+    ImuStudyFile,
+    StrapdownStudyFile,
+    TurntableStudyFile,
+    SelfcalStudyFile,
+    AoaStudyFile,
+)
 
 
 class TomlSchema(GenerateJsonSchema):

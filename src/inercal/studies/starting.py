@@ -110,8 +110,38 @@ states = 19
 """
 )
 
+_STRAPDOWN = (
+    _COMMON
+    + """
+[strapdown]
+frame = "upper"
+terms = ["k2", "size", "delay"]
+[noise]
+angle_random_walk = "0.05 deg/sqrt(h)"
+velocity_random_walk = "50 ug/sqrt(Hz)"
+[rests]
+velocity = "0.2 mm/s"
+[start]
+[prior]
+gyro_bias = "30 deg/h"
+scale = "1000 ppm"
+misalignment = "300 arcsec"
+bias = "5 mg"
+k1 = "1000 ppm"
+axes = "300 arcsec"
+[plan]
+start = ["0 deg", "-90 deg", "0 deg"]
+turns = [["z", "90 deg"], ["y", "180 deg"], ["x", "90 deg"], ["y", "180 deg"], ["x", "90 deg"]]
+turn_time = "4 s"
+dwell = "20 s"
+first_dwell = "60 s"
+[motion]
+"""
+)
+
 STARTING: Final = {
     "imu": _COMMON + '[imu]\nmethod = "multiposition"\n',
+    "strapdown": _STRAPDOWN,
     "turntable": _TURNTABLE,
     "selfcal": _SELFCAL,
     "aoa": _AOA,

@@ -126,7 +126,7 @@ def _example(key: str, value: str, comment: str) -> str:
     return _line(f"# {key}", value, comment)
 
 
-Kind = Literal["imu", "turntable", "selfcal", "aoa"]
+Kind = Literal["imu", "strapdown", "turntable", "selfcal", "aoa"]
 
 _HEAD = """\
 # Study {what}. Fill in each "?", replace what is not so; take the "# " from keys that you know.
@@ -139,6 +139,11 @@ _HEAD = """\
 #: kind -> what it is of; the next command where there is no recording, where there is one
 _NEXT = {
     "imu": ("for `inercal calibrate imu`", "calibrate imu {files}", "calibrate imu {files}"),
+    "strapdown": (
+        "of a strapdown unit",
+        "simulate strapdown {study} --out simulated.csv",
+        "calibrate strapdown {files}",
+    ),
     "turntable": ("of a turntable", "sensitivity {study}", "calibrate turntable {files}"),
     "selfcal": ("of a self-calibration", "simulate selfcal {study} --out simulated.csv", "selfcal {files}"),
     "aoa": ("of an angle of attack", "simulate aoa {study} --out simulated.csv", "aoa {files}"),

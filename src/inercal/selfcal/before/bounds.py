@@ -38,10 +38,13 @@ from inercal.selfcal.platform.linearised import (
     encoder_columns,
     encoder_roots,
     propagate_covariance,
+    wander,
 )
 from inercal.selfcal.platform.model import (
     Rates,
     Truth,
+    drifting,
+    force_within,
     on_the_base,
     platform_rate,
     sensing,
@@ -102,11 +105,13 @@ def bounds(
     measured: Mask | None = None,
     history: bool = False,
     contributions: bool = False,
+    warm: Array | None = None,
 ) -> PathBounds:
     """Bounds along a commanded motion, with noise, prior and near-level gate of the problem.
 
     ``truth`` (p,) or longer, product form, makes the path, the nominal one if absent; ``measured`` (n, 4) rows that
     accelerometers x, y, z and the encoders measure, all if absent. The first row's accelerometers play no part.
+    ``warm`` (n,) [K] above the temperature of the coefficients, 0 if absent.
     """
     c = problem.mean if truth is None else to_linear(truth[problem.states.index])
     world, n, rate = problem.world, len(motion.t), motion.rate
@@ -114,9 +119,11 @@ def bounds(
     first = np.array(attitude(motion.angles[0], world.axes, world.signs))
     without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
     full = problem.states.full(c)
-    simulate_truth(first, rate[:, None], dt[0], without, full, world, Truth(q, unused, motion.angles.copy()))
+    above = np.zeros(n) if warm is None else warm
+    truth_of = Truth(q, unused, motion.angles.copy())
+    simulate_truth(first, rate[:, None], dt[0], without, above, full, world, truth_of)
     seen = np.ones((n, 4), dtype=np.bool_) if measured is None else measured
-    return _along(q, motion.angles, dt, rate, seen, c, problem, history, contributions)
+    return _along(Path(q, motion.angles, dt, rate, seen, above), c, problem, history, contributions)
 
 
 def recorded_bounds(
@@ -134,17 +141,14 @@ def recorded_bounds(
     which the attitude was taken anew from the encoders.
     """
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
-    path = recording.th, recording.dt, recording.rate
+    warm = np.zeros(len(attitudes)) if recording.warm is None else recording.warm
     walked = None if recording.walked is None else recording.walked / recording.dt
-    return _along(attitudes, *path, seen, coefficients, problem, history, contributions, restarts, walked)
+    path = Path(attitudes, recording.th, recording.dt, recording.rate, seen, warm)
+    return _along(path, coefficients, problem, history, contributions, restarts, walked)
 
 
 def _along(
-    q: Array,
-    th: Array,
-    dt: Array,
-    rate: Array,
-    seen: Mask,
+    whole_path: Path,
     c: Array,
     problem: FilterProblem,
     history: bool,
@@ -152,8 +156,9 @@ def _along(
     restarts: Sequence[int] = (),
     walked: Array | None = None,
 ) -> PathBounds:
-    """Bounds along attitudes (n, 4) with coefficients (p,), linear form; ``walked`` (n - 1,) factors of the variance of
-    the angle random walk in each step."""
+    """Bounds along a path with coefficients (p,), linear form; ``walked`` (n - 1,) factors of the variance of the angle
+    random walk in each step."""
+    q, th, dt, rate, seen, warm = whole_path
     p, noise = len(c), problem.noise
     u = np.empty((len(q) if history else 0, p))
     start = np.zeros((2, 3 + p))
@@ -168,7 +173,7 @@ def _along(
     for last in (*restarts, len(q)):
         for begin, end, own in _evenly(first, last, problem, walked):
             rows, steps = slice(begin, end), slice(begin, max(end - 1, 0))
-            path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows])
+            path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows])
             riccati(P, path, problem.states.full(c), own.model, u[rows])
         if last < len(q):
             P[:, :3], P[:, :, :3] = 0.0, 0.0
@@ -234,13 +239,15 @@ def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -
 
 class Path(NamedTuple):
     """A path of n rows: attitudes ``q`` (n, 4), gimbal angles ``th`` (n, 3) [rad], steps ``dt`` (n - 1,) [s], commanded
-    ``rate`` (n - 1, 3) [rad/s], and rows ``measured`` (n, 4) by accelerometers x, y, z and the encoders."""
+    ``rate`` (n - 1, 3) [rad/s], rows ``measured`` (n, 4) by accelerometers x, y, z and the encoders, and how ``warm``
+    (n,) [K] they are."""
 
     q: Array
     th: Array
     dt: Array
     rate: Array
     measured: Mask
+    warm: Array
 
 
 @kernel
@@ -250,12 +257,12 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
     ``P`` (1 or 1 + sources, 3 + p, 3 + p) is that at the first row, the whole and then its parts; ``c`` is the
     full vector, linear form; ``u`` (n or 0, p) receives standard uncertainties.
     """
-    q, th, dt, w, seen = path
+    q, th, dt, w, seen, warm = path
     world, noise, gate, layout = model
     m, place = P.shape[1], layout.place
     top, work, row, columns = np.empty((3, m)), np.empty((2, m)), empty_row(WIDEST), empty_columns()
     near = np.zeros(3, dtype=np.int64)
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(len(q)):
         at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
@@ -263,17 +270,24 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
             following = min(k, len(w) - 1)
             commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
             read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
-            step = Step(commanded, platform_rate(commanded, c), earth_e, at, dt[k - 1])
+            rate, f = platform_rate(commanded, c), force_within(at, commanded, -0.5 * dt[k - 1], up_e)
+            if len(c) > 24:
+                rate = drifting(rate, f, warm[k], c)
+            step = Step(commanded, rate, earth_e, at, dt[k - 1], f, warm[k])
             walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
             for s in range(len(P)):
                 propagate_covariance(P[s], c, place, step, walk if s < 2 else 0.0, top, columns)
+                if len(c) > 24:  # how far biases walk is known before, as a prior is
+                    known = 1.0 if s == 0 or s == 4 else 0.0
+                    of_gyros, of_accelerometers = known * noise.gyro_walk, known * noise.accelerometer_walk
+                    wander(P[s], mean, place, of_gyros, of_accelerometers, step.dt)
             if seen[k, 3]:
                 watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
             if updating(gate, near):
                 if seen[k, 3]:
                     roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
                     wide = encoder_columns(
-                        th[k], at, read, earth_e, c, place, world.axes, world.signs, columns
+                        th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                     )
                     for i in range(3):
                         root = roots[i]
@@ -284,7 +298,7 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                             row.places[1 + i + a] = columns.places[a]
                             row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
                         observe(P, row, i + 1 + wide, 1.0, _PARTS[1], work)
-                sensed = sensing(at, read, earth_e, up_e, c)
+                sensed = sensing(at, read, earth_e, up_e, warm[k], c)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
                         size = accelerometer_row(i, sensed, c, place, up_e, row)

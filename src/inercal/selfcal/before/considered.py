@@ -11,7 +11,9 @@ Processes and Filtering Theory, 1970, section 8.4). G and D are the columns that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from inercal.selfcal.filters.gaps import anew
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, encoders_at, updating, watch
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
+    WALK_TIME,
     WIDEST,
     Columns,
     Places,
@@ -34,10 +37,19 @@ from inercal.selfcal.platform.linearised import (
     encoder_columns,
     encoder_roots,
     propagate_covariance,
+    wander,
 )
-from inercal.selfcal.platform.model import Rates, on_the_base, platform_rate, sensing, specific_force
+from inercal.selfcal.platform.model import (
+    Rates,
+    drifting,
+    force_within,
+    on_the_base,
+    platform_rate,
+    sensing,
+    specific_force,
+)
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, Layout, StateVector
+from inercal.selfcal.platform.states import ALL, WALK, Layout
 
 
 def sensitivities(
@@ -59,17 +71,18 @@ def sensitivities(
     place[[ALL.index(name) for name in names]] = 3 + p + np.arange(m)
     full = states.stated.copy()
     full[states.index] = coefficients
-    whole = StateVector((*states.names, *names), states.stated)
+    whole = replace(states, names=(*states.names, *names))
     wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole)
     P, S = np.diag(np.append(np.full(3, problem.noise.encoder**2), problem.prior**2)), np.zeros((3 + p, m))
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
+    warm = np.zeros(len(q)) if recording.warm is None else recording.warm
     first = 0
-    model = problem.model._replace(layout=Layout(states.index, place, full))
+    model = problem.model._replace(layout=Layout(states.index, place, full, whole.layout.waves))
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
         rows, steps = slice(first, last), slice(first, max(last - 1, 0))
-        carry(P, S, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows]), full, model)
+        carry(P, S, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows]), full, model)
         if last < len(q):
             P[:3], P[:, :3], S[:3] = 0.0, 0.0, 0.0
             P[np.diag_indices(3)] = anew(problem, th[last]).sigma ** 2
@@ -95,7 +108,7 @@ def _on_encoders(P: Array, S: Array, wide: FilterProblem, th: Array, c: Array, r
 def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
     """Covariance ``P`` (n, n) of the error state and sensitivities ``S`` (n, m) along a path, in place; ``c`` is the
     whole full vector, linear form; in the layout considered states have the places behind the n."""
-    q, th, dt, w, seen = path
+    q, th, dt, w, seen, warm = path
     world, noise, gate, layout = model
     n, place = len(P), layout.place
     own = place.copy()
@@ -104,22 +117,28 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
             own[i] = -1
     top, gain, row, columns = np.empty((3, n)), np.empty(n), empty_row(WIDEST), empty_columns()
     shift, near = np.empty((3, S.shape[1])), np.zeros(3, dtype=np.int64)
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(1, len(q)):
         at, following = (q[k, 0], q[k, 1], q[k, 2], q[k, 3]), min(k, len(w) - 1)
         commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
         read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
-        step = Step(commanded, platform_rate(commanded, c), earth_e, at, dt[k - 1])
+        force = force_within(at, commanded, -0.5 * dt[k - 1], up_e)
+        rate = drifting(platform_rate(commanded, c), force, warm[k], c)
+        step = Step(commanded, rate, earth_e, at, dt[k - 1], force, warm[k])
         _carry_step(S, n, c, place, step, shift, columns)
         walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
         propagate_covariance(P, c, own, step, walk, top, columns)
+        wander(P, mean, own, noise.gyro_walk, noise.accelerometer_walk, step.dt)
+        forget(S, own, step.dt)
         if seen[k, 3]:
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
             if seen[k, 3]:
                 roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
-                wide = encoder_columns(th[k], at, read, earth_e, c, place, world.axes, world.signs, columns)
+                wide = encoder_columns(
+                    th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
+                )
                 for i in range(3):
                     root = roots[i]
                     for j in range(i + 1):
@@ -129,11 +148,21 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
                         row.places[1 + i + a] = columns.places[a]
                         row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
                     _update(P, S, row, i + 1 + wide, 1.0, gain)
-            sensed = sensing(at, read, earth_e, up_e, c)
+            sensed = sensing(at, read, earth_e, up_e, warm[k], c)
             for i in range(3):
                 if seen[k, i] and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
                     _update(P, S, row, size, variance, gain)
+
+
+@kernel
+def forget(S: Array, place: Places, dt: float) -> None:
+    """Let what errors of walking biases depend on fade within ``dt`` [s], as these do, in sensitivities ``S``."""
+    keep = math.exp(-dt / WALK_TIME)
+    for i in range(WALK, WALK + 6):
+        if place[i] >= 0:
+            for k in range(S.shape[1]):
+                S[place[i], k] *= keep
 
 
 @kernel

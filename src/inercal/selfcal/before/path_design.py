@@ -160,7 +160,10 @@ def stated_moves(moves: tuple[Move, ...]) -> list[list[str]]:
 
 def _compared(name: str, plan: Plan, settings: SelfcalSettings) -> ComparedPath:
     """A plan judged by its bounds."""
-    along = bounds(motion(plan, settings.world), problem(settings))
+    commanded = motion(plan, settings.world)
+    temperature = settings.simulated_temperature(len(commanded.t))
+    warm = None if temperature is None else settings.warm(temperature)
+    along = bounds(commanded, problem(settings), warm=warm)
     value = criterion(along, settings.goal, settings.search.criterion)
     return ComparedPath(
         name, plan, observability(along, settings.goal), value, tuple(plan.beyond(settings.limits))

@@ -187,7 +187,8 @@ def _other_scale(case: Case, values: Array) -> Case:
 
 def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     """Errors periodic in the angle of a joint: for each joint the order that its innovations show most."""
-    orders_tried = np.arange(1, LIMITS.harmonic_orders + 1)
+    orders_tried, states = np.arange(1, LIMITS.harmonic_orders + 1), case[1].states
+    estimated = [wave for k, wave in enumerate(states.harmonics) if f"harmonic_{k + 1}_sin" in states.names]
     angles, by_joint = _found_angles(case, now)
     th = angles[1:]
     for joint in range(3):
@@ -195,6 +196,7 @@ def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
         angle, missed = th[used, joint], by_joint[used, joint]
         # half a period is the least from which an order is told from a constant
         orders = orders_tried[orders_tried * np.ptp(angle) > math.pi] if used.any() else orders_tried[:0]
+        orders = np.setdiff1d(orders, [order for of, order in estimated if of == joint])
         if len(orders):
             powers = np.array([np.abs(np.exp(1j * order * angle) @ missed) for order in orders])
             yield _harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint])

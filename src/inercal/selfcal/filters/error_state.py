@@ -36,10 +36,13 @@ from inercal.selfcal.platform.linearised import (
     encoder_columns,
     encoder_roots,
     propagate_covariance,
+    wander,
 )
 from inercal.selfcal.platform.model import (
     Rates,
+    drifting,
     encoders_attitude,
+    force_within,
     on_the_base,
     outputs,
     platform_rate,
@@ -185,7 +188,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
     """The loop; returns the least |cos thy|."""
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
-    intervals, rates, acc, th, later = steps
+    intervals, rates, acc, th, later, warm = steps
     index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
     c = layout.stated.copy()
     for j in range(len(index)):
@@ -203,16 +206,22 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         read = Rates(w, (later[k, 0], later[k, 1], later[k, 2]))
         rate, earth_e, up_e = platform_rate(w, c), on_the_base(world.earth, c), on_the_base(world.up, c)
+        f = (0.0, 0.0, 0.0)
+        if rig:
+            f = force_within(q, w, 0.5 * dt, up_e)
+            rate = drifting(rate, f, warm[k], c)
         q = normalize(propagate(q, rate, earth_e, dt))
         walk = noise.angle_random_walk * noise.angle_random_walk * dt
-        propagate_covariance(P, c, place, Step(w, rate, earth_e, q, dt), walk, top, columns)
+        propagate_covariance(P, c, place, Step(w, rate, earth_e, q, dt, f, warm[k]), walk, top, columns)
+        if rig:
+            wander(P, c, place, noise.gyro_walk, noise.accelerometer_walk, dt)
         total, count = 0.0, 0
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = encoders_attitude(angles, read, earth_e, c, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         if history:
@@ -221,7 +230,9 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
         if take and seen:
             wide = 0
             if rig:
-                wide = encoder_columns(angles, of_encoders, read, earth_e, c, place, axes, signs, columns)
+                wide = encoder_columns(
+                    angles, of_encoders, read, earth_e, up_e, c, layout, axes, signs, columns
+                )
             if late:
                 sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
             shown = out.innovations[k, 3:] if history else unwanted
@@ -246,12 +257,12 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
             up_e = on_the_base(world.up, c)
             if rig:
                 earth_e = on_the_base(world.earth, c)
-            sensed = sensing(q, read, earth_e, up_e, c)
+            sensed = sensing(q, read, earth_e, up_e, warm[k], c)
             expected = outputs(sensed, c)
             if late:
-                f = sensed.force
+                a = sensed.force
                 of_acc = variance + undecided(P, c, place, 1, read) * (
-                    f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
+                    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
                 )
             if levers:
                 of_acc = (of_acc if late else variance) + shaken(P, c, place, read, dt)

@@ -207,7 +207,7 @@ def _advance(
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
-    intervals, rate, acc, th_m, _ = steps
+    intervals, rate, acc, th_m, _, _ = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted = empty_points(n), np.empty(p)

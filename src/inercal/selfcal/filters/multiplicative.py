@@ -28,10 +28,12 @@ from inercal.selfcal.filters.error_state import initial as initial
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import nearest_turn
-from inercal.selfcal.platform.linearised import WIDEST, Places, empty_columns, encoder_columns
+from inercal.selfcal.platform.linearised import WIDEST, Places, empty_columns, encoder_columns, wander
 from inercal.selfcal.platform.model import (
     Rates,
+    drifting,
     encoders_attitude,
+    force_within,
     on_the_base,
     outputs,
     platform_rate,
@@ -82,6 +84,7 @@ def _predict(
     c: Array,
     index: Places,
     w: Vector,
+    warm: float,
     dt: float,
     world: World,
     columns: Array,
@@ -92,7 +95,10 @@ def _predict(
     ``columns`` (n, n) are those of the points before, ``index`` (p,) the places of states in ``c``; ``shifted``, as
     long, has what is no state."""
     n = len(columns)
-    rate = platform_rate(w, c)
+    rate, f = platform_rate(w, c), (0.0, 0.0, 0.0)
+    if len(c) > 24:
+        f = force_within(q, w, 0.5 * dt, on_the_base(world.up, c))
+        rate = drifting(rate, f, warm, c)
     turn = (rate[0] * dt, rate[1] * dt, rate[2] * dt)
     centre = normalize(propagate(q, rate, on_the_base(world.earth, c), dt))
     back = (centre[0], -centre[1], -centre[2], -centre[3])
@@ -102,6 +108,8 @@ def _predict(
         d = (sign * column[0], sign * column[1], sign * column[2])
         _moved(c, index, column, sign, shifted)
         rate = platform_rate(w, shifted)
+        if len(c) > 24:
+            rate = drifting(rate, f, warm, shifted)
         if len(c) > 18:
             held = multiply(back, multiply(_by_earth(world.earth, shifted, dt), q))
         after = multiply(multiply(held, exp(d)), exp((rate[0] * dt, rate[1] * dt, rate[2] * dt)))
@@ -122,6 +130,7 @@ def _read(
     c: Array,
     index: Places,
     read: Rates,
+    warm: float,
     world: World,
     columns: Array,
     shifted: Array,
@@ -135,7 +144,9 @@ def _read(
         _moved(c, index, column, sign, shifted)
         turned = multiply(q, exp((sign * column[0], sign * column[1], sign * column[2])))
         earth, up = on_the_base(world.earth, shifted), on_the_base(world.up, shifted)
-        z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = outputs(sensing(turned, read, earth, up, shifted), shifted)
+        z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = outputs(
+            sensing(turned, read, earth, up, warm, shifted), shifted
+        )
 
 
 @kernel
@@ -145,7 +156,7 @@ def _advance(
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
-    intervals, rates, acc, th, later = steps
+    intervals, rates, acc, th, later, warm = steps
     index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
     c = layout.stated.copy()
     for j in range(len(index)):
@@ -165,7 +176,7 @@ def _advance(
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         read = Rates(w, (later[k, 0], later[k, 1], later[k, 2]))
         draw(P, factor, spread, points)
-        q = _predict(q, c, index, w, dt, world, points.columns, shifted, z)
+        q = _predict(q, c, index, w, warm[k], dt, world, points.columns, shifted, z)
         moments(z, points.columns, other, of_points)
         middle = of_points.mean
         q = normalize(multiply(q, exp((middle[0], middle[1], middle[2]))))
@@ -175,21 +186,25 @@ def _advance(
             P[i, i] += noise.angle_random_walk * noise.angle_random_walk * dt
             for j in range(3, n):
                 P[i, j], P[j, i] = of_points.cross[j, i], of_points.cross[j, i]
+        if len(c) > 24:
+            wander(P, c, place, noise.gyro_walk, noise.accelerometer_walk, dt)
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
         if seen:
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            earth_e = on_the_base(world.earth, c)
-            of_encoders = encoders_attitude(angles, read, earth_e, c, axes, signs)
-            watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
+            earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, axes, signs)
+            watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         total, count = 0.0, 0
         if history:
             for i in range(6):
                 out.innovations[k, i] = math.nan
         if take and seen:
-            wide = encoder_columns(angles, of_encoders, read, earth_e, c, place, axes, signs, of_states)
+            wide = encoder_columns(
+                angles, of_encoders, read, earth_e, up_e, c, layout, axes, signs, of_states
+            )
             if late:
                 sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
             shown = out.innovations[k, 3:] if history else unwanted
@@ -217,7 +232,7 @@ def _advance(
             r[i] = acc[k, i] if take and admitted(i, gate, near) else math.nan
         if not (math.isnan(r[0]) and math.isnan(r[1]) and math.isnan(r[2])):
             draw(P, factor, spread, points)
-            _read(q, c, index, read, world, points.columns, shifted, z)
+            _read(q, c, index, read, warm[k], world, points.columns, shifted, z)
             moments(z, points.columns, other, of_points)
             if late:
                 up_square = world.up[0] ** 2 + world.up[1] ** 2 + world.up[2] ** 2

@@ -82,11 +82,14 @@ def updating(gate: Gate, near: NDArray[np.int64]) -> bool:
 
 class NoiseLevels(NamedTuple):
     """Standard deviations as kernels take them: ``angle_random_walk`` of the gyros [rad/sqrt(s)], ``accelerometer``
-    [m/s^2] and ``encoder`` [rad] of each sample."""
+    [m/s^2] and ``encoder`` [rad] of each sample; of biases that walk, about their means, ``gyro_walk`` [rad/s] and
+    ``accelerometer_walk`` [m/s^2]."""
 
     angle_random_walk: float
     accelerometer: float
     encoder: float
+    gyro_walk: float
+    accelerometer_walk: float
 
 
 class FilterModel(NamedTuple):
@@ -128,7 +131,11 @@ class FilterProblem:
         return self.states.stated[self.states.index]
 
     def for_kind(self, kind: FilterKind) -> FilterProblem:
-        """The problem with the states that an estimator can have: without those of the rig where it has none."""
+        """The problem with the states that an estimator can have: without those of the rig where it has none, and in
+        ``map`` without those that change with time."""
+        if kind == "map" and self.states.walks.any():
+            constant = self.states.without_walks
+            return replace(self, prior=self.prior[: len(constant.names)], vector=constant)
         if ESTIMATORS[kind].rig or not self.states.of_rig:
             return self
         size = 24 if self.states.has("kg1") and self.states.has("beta") else 18
@@ -138,7 +145,10 @@ class FilterProblem:
     def model(self) -> FilterModel:
         """World, noise and near-level gate, for kernels."""
         noise = self.noise
-        levels = NoiseLevels(float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder))
+        levels = NoiseLevels(
+            float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder),
+            noise.gyro_walk_sigma, noise.accelerometer_walk_sigma,
+        )  # fmt: skip
         return FilterModel(self.world, levels, gate_of(self.filter.gating), self.states.layout)
 
 
@@ -163,11 +173,11 @@ def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tup
     """Attitude (4,) of p as encoders have it that read ``th`` (3,) [rad], and its change (3, p) [rad, about the axes of
     p] per change of the states ``c`` (p,); ``rate`` (3,) [rad/s] as read about that time."""
     world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
-    w, earth = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full)
+    w, earth, up = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full), on_the_base(world.up, full)
     read = Rates(w, w)
-    q = encoders_attitude(th, read, earth, full, world.axes, world.signs)
+    q = encoders_attitude(th, read, earth, up, full, layout.waves, world.axes, world.signs)
     columns = empty_columns()
-    count = encoder_columns(th, q, read, earth, full, layout.place, world.axes, world.signs, columns)
+    count = encoder_columns(th, q, read, earth, up, full, layout, world.axes, world.signs, columns)
     slope = np.zeros((3, len(c)))
     slope[:, columns.places[:count] - 3] = columns.axes[:count].T
     return np.array(q), slope

@@ -176,7 +176,7 @@ def _advance(
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, _ = model
-    intervals, rates, acc, th, _ = steps
+    intervals, rates, acc, th, _, _ = steps
     n, p = len(P), len(c)
     _, _, other, spread = weights(n + 8, 1.0, 0.0, 0.0)
     points, ck = empty_points(n), np.empty(p)

@@ -142,7 +142,9 @@ def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:
     if module is not None and kind not in _LOADED:
         none = np.empty((0, 3))
         module.advance(
-            module.initial(problem, np.zeros(3)), problem, Steps(np.empty(0), none, none, none, none)
+            module.initial(problem, np.zeros(3)),
+            problem,
+            Steps(np.empty(0), none, none, none, none, np.empty(0)),
         )
         _LOADED.add(kind)
 

@@ -59,6 +59,8 @@ def second_pass(
     if not (np.isfinite(about).all() and np.isfinite(variance).all() and (variance > 0.0).all()):
         return found
     narrow = np.minimum(problem.prior, LIMITS.second_prior * np.sqrt(variance))
+    walks = problem.states.walks  # what they were in the beginning is not what they are in the end
+    about[walks], narrow[walks] = 0.0, problem.prior[walks]
     begun.coefficients[:] = about
     begun.covariance[-p:, -p:] = np.diag(narrow**2)
     if begun.covariance[
@@ -72,11 +74,11 @@ def second_pass(
 
 
 class Kept(NamedTuple):
-    """Rows that a stream keeps for further passes: of ``rows`` (m, 15) the first ``used``, the first angles and then
-    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked, later. None of a filter
-    that needs no second pass, or once there are `LIMITS.kept_rows`."""
+    """Rows that a stream keeps for further passes: of ``rows`` (m, 16) the first ``used``, the first angles and then
+    steps of `inercal.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked, later, warm. None of a
+    filter that needs no second pass, or once there are `LIMITS.kept_rows`."""
 
-    rows: Array = np.empty((0, 15))
+    rows: Array = np.empty((0, 16))
     used: int = 0
 
     @staticmethod
@@ -84,7 +86,7 @@ class Kept(NamedTuple):
         """The rows kept from a start with those angles (3,) [rad] on."""
         if not is_due(kind, problem):
             return Kept()
-        rows = np.zeros((64, 15))
+        rows = np.zeros((64, 16))
         rows[0, 7:10] = th
         return Kept(rows, 1)
 
@@ -94,7 +96,7 @@ class Kept(NamedTuple):
             return self
         rows = self.rows
         rows[self.used] = np.hstack(
-            [step.dt, step.rate[0], step.acc[0], step.th[0], held, walked, step.later[0]]
+            [step.dt, step.rate[0], step.acc[0], step.th[0], held, walked, step.later[0], step.warm]
         )
         return Kept(rows, self.used + 1)
 
@@ -108,7 +110,8 @@ class Kept(NamedTuple):
         first, steps = self.rows[0, 7:10], self.rows[1:]
         held = np.flatnonzero(steps[:, 10]).tolist()
         rate, acc, th, later = (np.ascontiguousarray(steps[:, k : k + 3]) for k in (1, 4, 7, 12))
-        taken = Steps(np.ascontiguousarray(steps[:, 0]), rate, acc, th, later)
+        dt, warm = (np.ascontiguousarray(steps[:, k]) for k in (0, 15))
+        taken = Steps(dt, rate, acc, th, later, warm)
         begun = initial(module, problem, first, steps[0, 1:4])
         state = second_pass(module, begun, found, problem, taken, held, steps[:, 11])
         more = Kept() if self.used >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.used)

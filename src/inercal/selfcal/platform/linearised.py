@@ -33,14 +33,31 @@ from inercal.selfcal.platform.model import (
     rate_at,
     squared,
 )
-from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, ZERO_Y
+from inercal.selfcal.platform.states import (
+    ASYM,
+    BY_FORCE,
+    GAMMA,
+    K2,
+    LEVER,
+    NONORTH,
+    SAG,
+    TAU,
+    WALK,
+    WARM,
+    WAVE,
+    ZERO_Y,
+    Layout,
+)
 
 Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
 FLOOR = LIMITS.encoder_floor
 """As kernels take it."""
 
-WIDEST = 20
+WALK_TIME = LIMITS.walk_time
+"""As kernels take it [s]."""
+
+WIDEST = 40
 """Most entries of a row of the model, and most columns of states."""
 
 Places: TypeAlias = NDArray[np.int64]
@@ -92,13 +109,16 @@ def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Vectors:
 
 class Step(NamedTuple):
     """A step of the platform: its ``commanded`` rate and its own ``rate`` (3,) [rad/s]; ``earth`` (3,) [rad/s] in the
-    frame of the encoders; the ``attitude`` (4,) after it; ``dt`` [s]."""
+    frame of the encoders; the ``attitude`` (4,) after it; ``dt`` [s]; specific ``force`` (3,) [m/s^2] in it, how
+    ``warm`` [K] it is."""
 
     commanded: Vector
     rate: Vector
     earth: Vector
     attitude: Quaternion
     dt: float
+    force: Vector
+    warm: float
 
 
 @kernel
@@ -110,6 +130,10 @@ def dynamics_columns(c: Array, place: Places, step: Step, columns: Columns) -> i
         axis = (j[0][i], j[1][i], j[2][i])
         count = put(columns, count, place[18 + i], axis, dt * w[i])
         count = put(columns, count, place[ASYM + i], axis, 0.5 * dt * abs(w[i]))
+        count = put(columns, count, place[WALK + i], axis, dt)
+        for k in range(3):
+            count = put(columns, count, place[BY_FORCE + 3 * i + k], axis, dt * step.force[k])
+        count = put(columns, count, place[WARM + i], axis, dt * step.warm)
     by_beta = turned_by_beta(step.earth, step.attitude, c)
     for i in range(3):
         count = put(columns, count, place[21 + i], by_beta[i], -dt)
@@ -182,34 +206,64 @@ def propagate_covariance(
 
 
 @kernel
+def wander(P: Array, c: Array, place: Places, of_gyros: float, of_accelerometers: float, dt: float) -> None:
+    """Biases that walk, and their covariance in ``P`` (3 + p, 3 + p), after ``dt`` [s], in place; they are
+    exponentially correlated, of standard deviations ``of_gyros`` [rad/s] and ``of_accelerometers`` [m/s^2]."""
+    keep = math.exp(-dt / WALK_TIME)
+    for i in range(6):
+        at, sigma = place[WALK + i], of_gyros if i < 3 else of_accelerometers
+        if at >= 0:
+            c[WALK + i] *= keep
+            for m in range(len(P)):
+                P[at, m] *= keep
+                P[m, at] *= keep
+            P[at, at] += sigma * sigma * (1.0 - keep * keep)
+
+
+@kernel
 def encoder_columns(
     th: Vector | Array,
     q: Quaternion,
     read: Rates,
     earth: Vector,
+    up: Vector,
     c: Array,
-    place: Places,
+    layout: Layout,
     axes: Axes,
     signs: Array,
     columns: Columns,
 ) -> int:
     """Columns of the attitude ``q`` (4,) that encoders have which read ``th`` (3,) [rad]; returns their number.
 
-    Turns of p within a delay, of some 1e-4, are left out of the axes.
+    Turns of p within a delay, of some 1e-4, and by sag are left out of the axes.
     """
     if len(c) <= 24:
         return 0
-    gamma = (c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])
+    place, waves, gamma = layout.place, layout.waves, (c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])
     j, count = right_jacobian(gamma), 0
     for i in range(3):
         count = put(columns, count, place[GAMMA + i], (j[0][i], j[1][i], j[2][i]), 1.0)
-    back = multiply(exp((-gamma[0], -gamma[1], -gamma[2])), elementary(axes[2], -signs[2] * th[2]))
+    back = exp((-gamma[0], -gamma[1], -gamma[2]))
+    about_z = rotate(back, unit(axes[2], signs[2]))
+    back = multiply(back, elementary(axes[2], -signs[2] * th[2]))
     count = put(columns, count, place[NONORTH + 1], rotate(back, unit(axes[0], 1.0)), 1.0)
     back = multiply(back, elementary(axes[0], -c[NONORTH + 1]))
-    count = put(columns, count, place[ZERO_Y], rotate(back, unit(axes[1], signs[1])), -1.0)
+    about_y = rotate(back, unit(axes[1], signs[1]))
+    count = put(columns, count, place[ZERO_Y], about_y, -1.0)
     back = multiply(back, elementary(axes[1], -signs[1] * (th[1] - c[ZERO_Y])))
     count = put(columns, count, place[NONORTH], rotate(back, unit(axes[2], 1.0)), 1.0)
-    w, v = platform_rate(rate_at(read, c[TAU]), c), rotate((q[0], -q[1], -q[2], -q[3]), earth)
+    if len(waves) > 0:
+        about_x = rotate(multiply(back, elementary(axes[2], -c[NONORTH])), unit(axes[0], signs[0]))
+        for k in range(len(waves)):
+            joint, at = waves[k, 0], waves[k, 1] * th[waves[k, 0]]
+            axis = about_x if joint == 0 else about_y if joint == 1 else about_z
+            count = put(columns, count, place[WAVE + 2 * k], axis, -math.sin(at))
+            count = put(columns, count, place[WAVE + 2 * k + 1], axis, -math.cos(at))
+    to_p = (q[0], -q[1], -q[2], -q[3])
+    f = rotate(to_p, up)
+    for i in range(3):
+        count = put(columns, count, place[SAG + i], cross(unit(i, 1.0), f), 1.0)
+    w, v = platform_rate(rate_at(read, c[TAU]), c), rotate(to_p, earth)
     return put(columns, count, place[TAU], (w[0] - v[0], w[1] - v[1], w[2] - v[2]), 1.0)
 
 
@@ -256,7 +310,8 @@ def accelerometer_row(i: int, sensed: Sensing, c: Array, place: Places, up: Vect
 def rig_entries(
     i: int, sensed: Sensing, g: Vector, turn: Vector, c: Array, place: Places, row: Row, count: int
 ) -> int:
-    """Put delay, K2 and lever of accelerometer ``i`` into its row behind ``count`` entries; returns their number.
+    """Put delay, K2, lever, walk and warmth of accelerometer ``i`` into its row behind ``count`` entries; returns
+    their number.
 
     ``g`` (3,) are the weights of the specific force, ``turn`` (3,) the derivative by the attitude.
     """
@@ -266,15 +321,25 @@ def rig_entries(
         places[count] = place[TAU + 1]
         values[count] = -(turn[0] * late[0] + turn[1] * late[1] + turn[2] * late[2])
         count += 1
+    signal = g[0] * f[0] + g[1] * f[1] + g[2] * f[2]
     if place[K2 + i] >= 0:
         places[count] = place[K2 + i]
-        values[count] = squared(g[0] * f[0] + g[1] * f[1] + g[2] * f[2], i, c)
+        values[count] = squared(signal, i, c)
         count += 1
     along = centripetal(i, sensed.rate)
     for k in range(3):
         if place[LEVER + 3 * i + k] >= 0:
             places[count], values[count] = place[LEVER + 3 * i + k], (1.0 + c[15 + i]) * along[k]
             count += 1
+    if place[WALK + 3 + i] >= 0:
+        places[count], values[count] = place[WALK + 3 + i], 1.0
+        count += 1
+    if place[WARM + 3 + i] >= 0:
+        places[count], values[count] = place[WARM + 3 + i], sensed.warm
+        count += 1
+    if place[WARM + 6 + i] >= 0:
+        places[count], values[count] = place[WARM + 6 + i], sensed.warm * signal / (1.0 + c[15 + i])
+        count += 1
     return count
 
 

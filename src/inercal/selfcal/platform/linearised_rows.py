@@ -18,7 +18,9 @@ from inercal.selfcal.platform.linearised import (
 )
 from inercal.selfcal.platform.model import (
     Rates,
+    drifting,
     encoders_attitude,
+    force_within,
     on_the_base,
     outputs,
     platform_rate,
@@ -52,14 +54,14 @@ def linearise_rows(
         w, later = steps.rate[k], steps.later[k]
         read = Rates((w[0], w[1], w[2]), (later[0], later[1], later[2]))
         angles = (th[k, 0], th[k, 1], th[k, 2])
-        at = encoders_attitude(angles, read, earth_e, c, world.axes, world.signs)
+        at = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, world.axes, world.signs)
         for i in range(4):
             out.of_encoders[k, i] = at[i]
-        count = encoder_columns(angles, at, read, earth_e, c, place, world.axes, world.signs, columns)
+        count = encoder_columns(angles, at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns)
         for a in range(count):
             for i in range(3):
                 out.by_encoders[k, i, columns.places[a]] = columns.axes[a, i]
-        sensed = sensing((q[k, 0], q[k, 1], q[k, 2], q[k, 3]), read, earth_e, up_e, c)
+        sensed = sensing((q[k, 0], q[k, 1], q[k, 2], q[k, 3]), read, earth_e, up_e, steps.warm[k], c)
         expected = outputs(sensed, c)
         for i in range(3):
             out.expected[k, i] = expected[i]
@@ -75,11 +77,13 @@ def linearise_steps(
     """Put rotation vectors ``turn`` (m, 3) [rad] of the platform against inertial space in each step, and the change
     ``slope`` (m, 3, p) of the attitude ``q`` (m, 4) after it, about the axes of p; ``slope`` comes in as zeros."""
     columns, place = empty_columns(), layout.place
-    earth_e = on_the_base(world.earth, c)
+    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
     for k in range(len(q)):
         w, dt = (steps.rate[k, 0], steps.rate[k, 1], steps.rate[k, 2]), steps.dt[k]
-        rate = platform_rate(w, c)
         at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
+        rate, f = platform_rate(w, c), force_within(at, w, -0.5 * dt, up_e)
+        if len(c) > 24:
+            rate = drifting(rate, f, steps.warm[k], c)
         j = right_jacobian((rate[0] * dt, rate[1] * dt, rate[2] * dt))
         for i in range(3):
             turn[k, i] = rate[i] * dt
@@ -87,7 +91,8 @@ def linearise_steps(
                 slope[k, i, a] = dt * j[i][a]
                 slope[k, i, 6 + a] = dt * j[i][a] * w[(a + 1) % 3]
                 slope[k, i, 9 + a] = -dt * j[i][a] * w[(a + 2) % 3]
-        count = 0 if len(c) <= 18 else dynamics_columns(c, place, Step(w, rate, earth_e, at, dt), columns)
+        step = Step(w, rate, earth_e, at, dt, f, steps.warm[k])
+        count = 0 if len(c) <= 18 else dynamics_columns(c, place, step, columns)
         for a in range(count):
             for i in range(3):
                 slope[k, i, columns.places[a] - 3] = columns.axes[a, i]

@@ -4,10 +4,14 @@ Parameters ``c`` are the full vector of `inercal.selfcal.platform.states`, in th
 of the extended model, or all (K,) with those of the rig. Attitudes are ``q_ep`` against the frame e of the encoders;
 earth rate and gravity in b turn with beta. With the states of the rig
 
-    q_ep = R_i(th_x) qexp(nonorth_xy e_k) R_j(th_y - zero_y) qexp(nonorth_yz e_i) R_k(th_z) qexp(gamma)
+    q_ep = R_i(th_x) qexp(nonorth_xy e_k) R_j(th_y - zero_y) qexp(nonorth_yz e_i) R_k(th_z) qexp(gamma) qexp(sag x f)
 
-for joints about the axes i, j, k of p, and each accelerometer reads ``ka0 + s + K2 s^2 / (1 + ka1)``, s its output
-without them at the specific force ``f + w x (w x r)``, r its place and w the rate against inertial space.
+for joints about the axes i, j, k of p, th the readings without their harmonics, f the specific force in p; each
+accelerometer reads ``ka0 + s + K2 s^2 / (1 + ka1)``, s its output without them at the specific force
+``f + w x (w x r)``, r its place and w the rate against inertial space. Gyros drift by ``G f``.
+
+Biases are ``kg0`` and ``ka0`` in the mean, and walk about them. At another temperature than that of the coefficients
+kg0, ka0 and ka1 change with it.
 
 A sensor that is late by tau reads at t what was at t - tau, in the clock of the rates: a delay that all share is only
 another time. Rates are held from row to row, and the platform has turned since then at the rate before the row, or
@@ -16,14 +20,31 @@ will turn until then at the one after it where tau is negative.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.selfcal.platform.kinematics import Axes, attitude, elementary, joint_axes, nearest_turn
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import ASYM, GAMMA, K2, LEVER, NONORTH, TAU, ZERO_Y
+from inercal.selfcal.platform.states import (
+    ASYM,
+    BY_FORCE,
+    GAMMA,
+    K2,
+    LEVER,
+    NONORTH,
+    SAG,
+    TAU,
+    WALK,
+    WARM,
+    WAVE,
+    ZERO_Y,
+)
 
 
 @kernel
@@ -35,10 +56,28 @@ def platform_rate(w: Vector | Array, c: Array) -> Vector:
     if len(c) > 18:
         x, y, z = x + c[18] * w[0], y + c[19] * w[1], z + c[20] * w[2]
     if len(c) > 24:
-        x += 0.5 * c[ASYM] * abs(w[0])
-        y += 0.5 * c[ASYM + 1] * abs(w[1])
-        z += 0.5 * c[ASYM + 2] * abs(w[2])
+        x += 0.5 * c[ASYM] * abs(w[0]) + c[WALK]
+        y += 0.5 * c[ASYM + 1] * abs(w[1]) + c[WALK + 1]
+        z += 0.5 * c[ASYM + 2] * abs(w[2]) + c[WALK + 2]
     return x, y, z
+
+
+@kernel
+def force_within(q: Quaternion | Array, w: Vector, by: float, up: Vector) -> Vector:
+    """Specific force (3,) [m/s^2] in p at rest, ``by`` [s] after attitude ``q`` at a rate ``w`` (3,) [rad/s]."""
+    return specific_force(multiply((q[0], q[1], q[2], q[3]), exp((by * w[0], by * w[1], by * w[2]))), up)
+
+
+@kernel
+def drifting(rate: Vector, f: Vector, warm: float, c: Array) -> Vector:
+    """A ``rate`` (3,) [rad/s] of the platform with what gyros drift by specific force ``f`` (3,) [m/s^2] and ``warm``
+    [K] above the temperature of the coefficients."""
+    x, y, z = BY_FORCE, BY_FORCE + 3, BY_FORCE + 6
+    return (
+        rate[0] + c[x] * f[0] + c[x + 1] * f[1] + c[x + 2] * f[2] + c[WARM] * warm,
+        rate[1] + c[y] * f[0] + c[y + 1] * f[1] + c[y + 2] * f[2] + c[WARM + 1] * warm,
+        rate[2] + c[z] * f[0] + c[z + 1] * f[1] + c[z + 2] * f[2] + c[WARM + 2] * warm,
+    )
 
 
 @kernel
@@ -106,9 +145,9 @@ def squared(signal: float, i: int, c: Array) -> float:
 
 
 @kernel
-def rig_accelerometers(f: Vector, w: Vector, c: Array) -> Vector:
+def rig_accelerometers(f: Vector, w: Vector, warm: float, c: Array) -> Vector:
     """Outputs (3,) [m/s^2] at specific force ``f`` (3,) at the centre of the gimbals and rate ``w`` (3,) [rad/s]
-    against inertial space, with K2 and levers."""
+    against inertial space, ``warm`` [K] above the temperature of the coefficients, with K2 and levers."""
     by_x, by_y, by_z = centripetal(0, w), centripetal(1, w), centripetal(2, w)
     there = (
         f[0] + by_x[0] * c[LEVER] + by_x[1] * c[LEVER + 1] + by_x[2] * c[LEVER + 2],
@@ -117,38 +156,47 @@ def rig_accelerometers(f: Vector, w: Vector, c: Array) -> Vector:
     )
     x, y, z = accelerometers(there, c)
     return (
-        x + c[K2] * squared(x - c[12], 0, c),
-        y + c[K2 + 1] * squared(y - c[13], 1, c),
-        z + c[K2 + 2] * squared(z - c[14], 2, c),
+        x + _beside(x - c[12], 0, warm, c),
+        y + _beside(y - c[13], 1, warm, c),
+        z + _beside(z - c[14], 2, warm, c),
     )
+
+
+@kernel
+def _beside(signal: float, i: int, warm: float, c: Array) -> float:
+    """Output [m/s^2] of accelerometer ``i`` beside the linear one, at its ``signal`` [m/s^2] without bias."""
+    by_temperature = c[WARM + 3 + i] + c[WARM + 6 + i] * signal / (1.0 + c[15 + i])
+    return float(c[K2 + i] * squared(signal, i, c) + c[WALK + 3 + i] + warm * by_temperature)
 
 
 class Sensing(NamedTuple):
     """The platform as its accelerometers sense it at a row: specific ``force`` (3,) [m/s^2] at the centre of the
     gimbals, in p of the ``attitude`` (4,) then; its ``rate`` (3,) [rad/s] against inertial space and the one
-    ``over_base``."""
+    ``over_base``; how ``warm`` [K] it is, above the temperature of the coefficients."""
 
     force: Vector
     attitude: Quaternion
     rate: Vector
     over_base: Vector
+    warm: float
 
 
 @kernel
-def sensing(q: Quaternion, read: Rates, earth: Vector, up: Vector, c: Array) -> Sensing:
+def sensing(q: Quaternion, read: Rates, earth: Vector, up: Vector, warm: float, c: Array) -> Sensing:
     """The platform as accelerometers late by tau_a sense it at a row of attitude ``q``."""
     if len(c) > 24:
-        return sensing_late(q, read, earth, up, c)
-    return Sensing(specific_force(q, up), q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        return sensing_late(q, read, earth, up, warm, c)
+    return Sensing(specific_force(q, up), q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
 @kernel
-def sensing_late(q: Quaternion, read: Rates, earth: Vector, up: Vector, c: Array) -> Sensing:
+def sensing_late(q: Quaternion, read: Rates, earth: Vector, up: Vector, warm: float, c: Array) -> Sensing:
     """`sensing` with a delay."""
     rate = platform_rate(rate_at(read, c[TAU + 1]), c)
     then = propagate(q, rate, earth, -c[TAU + 1])
     v = specific_force(then, earth)
-    return Sensing(specific_force(then, up), then, rate, (rate[0] - v[0], rate[1] - v[1], rate[2] - v[2]))
+    over_base = (rate[0] - v[0], rate[1] - v[1], rate[2] - v[2])
+    return Sensing(specific_force(then, up), then, rate, over_base, warm)
 
 
 @kernel
@@ -156,7 +204,7 @@ def outputs(sensed: Sensing, c: Array) -> Vector:
     """Outputs (3,) [m/s^2] of the accelerometers."""
     if len(c) <= 24:
         return accelerometers(sensed.force, c)
-    return rig_accelerometers(sensed.force, sensed.rate, c)
+    return rig_accelerometers(sensed.force, sensed.rate, sensed.warm, c)
 
 
 @kernel
@@ -169,12 +217,44 @@ def joints_attitude(th: Vector | Array, c: Array, axes: Axes, signs: Array) -> Q
 
 
 @kernel
+def sagging(q: Quaternion, up: Vector, c: Array) -> Vector:
+    """Turn (3,) [rad] of the sensors on a platform of attitude ``q``, which gravity bends: sag x f."""
+    f = specific_force(q, up)
+    x, y, z = c[SAG], c[SAG + 1], c[SAG + 2]
+    return y * f[2] - z * f[1], z * f[0] - x * f[2], x * f[1] - y * f[0]
+
+
+@kernel
+def without_harmonics(th: Vector | Array, c: Array, waves: NDArray[np.int64]) -> Vector:
+    """Angles (3,) [rad] without the harmonics of encoders that read ``th`` (3,) [rad]; ``waves`` as of a layout."""
+    x, y, z = th[0], th[1], th[2]
+    for k in range(len(waves)):
+        joint, at = waves[k, 0], waves[k, 1] * th[waves[k, 0]]
+        error = c[WAVE + 2 * k] * math.sin(at) + c[WAVE + 2 * k + 1] * math.cos(at)
+        if joint == 0:
+            x -= error
+        elif joint == 1:
+            y -= error
+        else:
+            z -= error
+    return x, y, z
+
+
+@kernel
 def encoders_attitude(
-    th: Vector | Array, read: Rates, earth: Vector, c: Array, axes: Axes, signs: Array
+    th: Vector | Array,
+    read: Rates,
+    earth: Vector,
+    up: Vector,
+    c: Array,
+    waves: NDArray[np.int64],
+    axes: Axes,
+    signs: Array,
 ) -> Quaternion:
     """Attitude of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc."""
     if len(c) > 24:
-        q = joints_attitude(th, c, axes, signs)
+        q = joints_attitude(without_harmonics(th, c, waves), c, axes, signs)
+        q = multiply(q, exp(sagging(q, up, c)))
         return propagate(q, platform_rate(rate_at(read, c[TAU]), c), earth, c[TAU])
     return attitude(th, axes, signs)
 
@@ -222,12 +302,15 @@ class Truth(NamedTuple):
 
 
 @kernel
-def simulate_truth(q0: Array, w: Array, dt: float, noise: Array, c: Array, world: World, out: Truth) -> None:
+def simulate_truth(
+    q0: Array, w: Array, dt: float, noise: Array, warm: Array, c: Array, world: World, out: Truth
+) -> None:
     """True attitudes and readings, integrated at finer steps of ``dt`` [s], m between rows.
 
     ``q0`` (4,) attitude at the first row; ``w`` (n - 1, m, 3) [rad/s] at which the platform is commanded to turn and
-    ``noise`` (n - 1, m, 3) [rad/s] of the gyros in each finer step; ``c`` full vector, linear form. Readings ``th``
-    are made of the states of the rig alone, from nominal angles that stand there; else they stay as they are.
+    ``noise`` (n - 1, m, 3) [rad/s] of the gyros in each finer step; ``warm`` (n,) [K] above the temperature of the
+    coefficients; ``c`` full vector, linear form. Readings ``th`` are made of the states of the rig alone, from nominal
+    angles that stand there; else they stay as they are.
     """
     q, acc, th = out
     at = (q0[0], q0[1], q0[2], q0[3])
@@ -236,7 +319,10 @@ def simulate_truth(q0: Array, w: Array, dt: float, noise: Array, c: Array, world
     for k in range(len(q)):
         if k > 0:
             for j in range(m):
-                rate = platform_rate((w[k - 1, j, 0], w[k - 1, j, 1], w[k - 1, j, 2]), c)
+                commanded = (w[k - 1, j, 0], w[k - 1, j, 1], w[k - 1, j, 2])
+                rate = platform_rate(commanded, c)
+                if len(c) > 24:
+                    rate = drifting(rate, force_within(at, commanded, 0.5 * dt, up_e), warm[k - 1], c)
                 noisy = (
                     rate[0] + noise[k - 1, j, 0],
                     rate[1] + noise[k - 1, j, 1],
@@ -251,9 +337,11 @@ def simulate_truth(q0: Array, w: Array, dt: float, noise: Array, c: Array, world
             after = platform_rate((w[first, 0, 0], w[first, 0, 1], w[first, 0, 2]), c)
             of_acc, of_enc = before if c[TAU + 1] >= 0.0 else after, before if c[TAU] >= 0.0 else after
             then = propagate(at, of_acc, earth_e, -c[TAU + 1])
-            read = rig_accelerometers(specific_force(then, up_e), of_acc, c)
+            read = rig_accelerometers(specific_force(then, up_e), of_acc, warm[k], c)
             near = (th[k, 0], th[k, 1], th[k, 2])
-            angles = encoders_read(propagate(at, of_enc, earth_e, -c[TAU]), near, c, world)
+            seen = propagate(at, of_enc, earth_e, -c[TAU])
+            bent = sagging(seen, up_e, c)
+            angles = encoders_read(multiply(seen, exp((-bent[0], -bent[1], -bent[2]))), near, c, world)
             for i in range(3):
                 th[k, i] = nearest_turn(angles[i], near[i])
         for i in range(4):

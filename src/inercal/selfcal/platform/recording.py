@@ -16,13 +16,14 @@ from inercal.units import Quantity
 class Steps(NamedTuple):
     """Rates and measurements of m steps, as kernels take them: ``dt`` (m,) [s]; ``rate`` (m, 3) [rad/s], held over each
     step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not; ``later`` (m, 3)
-    [rad/s] the rate of the step after it."""
+    [rad/s] the rate of the step after it; ``warm`` (m,) [K] at its end, above the temperature of the coefficients."""
 
     dt: Array
     rate: Array
     acc: Array
     th: Array
     later: Array
+    warm: Array
 
     def part(self, steps: slice) -> Steps:
         """Some of the steps."""
@@ -38,7 +39,8 @@ class Recording:
     each step, the step itself if None. ``th`` (n, 3) [rad] gimbal angles, continuous through full
     turns, the first row complete; ``acc`` (n, 3) [m/s^2], the first row not used. ``held``: steps whose rate was not
     recorded (`inercal.selfcal.filters.gaps`). ``temperature``: mean and standard deviation of the recorded one.
-    ``reference`` (n, 4) q_bp by another instrument, or the truth of a simulation.
+    ``reference`` (n, 4) q_bp by another instrument, or the truth of a simulation. ``warm`` (n,) [K] above the
+    temperature of the coefficients; None where it was not recorded.
     """
 
     t: Array
@@ -52,6 +54,7 @@ class Recording:
     temperature: Quantity | None = None
     walked: Array | None = None
     reference: Array | None = None
+    warm: Array | None = None
 
     @property
     def dt(self) -> Array:
@@ -62,7 +65,8 @@ class Recording:
     def steps(self) -> Steps:
         """The n - 1 steps from row to row."""
         rate = self.rate
-        return Steps(self.dt, rate, self.acc[1:], self.th[1:], np.vstack([rate[1:], rate[-1:]]))
+        warm = np.zeros(len(rate)) if self.warm is None else self.warm[1:]
+        return Steps(self.dt, rate, self.acc[1:], self.th[1:], np.vstack([rate[1:], rate[-1:]]), warm)
 
     @property
     def walking(self) -> Array:

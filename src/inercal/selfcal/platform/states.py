@@ -11,7 +11,7 @@ than it is needed: 18, 24 or K numbers.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -44,6 +44,8 @@ _CHAIN = (
     "R. Paul, Robot Manipulators, MIT Press (1981): a chain of turns, each axis turned against the one before"
 )
 _DELAY = "J. Kelly, G. S. Sukhatme, A general framework for temporal calibration, ISER 2010: delays as states"
+_MARKOV = "A. Gelb (editor), Applied Optimal Estimation, MIT Press (1974), section 3.8: exponentially correlated errors"
+_WARM = "IEEE Std 952 and 1293: coefficients of temperature"
 _IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
 
 STATES: Final[Mapping[str, State]] = {
@@ -94,8 +96,45 @@ STATES: Final[Mapping[str, State]] = {
         "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
+    "g_sensitivity": State(
+        tuple(f"G_{i}{j}" for i in "xyz" for j in "xyz"), "(rad/s)/(m/s^2)", "rate by force", "0.02 deg/h/g",
+        "0(0.02) deg/h/g", "drift of gyro x, y, z per specific force along x, y, z", "g_sensitivity",
+        "IEEE Std 952: acceleration-sensitive drift",
+    ),
+    "sag": State(
+        _by_axis("sag"), "rad/(m/s^2)", "angle by force", "2 arcsec/g", "0(2) arcsec/g",
+        "elastic turn of the sensors on the platform per specific force, by a mass off the centre along x, y, z",
+        "sag", "Hooke's law",
+    ),
+    "kg0_T1": State(
+        tuple(f"kg0_{i}_T1" for i in "xyz"), "rad/s/K", "rate by temperature", "0.02 deg/h/K", "0(0.02) deg/h/K",
+        "gyro biases per kelvin", "kg0_T1", _WARM,
+    ),
+    "ka0_T1": State(
+        tuple(f"ka0_{i}_T1" for i in "xyz"), "m/s^2/K", "acceleration by temperature", "50 ug/K", "0(50) ug/K",
+        "accelerometer biases per kelvin", "ka0_T1", _WARM,
+    ),
+    "ka1_T1": State(
+        tuple(f"ka1_{i}_T1" for i in "xyz"), "1/K", "number by temperature", "20 ppm/K", "0(20) ppm/K",
+        "accelerometer scale errors per kelvin", "ka1_T1", _WARM,
+    ),
+    "harmonics": State(
+        tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "rad", "angle", "5 arcsec",
+        "0(5) arcsec", "errors of the encoders that repeat with their angle, sine and cosine part of each, in the "
+        "order of the study, or orders 1 and 2 of th_x, th_y, th_z", "harmonics",
+        "eccentric and elliptic circles of textbooks on surveying instruments",
+    ),
+    "gyro_walk": State(
+        _by_axis("kg0_walk"), "rad/s", "rate", "0.0005 deg/h", "0.0005 deg/h",
+        "gyro biases at the last row, less their means kg0", source=_MARKOV,
+    ),
+    "accelerometer_walk": State(
+        _by_axis("ka0_walk"), "m/s^2", "acceleration", "1.9 ug", "1.9 ug",
+        "accelerometer biases at the last row, less their means ka0", source=_MARKOV,
+    ),
 }  # fmt: skip
-"""Name of a kind -> its states; the first six are the paper's, the next two the extended model's."""
+"""Name of a kind -> its states; the first six are the paper's, the next two the extended model's. The last two change
+with time: an estimator without them has the same states before."""
 
 ALL: Final[tuple[str, ...]] = tuple(name for state in STATES.values() for name in state.parameters)
 """Names of the full vector, in order."""
@@ -112,10 +151,24 @@ KIND_OF: Final[Mapping[str, str]] = {
 
 PAPER: Final[tuple[str, ...]] = tuple(STATES)[:6]
 EXTENDED_MODEL: Final[tuple[str, ...]] = tuple(STATES)[:8]
-RIG: Final[tuple[str, ...]] = (*EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay")
+TEMPERATURE: Final[tuple[str, ...]] = ("kg0_T1", "ka0_T1", "ka1_T1")
+BIAS_WALK: Final[tuple[str, ...]] = ("gyro_walk", "accelerometer_walk")
+RIG: Final[tuple[str, ...]] = (
+    *EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay", *BIAS_WALK,
+)  # fmt: skip
 
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {"paper": PAPER, "extended": EXTENDED_MODEL, "rig": RIG}
 """Word for a set of states -> their kinds."""
+
+ADDED: Final[Mapping[str, tuple[str, ...]]] = {
+    kind: (kind,) for kind, state in STATES.items() if state.key and kind not in TEMPERATURE
+} | {"temperature": TEMPERATURE, "bias_walk": BIAS_WALK}
+"""Additions to such a set -> their kinds."""
+
+USUAL_WAVES: Final = tuple((joint, order) for joint in range(3) for order in (1, 2))
+"""Joint and order of harmonics where the study names none."""
+
+MOST_WAVES: Final = len(STATES["harmonics"].parameters) // 2
 
 GAMMA: Final = ALL.index("gamma_x")
 NONORTH: Final = ALL.index("nonorth_xy")
@@ -124,24 +177,34 @@ TAU: Final = ALL.index("tau_enc")
 K2: Final = ALL.index("K2_x")
 LEVER: Final = ALL.index("r_xx")
 ASYM: Final = ALL.index("S_asym_x")
-"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer."""
+BY_FORCE: Final = ALL.index("G_xx")
+SAG: Final = ALL.index("sag_x")
+WARM: Final = ALL.index("kg0_x_T1")
+WAVE: Final = ALL.index("harmonic_1_sin")
+WALK: Final = ALL.index("kg0_walk_x")
+"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; by temperature
+kg0, ka0, ka1; of harmonics a sine and a cosine of each; of walks gyros, accelerometers."""
 
 
 class Layout(NamedTuple):
     """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
-    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states."""
+    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states; ``waves``
+    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0."""
 
     chosen: NDArray[np.int64]
     place: NDArray[np.int64]
     stated: Array
+    waves: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class StateVector:
-    """States of an estimator: their ``names``, and the ``stated`` (K,) full vector of what is not estimated."""
+    """States of an estimator: their ``names``, the ``stated`` (K,) full vector of what is not estimated, and joint and
+    order of each of the ``harmonics``."""
 
     names: tuple[str, ...]
     stated: Array
+    harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -155,13 +218,26 @@ class StateVector:
         place[index] = 3 + np.arange(len(index))
         longest = max(int(index.max(initial=-1)), int(np.flatnonzero(self.stated).max(initial=-1)))
         size = next(size for size in (18, 24, len(ALL)) if longest < size)
-        return Layout(index, place, self.stated[:size].copy())
+        slots = slice(WAVE, WAVE + 2 * len(self.harmonics))
+        used = (place[slots] >= 0).any() or self.stated[slots].any()
+        waves = np.array(self.harmonics if used else (), dtype=np.int64).reshape(-1, 2)
+        return Layout(index, place, self.stated[:size].copy(), waves)
 
     def full(self, c: Array) -> Array:
         """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
         whole = self.layout.stated.copy()
         whole[self.layout.chosen] = c
         return whole
+
+    @cached_property
+    def walks(self) -> NDArray[np.bool_]:
+        """(p,) true of states that change with time."""
+        return self.index >= WALK
+
+    @property
+    def without_walks(self) -> StateVector:
+        """The states that are constant."""
+        return replace(self, names=tuple(name for name in self.names if ALL.index(name) < WALK))
 
     @property
     def of_rig(self) -> bool:
@@ -191,8 +267,12 @@ def twins(kinds: Sequence[str], fixed: Sequence[int]) -> tuple[str, ...]:
 
 
 def state_vector(
-    kinds: Sequence[str], stated: Array | None = None, left_out: Sequence[str] = ()
+    kinds: Sequence[str],
+    stated: Array | None = None,
+    left_out: Sequence[str] = (),
+    harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES,
 ) -> StateVector:
-    """The states of some kinds, in the order of the table, but those ``left_out``."""
-    names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in left_out)
-    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated)
+    """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named."""
+    without = {*left_out, *ALL[WAVE + 2 * len(harmonics) : WALK]}
+    names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in without)
+    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated, harmonics)

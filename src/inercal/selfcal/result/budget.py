@@ -20,7 +20,7 @@ from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF
+from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF, WAVE
 from inercal.selfcal.result.systematic import systematic_inputs
 from inercal.selfcal.settings import Noise, SelfcalSettings
 from inercal.units import parse_quantity, parse_unit
@@ -61,7 +61,8 @@ def considered(
     assert filtered.history is not None
     of = problem(settings)
     known = {*of.names, *settings.model.left_out}
-    left = [name for name in ALL[18:] if name not in known and KIND_OF[name] != "beta"]
+    named = ALL[18 : WAVE + 2 * len(of.states.harmonics)]
+    left = [name for name in named if name not in known and KIND_OF[name] != "beta"]
     along = filtered.history.attitude, filtered.coefficients
     by_linear = sensitivities(recording, of, *along, left, restarts=filtered.restarts)
     slopes = product_slope(filtered.coefficients) @ by_linear

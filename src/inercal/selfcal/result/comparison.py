@@ -77,13 +77,14 @@ def of_attitude(filtered: FilterResult, reference: Array | None) -> dict[str, An
 
 def differing(filtered: FilterResult, others: Mapping[FilterKind, FilterResult]) -> list[Finding]:
     """``estimators_differ``: the batch estimator, which linearises all rows where it ends, is far from the one that
-    counts. Not of ``lm``, which weighs the noise of the gyros otherwise, and says so by its u."""
+    counts. Not of ``lm``, which weighs the noise of the gyros otherwise, and says so by its u, nor of other states."""
     batch = others.get("map")
     if batch is None or not (batch.converged and filtered.converged) or filtered.kind == "lm":
         return []
+    if batch.names != filtered.names:
+        return []
     values, u = product_form(filtered)
-    p = min(len(values), len(batch.coefficients))
-    apart = np.abs(product_form(batch)[0][:p] - values[:p]) / u[:p]
+    apart = np.abs(product_form(batch)[0] - values) / u
     far = np.flatnonzero(apart > LIMITS.estimators_apart)
     if not far.size:
         return []

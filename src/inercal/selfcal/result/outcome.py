@@ -29,7 +29,7 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES, product_slope, to_product, units
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF
+from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, KIND_OF, STATES, UNIT_OF
 from inercal.selfcal.result.budget import considered, systematic, within
 from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import SelfcalSettings
@@ -176,7 +176,9 @@ def assemble(
 def _on_rig(kinds: Sequence[str]) -> str:
     """States of the rig in words."""
     named = [
-        f"{', '.join(STATES[kind].parameters)}: {STATES[kind].words}" for kind in kinds if STATES[kind].key
+        f"{', '.join(STATES[kind].parameters)}: {STATES[kind].words}"
+        for kind in kinds
+        if kind not in EXTENDED_MODEL
     ]
     return "".join(f"; {each}" for each in named)
 
@@ -262,7 +264,11 @@ def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str,
 def _left_at_prior(judged: Observability, hints: Mapping[str, str]) -> list[Finding]:
     """Coefficients of which more than half of the prior is left."""
     ratio = dict(zip(judged.learned.names, judged.learned.ratio, strict=True))
-    texts = {name: f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left" for name in judged.at_prior}
+    texts = {
+        name: f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left"
+        for name in judged.at_prior
+        if KIND_OF[name] not in BIAS_WALK  # no recording tells more of them
+    }
     return _hinted("at_prior", texts, hints)
 
 
@@ -288,7 +294,7 @@ def _hidden(
     """Coefficients that the path shows, but a systematic input hides: u over prior, and why."""
     hidden = {}
     for name, left in zip(judged.learned.names, ratio, strict=True):
-        if left > HALF_SEEN and name not in judged.at_prior:
+        if left > HALF_SEEN and name not in judged.at_prior and KIND_OF[name] not in BIAS_WALK:
             source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
             why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
             hidden[name] = (float(left), why)

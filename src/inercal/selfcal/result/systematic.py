@@ -10,7 +10,7 @@ from typing import Any
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import Hypothesis
 from inercal.selfcal.diagnosis.fit_quality import Case
-from inercal.selfcal.platform.states import UNIT_OF, StateVector
+from inercal.selfcal.platform.states import UNIT_OF
 from inercal.selfcal.settings import SelfcalSettings
 
 
@@ -114,7 +114,7 @@ def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
                     stated = stated + there.states.stated - settings.states.stated
                 else:
                     earth, up = earth + there.world.earth - here.earth, up + there.world.up - here.up
-        vector = StateVector(problem.names, stated)
+        vector = replace(problem.states, stated=stated)
         world = problem.world._replace(earth=earth, up=up)
         return recording, replace(problem, world=world, vector=vector)
 

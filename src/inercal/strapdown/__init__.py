@@ -1,0 +1,1 @@
+"""System-level calibration of a strapdown unit from rests and coarse turns, without a precise table."""

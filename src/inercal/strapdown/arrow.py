@@ -1,0 +1,257 @@
+"""Normal equations of a chain of nodes, solved from the first to the last and back (block elimination).
+
+Each node has m errors of its state, nodes of one rest share three angles of its reference attitude, and all share the p
+coefficients: an arrow. Of each interval four blocks are at hand, [x_k (m), angles (3), x_k+1 (m), coefficients (p)];
+when the rows of interval and node are in, the first is eliminated, with the angles where the rest ends.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal._jit import kernel
+from inercal.arrays import Array
+
+
+class Chain(NamedTuple):
+    """The rows of a chain, linearised: x_k+1 - F x_k - G c = e + noise of information W, and at the nodes.
+
+    ``F`` (k, m, m), ``G`` (k, m, p), ``e`` (k, m), ``W`` (k, m, m) of intervals; ``rest`` (k + 1,) number of the rest
+    of each node; velocity ``v`` (k + 1, 3), which is 0 with information ``velocity``; ``angles`` (k + 1, 3) [rad] of
+    the attitude against the reference of its rest with information ``attitude``, 0 for none; ``start`` (m,) information
+    and ``begin`` (m,) deviation of the first node; ``prior`` (p,) information and ``c`` (p,) deviation of coefficients.
+    """
+
+    F: Array
+    G: Array
+    e: Array
+    W: Array
+    rest: NDArray[np.int64]
+    v: Array
+    velocity: float
+    angles: Array
+    attitude: float
+    start: Array
+    begin: Array
+    prior: Array
+    c: Array
+
+
+@kernel
+def eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
+    """Eliminate the first ``count`` unknowns from H x = g, in place; ``gone`` is used up. Of H only the upper triangle
+    is used."""
+    n = len(g)
+    for i in range(count):
+        gone[i] = 1.0
+        for j in range(n):
+            if gone[j] == 0.0 and H[i, j] != 0.0:
+                by = H[i, j] / H[i, i]
+                g[j] -= by * g[i]
+                for k in range(j, n):
+                    H[j, k] -= by * H[i, k]
+
+
+@kernel
+def add_interval(chain: Chain, k: int, m: int, H: Array, g: Array, row: Array, weighted: Array) -> None:
+    """Add the rows of interval k to H and g."""
+    n = len(g)
+    for a in range(m):
+        for j in range(n):
+            row[a, j] = 0.0
+        for b in range(m):
+            row[a, b] = -chain.F[k, a, b]
+        row[a, m + 3 + a] = 1.0
+        for b in range(n - 2 * m - 3):
+            row[a, 2 * m + 3 + b] = -chain.G[k, a, b]
+    for a in range(m):
+        for j in range(n):
+            total = 0.0
+            for b in range(m):
+                total += chain.W[k, a, b] * row[b, j]
+            weighted[a, j] = total
+    for j in range(n):
+        for a in range(m):
+            g[j] += weighted[a, j] * chain.e[k, a]
+            if row[a, j] != 0.0:
+                for i in range(n):
+                    H[j, i] += row[a, j] * weighted[a, i]
+
+
+@kernel
+def add_node(chain: Chain, k: int, at: int, m: int, H: Array, g: Array) -> None:
+    """Add the rows of node k, whose state begins ``at``, to H and g."""
+    for i in range(3):
+        H[at + 3 + i, at + 3 + i] += chain.velocity
+        g[at + 3 + i] -= chain.velocity * chain.v[k, i]
+        if chain.attitude > 0.0:
+            a, b = at + i, m + i
+            H[a, a] += chain.attitude
+            H[b, b] += chain.attitude
+            H[a, b] -= chain.attitude
+            H[b, a] -= chain.attitude
+            g[a] -= chain.attitude * chain.angles[k, i]
+            g[b] += chain.attitude * chain.angles[k, i]
+
+
+@kernel
+def cleared(H: Array, g: Array, begin: int, end: int) -> None:
+    """Forget what H and g say of the unknowns from ``begin`` to below ``end``."""
+    for i in range(begin, end):
+        g[i] = 0.0
+        for j in range(len(g)):
+            H[i, j] = H[j, i] = 0.0
+
+
+@kernel
+def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
+    """Put the next node in the place of the one that was eliminated, with its angles where the rest ``ends``."""
+    n, by = len(g), m + 3
+    cleared(H, g, 0, m + 3 if ends else m)
+    for i in range(m):
+        for j in range(i, m):
+            H[i, j] = H[by + i, by + j]
+        for j in range(m, by):
+            H[i, j] = H[j, by + i]
+        for j in range(2 * m + 3, n):
+            H[i, j] = H[by + i, j]
+        g[i] = g[by + i]
+    cleared(H, g, by, by + m)
+
+
+@kernel
+def begun(chain: Chain, m: int, H: Array, g: Array) -> None:
+    """Set H and g to what is known of the first node and of the coefficients beforehand."""
+    n = len(g)
+    cleared(H, g, 0, n)
+    for i in range(m):
+        H[i, i] = chain.start[i]
+        g[i] = -chain.start[i] * chain.begin[i]
+    at = 2 * m + 3
+    for i in range(n - at):
+        H[at + i, at + i] = chain.prior[i]
+        g[at + i] = -chain.prior[i] * chain.c[i]
+
+
+@kernel
+def kept(H: Array, g: Array, rows: Array, right: Array) -> None:
+    """Copy the first rows of H and g to ``rows`` and ``right``."""
+    for i in range(len(right)):
+        right[i] = g[i]
+        for j in range(len(g)):
+            rows[i, j] = H[i, j]
+
+
+@kernel
+def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None:
+    """Eliminate all nodes: ``H`` (n, n) and ``g`` (n,), n = 2 m + 3 + p, end with the coefficients alone; ``rows``
+    (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts."""
+    m, n, count = chain.F.shape[1], len(g), len(chain.rest)
+    gone, row, weighted = np.zeros(n), np.zeros((m, n)), np.zeros((m, n))
+    begun(chain, m, H, g)
+    for k in range(count):
+        starts = k == 0 or chain.rest[k] != chain.rest[k - 1]
+        ends = k == count - 1 or chain.rest[k + 1] != chain.rest[k]
+        if starts:
+            add_node(chain, k, 0, m, H, g)
+        for i in range(n):
+            gone[i] = 0.0
+        if k < count - 1:
+            add_interval(chain, k, m, H, g, row, weighted)
+            if not ends:
+                add_node(chain, k + 1, m + 3, m, H, g)
+        eliminate(H, g, m + 3 if ends and chain.attitude > 0.0 else m, gone)
+        kept(H, g, rows[k], right[k])
+        moved_on(H, g, m, ends)
+
+
+@kernel
+def backward(rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Array, angles: Array) -> None:
+    """Errors ``x`` (k + 1, m) of the nodes, and ``angles`` (k + 1, 3) of the references, of those of the coefficients
+    ``c`` (p,)."""
+    m = x.shape[1]
+    n = rows.shape[2]
+    z = np.zeros(n)
+    for k in range(len(rest) - 1, -1, -1):
+        last = k == len(rest) - 1
+        ends = last or rest[k + 1] != rest[k]
+        for i in range(m):
+            z[m + 3 + i] = 0.0 if last else x[k + 1, i]
+        for i in range(3):
+            z[m + i] = 0.0 if ends else angles[k + 1, i]
+        for i in range(n - 2 * m - 3):
+            z[2 * m + 3 + i] = c[i]
+        for i in range(m + 2, -1, -1):
+            if i >= m and not (ends and rows[k, i, i] > 0.0):
+                continue
+            total = right[k, i]
+            for j in range(i + 1, n):
+                total -= rows[k, i, j] * z[j]
+            z[i] = total / rows[k, i, i]
+        for i in range(m):
+            x[k, i] = z[i]
+        for i in range(3):
+            angles[k, i] = z[m + i]
+
+
+@kernel
+def completed(row: Array, i: int, Z: Array) -> None:
+    """Covariances ``Z`` (n, n) of unknown i with those behind it, of its ``row`` (n,) at elimination."""
+    n = len(row)
+    for j in range(i + 1, n):
+        total = 0.0
+        for k in range(i + 1, n):
+            total -= row[k] * Z[k, j]
+        Z[i, j] = Z[j, i] = total / row[i]
+    total = 1.0
+    for k in range(i + 1, n):
+        total -= row[k] * Z[i, k]
+    Z[i, i] = total / row[i]
+
+
+@kernel
+def explained(chain: Chain, k: int, m: int, Z: Array, row: Array) -> float:
+    """Part of the m rows of interval k that the unknowns of covariance ``Z`` (n, n) follow: the trace of W A Z A^T."""
+    n, total = len(Z), 0.0
+    for b in range(m):
+        for j in range(n):
+            # column j of A Z, row b
+            value = Z[m + 3 + b, j]
+            for i in range(m):
+                value -= chain.F[k, b, i] * Z[i, j]
+            for i in range(n - 2 * m - 3):
+                value -= chain.G[k, b, i] * Z[2 * m + 3 + i, j]
+            row[j] = value
+        for a in range(m):
+            value = row[m + 3 + a]
+            for i in range(m):
+                value -= chain.F[k, a, i] * row[i]
+            for i in range(n - 2 * m - 3):
+                value -= chain.G[k, a, i] * row[2 * m + 3 + i]
+            total += chain.W[k, a, b] * value
+    return total
+
+
+@kernel
+def followed(chain: Chain, rows: Array, Z: Array, out: Array) -> None:
+    """Numbers ``out`` (k,) of degrees of freedom of each interval that the solution follows; ``Z`` (n, n) begins with
+    the covariance (p, p) of the coefficients at its end and zeros before."""
+    m, n = chain.F.shape[1], len(Z)
+    row = np.zeros(n)
+    for k in range(len(chain.rest) - 1, -1, -1):
+        last = k == len(chain.rest) - 1
+        ends = last or chain.rest[k + 1] != chain.rest[k]
+        first = m + 2 if ends and chain.attitude > 0.0 else m - 1
+        for i in range(first, -1, -1):
+            completed(rows[k, i], i, Z)
+        if not last:
+            out[k] = explained(chain, k, m, Z, row)
+        for i in range(m):
+            for j in range(m, n):
+                if j < m + 3 or j >= 2 * m + 3:
+                    Z[m + 3 + i, j] = Z[j, m + 3 + i] = Z[i, j]
+            for j in range(m):
+                Z[m + 3 + i, m + 3 + j] = Z[i, j]

@@ -1,0 +1,69 @@
+"""Thresholds of the judgement of a strapdown unit, in SI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds, in SI where nothing else is said."""
+
+    uneven: float = 0.5
+    """Part of the sample interval by which a step of time may differ from it."""
+
+    window: float = 0.5
+    """Window [s] in which rate and force must be still at a rest."""
+
+    quiet_share: float = 0.1
+    """Share of the windows, the quietest, that tells the noise at rest."""
+
+    restless_ratio: float = 4.0
+    """Standard deviation in a window, over that of the quietest, from which the unit moves."""
+
+    least_scatter: float = math.radians(0.02)
+    """Standard deviation of the rate [rad/s] that is no motion, however quiet the rest is."""
+
+    least_shake: float = 0.02
+    """The same of the force [m/s^2]."""
+
+    resting_rate: float = math.radians(0.5)
+    """Rate [rad/s], less that of the quietest windows, from which the unit turns: g-sensitivity of cheap gyros stays
+    below."""
+
+    shortest_rest: float = 1.2
+    """Shortest rest [s], without margins."""
+
+    fewest_rests: int = 5
+    """Rests at least."""
+
+    off_gravity: float = 0.5
+    """Part of gravity by which the size of the force at rest may differ from it: beyond, units are wrong."""
+
+    block_samples: int = 10
+    """Samples at most in a block over which sensitivities are taken at once."""
+
+    block_angle: float = math.radians(2.0)
+    """Angle [rad] at most by which the unit turns in such a block."""
+
+    start_tilt: float = math.radians(1.0)
+    """Standard deviation [rad] of the first attitude about level axes."""
+
+    start_heading: float = math.radians(5.0)
+    """The same about the vertical where it was found from earth rate."""
+
+    step: float = 0.02
+    """Largest step, over the standard uncertainties of the coefficients, at which the iteration ends."""
+
+    near: float = 30.0
+    """Length of a step, over the standard uncertainties, from which on steps that follow each other are summed."""
+
+    iterations: int = 30
+    """Steps at most."""
+
+    risk: float = 1e-4
+    """Probability by chance of the largest chi-square that still agrees with the model."""
+
+
+LIMITS = Limits()

@@ -1,0 +1,257 @@
+"""The estimate of a strapdown unit: coefficients in the stated form, covariance, budget and verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.basis import Basis, conditions_of, studied
+from inercal.estimate.budget import TypeB, combine
+from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
+from inercal.estimate.result import Estimate
+from inercal.findings import Finding, Status
+from inercal.geometry.rotations import conjugate, log, multiply
+from inercal.instruments.terms import TERMS
+from inercal.records.dwells import Dwell
+from inercal.records.places import counted, counted_names
+from inercal.records.record import Record, recorded_temperature
+from inercal.strapdown.batch import Fit
+from inercal.strapdown.budget import sources
+from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, group_of, names, slope, stated
+from inercal.strapdown.limits import LIMITS
+from inercal.strapdown.samples import Samples
+from inercal.strapdown.settings import StrapdownSettings
+
+COMMAND = "calibrate strapdown"
+
+FRAMES = {
+    "upper": "b, of the instrument: z along the input axis of accelerometer z, y in the plane of those of y and z; "
+    "origin at accelerometer z",
+    "lower": "b, of the instrument: x along the input axis of accelerometer x, y in the plane of those of x and y; "
+    "origin at accelerometer z",
+}
+
+MODEL = (
+    "y_a = K1 (M fs + K2 fs^2) + K0, fs_i = (f + W r_i)_i at the time t - tau_a, W = [w' x] + [w x][w x]; "
+    "y_g = S (T w + S_asym/2 |w|) + G f + D_F; f and w are specific force and inertial rate at the origin of b, M and "
+    "T have diagonals of 1, r_z = 0. At rest the velocity is zero, attitude and velocity are carried through all "
+    "samples."
+)
+
+REFERENCES = (
+    "P. G. Savage, Strapdown inertial navigation integration algorithm design, J. Guidance, Control, and Dynamics 21 "
+    "(1998) 19 and 208",
+    "D. H. Titterton, J. L. Weston, Strapdown inertial navigation technology, second edition, IEE 2004",
+    "B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, Bundle adjustment - a modern synthesis, LNCS 1883 (2000)",
+    "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
+)
+
+
+def assemble(
+    record: Record, samples: Samples, rests: tuple[Dwell, ...], fit: Fit, settings: StrapdownSettings
+) -> Estimate:
+    """Put the estimate together."""
+    terms, outputs = settings.terms, _outputs(record)
+    found = names(terms, settings.frame)
+
+    def in_words(free: Array) -> Array:
+        c = fit.c.copy()
+        c[fit.free] = free
+        return stated(c, terms, settings.frame, outputs)
+
+    values, J = in_words(fit.c[fit.free]), slope(in_words, fit.c[fit.free])
+    prior_u = np.sqrt(np.sum(np.square(J * fit.prior), axis=1))
+    parts = sources(fit, samples, settings, J)
+    by_fit = np.sqrt(np.diag(J @ fit.covariance @ J.T))
+    scales = np.array(
+        [
+            value if name.startswith("S_") and len(name) == 3 else 0.0
+            for name, value in zip(found, values, strict=True)
+        ]
+    )
+    if settings.time_base_u > 0.0:
+        parts.append(TypeB("time base", settings.time_base_u, "1", scales))
+    uncertainty = combine(found, parts)
+    left = dict(zip(found, (uncertainty.u / prior_u).tolist(), strict=True))
+    judged = learned(J @ fit.covariance @ J.T, prior_u, found)
+    at_prior = [name for name in found if left[name] > HALF_SEEN]
+    findings = [*record.findings]
+    if at_prior:
+        text = f"{counted_names(at_prior, 6)}: more than half of the prior is left"
+        findings.append(Finding("at_prior", text))
+    if not settings.site.inputs:
+        text = (
+            f"gravity is taken as exactly {settings.site.gravity:.7g} m/s^2, and its relative error goes into all K1: "
+            'state it with its uncertainty, such as gravity = "9.79649(2) m/s^2"'
+        )
+        findings.append(Finding("stated_exact", text))
+    findings += _too_quiet(fit)
+    turns, still = fit.nodes.turns, np.ones(len(fit.squares), dtype=bool)
+    still[turns] = False
+    statistics = {
+        "dof": float(fit.dof),
+        "chi2": fit.chi2,
+        "condition": judged.condition,
+        "residual_rms": math.sqrt(fit.chi2 / fit.dof),
+        "rest_residual_rms": math.sqrt(fit.squares[still].sum() / fit.redundancy[still].sum()),
+        "turn_residual_rms": math.sqrt(fit.squares[turns].sum() / fit.redundancy[turns].sum()),
+        "intervals": float(len(rests)),
+    }
+    return Estimate.of(
+        _basis(record, settings, _conditions(record, samples, settings)),
+        found,
+        [_unit(name, record) for name in found],
+        values,
+        uncertainty,
+        _verdict(fit, left, judged, statistics),
+        findings=findings,
+        statistics=statistics,
+        result={
+            "estimator": "batch",
+            "passes": fit.passes,
+            "frame": settings.frame,
+            "unit": {sensor: record[f"{sensor}_x"].unit.symbol for sensor in ("acc", "gyro")},
+            "rests": _times(rests, samples),
+            "turns": _turns(fit),
+            "bounds": dict(zip(found, by_fit.tolist(), strict=True)),
+            "at_prior": at_prior,
+            "nuisances": _nuisances(fit),
+        },
+    )
+
+
+def useless(
+    record: Record, samples: Samples, rests: tuple[Dwell, ...], settings: StrapdownSettings, force: float
+) -> Estimate:
+    """The estimate of a recording that no solution fits; ``force`` [m/s^2] is the size read at rest."""
+    text = (
+        f"no solution was found; at rest the accelerometers read {force:.3g} m/s^2, expected about "
+        f"{settings.site.gravity:.3g}: check units, signs and the order of axes"
+    )
+    result = {"estimator": "batch", "rests": _times(rests, samples), "turns": []}
+    return Estimate.without(
+        _basis(record, settings), Status.NOT_CONVERGED, text, findings=record.findings, result=result
+    )
+
+
+def too_few(
+    record: Record, samples: Samples, rests: tuple[Dwell, ...], settings: StrapdownSettings
+) -> Estimate:
+    """The estimate of a recording without enough rests."""
+    text = (
+        f"found {counted(len(rests), 'rest')} of {LIMITS.shortest_rest:g} s or more, expected {LIMITS.fewest_rests} or "
+        "more: let the unit stand still between the turns, or list the rests (rests.list)"
+    )
+    result = {"estimator": "batch", "rests": _times(rests, samples), "turns": []}
+    return Estimate.without(
+        _basis(record, settings), Status.TOO_FEW_INTERVALS, text, findings=record.findings, result=result
+    )
+
+
+def _basis(record: Record, settings: StrapdownSettings, conditions: Mapping[str, Any] | None = None) -> Basis:
+    """The basis of the estimate."""
+    return studied(COMMAND, settings, record.sources, MODEL, REFERENCES, conditions)
+
+
+def _outputs(record: Record) -> tuple[float, float]:
+    """Units of accelerometers and gyros in SI."""
+    return record["acc_x"].unit.factor, record["gyro_x"].unit.factor
+
+
+def _unit(name: str, record: Record) -> str:
+    """Unit of a coefficient, from that of the output of its sensor."""
+    sensor = "acc_x" if name.startswith("K") else "gyro_x"
+    return TERMS[name].unit_for(record[sensor].unit.symbol)
+
+
+def _times(rests: tuple[Dwell, ...], samples: Samples) -> list[list[float]]:
+    """Begin and end of each rest [s] from the first sample on."""
+    return [[each.start * samples.ts, each.stop * samples.ts] for each in rests]
+
+
+def _turns(fit: Fit) -> list[dict[str, Any]]:
+    """Angle [rad], axis in b, and standardised residual of each turn."""
+    q, turns = fit.q_nb, fit.nodes.turns
+    vectors = log(multiply(conjugate(q[turns]), q[turns + 1]))
+    angles = np.linalg.norm(vectors, axis=1)
+    z = np.sqrt(fit.squares[turns] / fit.redundancy[turns])
+    axes = vectors / np.maximum(angles, 1e-12)[:, None]
+    rows = zip(angles.tolist(), axes.tolist(), z.tolist(), strict=True)
+    return [{"angle": angle, "axis": axis, "residual_z": each} for angle, axis, each in rows]
+
+
+def _nuisances(fit: Fit) -> dict[str, dict[str, float]]:
+    """Corrections of gravity and latitude, where they are uncertain."""
+    called = {GRAVITY: "gravity", LATITUDE: "latitude"}
+    return {
+        called[place]: {
+            "value": float(fit.c[place]),
+            "u": float(np.sqrt(fit.covariance[k, k])),
+            "prior": float(fit.prior[k]),
+        }
+        for k, place in enumerate(fit.free.tolist())
+        if place in called
+    }
+
+
+def _conditions(record: Record, samples: Samples, settings: StrapdownSettings) -> dict[str, Any]:
+    """Conditions and ranges over which the result is valid."""
+    ranges = {
+        "rate_rad_s": float(np.linalg.norm(samples.rate, axis=1).max()),
+        "specific_force_along_an_axis_m_s2": [float(samples.force.min()), float(samples.force.max())],
+        "duration_s": len(samples.rate) * samples.ts,
+        "rate_hz": 1.0 / samples.ts,
+    }
+    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAMES[settings.frame])
+
+
+def _too_quiet(fit: Fit) -> list[Finding]:
+    """``low_scatter`` where the noise is stated too large, as of a simulation without any."""
+    from scipy.special import chdtri
+
+    if fit.chi2 >= chdtri(fit.dof, 1.0 - LIMITS.risk):
+        return []
+    text = (
+        f"chi-square {fit.chi2:.4g} is far below the {fit.dof} expected: the noise is stated too large, and every u "
+        "with it"
+    )
+    return [Finding("low_scatter", text)]
+
+
+def _verdict(
+    fit: Fit, left: Mapping[str, float], judged: Learned, statistics: Mapping[str, float]
+) -> tuple[Status, str]:
+    """Status and sentence."""
+    from scipy.special import chdtri
+
+    limit = float(chdtri(fit.dof, LIMITS.risk))
+    if not fit.converged:
+        return Status.NOT_CONVERGED, (
+            f"after {fit.passes} passes the coefficients still move: check units, signs and the order of axes, and "
+            "that the prior allows for what the unit is"
+        )
+    if fit.chi2 > limit:
+        return Status.INCONSISTENT, (
+            f"the recording contradicts model or noise: chi-square {fit.chi2:.4g}, expected {fit.dof} and at most "
+            f"{limit:.4g}; residuals are {statistics['turn_residual_rms']:.2g} times the noise over turns and "
+            f"{statistics['rest_residual_rms']:.2g} times within rests"
+        )
+    unseen = [name for name in left if group_of(name) in ALWAYS and left[name] > UNSEEN]
+    if unseen:
+        return Status.UNOBSERVABLE, (
+            f"the turns say nothing about {counted_names(unseen, 6)}; the weakest combination is "
+            f"{judged.weakest()[0]}: add turns about other axes, and at least two quadrants of each"
+        )
+    if judged.left[-1] ** 2 < len(judged.left) * np.finfo(float).eps * judged.left[0] ** 2:
+        return Status.ILL_CONDITIONED, (
+            f"the covariance is numerically singular: {judged.weakest()[0]} is known too weakly beside the rest; add "
+            "turns about other axes"
+        )
+    return Status.OK, (
+        f"{counted(len(left), 'coefficient')} from {counted(int(statistics['intervals']), 'rest')}, chi-square "
+        f"{fit.chi2:.4g} with {fit.dof} degrees of freedom"
+    )

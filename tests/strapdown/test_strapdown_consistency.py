@@ -1,0 +1,78 @@
+"""Errors of the batch estimator against its stated uncertainties, on runs of known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from grades import GRADES, NAV, drawn, fitted, u_by_kind
+from scipy.stats import chi2, norm
+
+from inercal.strapdown.settings import Motion
+
+RISK = 1e-3
+
+#: largest u of each kind that another program has for the same tests, in the units of `u_by_kind`
+EXPECTED = {
+    "nav": (0.0029, 0.55, 1.35, 0.83, 0.47, 1.2, 0.96, 0.036, 0.0031),
+    "tactical": (0.155, 13.5, 27.0, 16.6, 4.7, 21.0, 17.5, 0.094, 0.019),
+    "mems": (2.8, 65.0, 126.0, 81.0, 17.0, 99.0, 80.0, 0.077, 0.043),
+}
+
+
+def campaign(settings, runs, seed):
+    """Errors (runs, 31) over u, NEES (runs,), chi-square (runs,); the last fit."""
+    errors, nees, squares, fit = [], [], [], None
+    for number in range(runs):
+        rng = np.random.default_rng([seed, number])
+        c = drawn(settings, rng)
+        fit = fitted(settings, c, rng)
+        error = (fit.c - c)[fit.free]
+        assert fit.converged
+        errors.append(error / np.sqrt(np.diag(fit.covariance)))
+        nees.append(error @ np.linalg.solve(fit.covariance, error))
+        squares.append(fit.chi2)
+    return np.array(errors), np.array(nees), np.array(squares), fit
+
+
+def judge(settings, runs, seed):
+    """Assert that errors, their squares and chi-square are as stated, within limits for ``runs``."""
+    z, nees, squares, fit = campaign(settings, runs, seed)
+    p, sigmas = z.shape[1], norm.isf(RISK / 2.0)
+    assert abs(nees.mean() - p) < sigmas * np.sqrt(2.0 * p / runs)
+    low, high = chi2.ppf([RISK / (2.0 * p), 1.0 - RISK / (2.0 * p)], runs)
+    assert np.all((np.sum(z**2, axis=0) > low) & (np.sum(z**2, axis=0) < high))
+    assert abs(squares.mean() / fit.dof - 1.0) < sigmas * np.sqrt(2.0 / (fit.dof * runs))
+    return z, fit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("grade", GRADES)
+def test_errors_are_as_large_as_stated(grade):
+    settings = GRADES[grade]
+    judge(replace(settings, plan=replace(settings.plan, sample_rate=50.0)), 20, 20261123)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("grade", GRADES)
+def test_errors_are_as_large_as_stated_in_a_hundred_runs(grade):
+    z, _ = judge(GRADES[grade], 100, 21)
+    assert 0.935 < np.mean(np.abs(z) < norm.isf(0.025)) < 0.965
+    lengths = np.sum(z**2, axis=0) / len(z)
+    assert 0.95 < np.exp(0.5 * np.mean(np.log(lengths))) < 1.05
+    assert np.all((np.sqrt(lengths) > 0.65) & (np.sqrt(lengths) < 1.35))
+
+
+@pytest.mark.parametrize("grade", GRADES)
+def test_uncertainties_are_those_expected_of_the_grade(grade):
+    """Those of another program; that turned at an even rate, which tells places of accelerometers less well."""
+    found = u_by_kind(fitted(GRADES[grade], np.zeros(51), np.random.default_rng(5)))
+    for (kind, u), expected in zip(found.items(), EXPECTED[grade], strict=True):
+        assert 0.8 < u / expected < 1.2, kind
+
+
+def test_without_noise_only_the_integration_is_left():
+    settings = replace(NAV, motion=Motion(np.radians(3.0), 1.5, 0.3))
+    rng = np.random.default_rng(1)
+    c = drawn(settings, rng)
+    fit = fitted(settings, c, rng, noise=False)
+    assert np.all(np.abs((fit.c - c)[fit.free]) < 0.1 * np.sqrt(np.diag(fit.covariance)))
