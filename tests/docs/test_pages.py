@@ -24,6 +24,7 @@ SLOW = [
     "README.md",
     "docs/how-to/calibrate-a-platform.md",
     "docs/how-to/calibrate-an-imu.md",
+    "docs/how-to/calibrate-a-strapdown-unit.md",
     "docs/how-to/calibrate-on-a-turntable.md",
     "docs/how-to/design-a-path.md",
     "docs/how-to/live.md",
@@ -39,6 +40,7 @@ SLOW = [
     "docs/theory/self-calibration-filters.md",
     "docs/tutorials/angle-of-attack.md",
     "docs/tutorials/self-calibration.md",
+    "docs/tutorials/strapdown.md",
     "docs/tutorials/turntable.md",
 ]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"

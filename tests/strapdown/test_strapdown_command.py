@@ -191,6 +191,14 @@ def test_a_calibration_is_applied_without_what_a_sample_does_not_tell(folder, ca
     assert np.linalg.norm(force) == pytest.approx(9.7965, rel=1e-4)
 
 
+@pytest.mark.parametrize("tool", ["psins", "kalibr", "imu_tk", "imucal"])
+def test_other_tools_are_told_what_they_do_not_hold(tool, folder, capsys):
+    calibrate("--out", "cal.json")
+    capsys.readouterr()
+    assert run(["convert", "cal.json", "--to", tool]) == 0
+    assert "K2_z, r_xx, r_xy, r_xz, r_yx, r_yy, r_yz, tau_a" in capsys.readouterr().err
+
+
 def test_repeat_runs_are_combined(folder, capsys):
     capsys.readouterr()
     assert run(["simulate", "strapdown", "strapdown.toml", "--seed", "4", "--out", "two.npz", "--quiet"]) == 0

@@ -31,8 +31,9 @@ class Fit:
     """A fit: coefficients ``c`` (51,), their places ``free`` (p,) that were estimated with ``covariance`` (p, p) and
     ``prior`` (p,) standard deviations, attitudes ``q_nb`` (k + 1, 4) and velocities (k + 1, 3) of the nodes.
 
-    ``chi2`` with ``dof`` degrees of freedom; of each interval its part ``squares`` (k,) and its ``redundancy`` (k,),
-    the expected value of that; ``passes`` until it ``converged``; ``chain`` is the last linear problem.
+    ``chi2`` with ``dof`` degrees of freedom is of the data, without the prior; of each interval its part ``squares``
+    (k,) and its ``redundancy`` (k,), the expected value of that; ``passes`` until it ``converged``; ``chain`` is the
+    last linear problem, ``sensitivities`` (k, 6, 51) its derivatives by all coefficients.
     """
 
     c: Array
@@ -43,12 +44,13 @@ class Fit:
     velocity: Array
     nodes: Nodes
     chi2: float
-    dof: int
+    dof: float
     squares: Array
     redundancy: Array
     passes: int
     converged: bool
     chain: Chain
+    sensitivities: Array
 
 
 def world_of(settings: StrapdownSettings, c: Array, ts: float) -> World:
@@ -147,11 +149,27 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
         motion = freed(samples, c)
     c[free] += step
     chi2, squares = _chi2(chain, step, x, angles)
-    dof = 3 * count - 3 + (0 if held is None else 3 * (count - len(np.unique(nodes.rest))))
+    rows_more = 3 * count - 3 + (0 if held is None else 3 * (count - len(np.unique(nodes.rest))))
+    # what the data tell of a coefficient goes from the degrees of freedom, what the prior tells does not
+    dof = float(rows_more - np.sum(1.0 - np.diag(covariance) / prior**2))
     q, v = multiply(exp(x[:, :3]), q), v + x[:, 3:6]
     redundancy = m - _followed(chain, rows, covariance)
     return Fit(
-        c, free, covariance, prior, q, v, nodes, chi2, dof, squares, redundancy, passes, converged, chain
+        c,
+        free,
+        covariance,
+        prior,
+        q,
+        v,
+        nodes,
+        chi2,
+        dof,
+        squares,
+        redundancy,
+        passes,
+        converged,
+        chain,
+        shot.G,
     )
 
 
@@ -223,11 +241,10 @@ def _inverse(information: Array, prior: Array) -> Array:
 
 
 def _chi2(chain: Chain, step: Array, x: Array, angles: Array) -> tuple[float, Array]:
-    """Sum of squares at the solution, and its parts (k,) by interval."""
+    """Sum of squares of the data at the solution, and its parts (k,) by interval."""
     left = chain.e + np.einsum("kij,kj->ki", chain.F, x[:-1]) + chain.G @ step - x[1:]
     squares = np.einsum("ki,kij,kj->k", left, chain.W, left)
     velocity = chain.velocity * np.sum((chain.v + x[:, 3:6]) ** 2)
     attitude = chain.attitude * np.sum((chain.angles + x[:, :3] - angles) ** 2)
     begin = np.sum(chain.start * (chain.begin + x[0]) ** 2)
-    prior = np.sum(chain.prior * (chain.c + step) ** 2)
-    return float(squares.sum() + velocity + attitude + begin + prior), np.asarray(squares)
+    return float(squares.sum() + velocity + attitude + begin), np.asarray(squares)

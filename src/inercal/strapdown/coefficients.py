@@ -61,6 +61,9 @@ GROUPS: Final[Mapping[str, tuple[int, ...]]] = {
 ALWAYS: Final = ("gyro_bias", "scale", "misalignment", "bias", "k1", "axes")
 """Groups that are always estimated, and that a recording must tell for its result to be of use."""
 
+USUAL: Final = ("k2", "size", "delay")
+"""Groups that are estimated unless the study says otherwise: every unit has them."""
+
 OPTIONS: Final = ("k2", "size", "delay", "asymmetry", "g_sensitivity")
 """Groups that are estimated where the study says so."""
 

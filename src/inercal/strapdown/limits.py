@@ -65,5 +65,11 @@ class Limits:
     risk: float = 1e-4
     """Probability by chance of the largest chi-square that still agrees with the model."""
 
+    naming_risk: float = 0.01
+    """Probability that an effect outside the model is named by chance in a sound record."""
+
+    far_from_prior: float = 4.0
+    """Distance of a value from what is expected, over the standard deviation of its prior, at which that is doubted."""
+
 
 LIMITS = Limits()

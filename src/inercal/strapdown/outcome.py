@@ -21,7 +21,8 @@ from inercal.records.places import counted, counted_names
 from inercal.records.record import Record, recorded_temperature
 from inercal.strapdown.batch import Fit
 from inercal.strapdown.budget import sources
-from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, group_of, names, slope, stated
+from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, USUAL, group_of, names, slope, stated
+from inercal.strapdown.left_out import Tested, tests
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import StrapdownSettings
@@ -90,6 +91,9 @@ def assemble(
         )
         findings.append(Finding("stated_exact", text))
     findings += _too_quiet(fit)
+    tested = tests(fit, settings)
+    findings += _left_out(tested, found, J, uncertainty.u)
+    findings += _beyond_prior(found, values - in_words(np.zeros(len(fit.free))), prior_u, uncertainty.u)
     turns, still = fit.nodes.turns, np.ones(len(fit.squares), dtype=bool)
     still[turns] = False
     statistics = {
@@ -120,6 +124,10 @@ def assemble(
             "bounds": dict(zip(found, by_fit.tolist(), strict=True)),
             "at_prior": at_prior,
             "nuisances": _nuisances(fit),
+            "left_out": {
+                each.candidate.name: {"chi2_drop": each.drop, "parameters": len(each.candidate.prior)}
+                for each in tested
+            },
         },
     )
 
@@ -216,10 +224,47 @@ def _too_quiet(fit: Fit) -> list[Finding]:
     if fit.chi2 >= chdtri(fit.dof, 1.0 - LIMITS.risk):
         return []
     text = (
-        f"chi-square {fit.chi2:.4g} is far below the {fit.dof} expected: the noise is stated too large, and every u "
-        "with it"
+        f"chi-square {fit.chi2:.4g} is far below the {fit.dof:.0f} expected: the noise is stated too large, and "
+        "every u with it"
     )
     return [Finding("low_scatter", text)]
+
+
+def _left_out(tested: list[Tested], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
+    """The effect outside the model that explains most, where that is more than chance; else terms that usually are
+    estimated and were left out, where they may shift a value by more than its u."""
+    if not tested:
+        return []
+    if not tested[0].significant:
+        return [
+            Finding("unmodelled", f"terms leaves out {each.candidate.words}, which may be as large as their prior: "
+                    f"{each.candidate.advice}, or state a smaller prior.{each.candidate.name}", harm=harm)
+            for each in tested
+            if each.candidate.name in USUAL
+            and (harm := _beyond(found, np.linalg.norm(slope @ each.reach, axis=1), u))
+        ]  # fmt: skip
+    best, candidate = tested[0], tested[0].candidate
+    harm = _beyond(found, np.abs(slope @ best.shift), u)
+    text = (
+        f"the recording shows {candidate.words}: chi-square falls by {best.drop:.4g} for "
+        f"{counted(len(candidate.prior), 'parameter')}; {candidate.advice}"
+    )
+    return [Finding(candidate.code, text, harm=harm)]
+
+
+def _beyond(found: tuple[str, ...], shift: Array, u: Array) -> tuple[str, ...]:
+    """Names of values that are shifted by more than their u."""
+    return tuple(name for name, by, each in zip(found, shift.tolist(), u.tolist(), strict=True) if by > each)
+
+
+def _beyond_prior(found: tuple[str, ...], off: Array, prior_u: Array, u: Array) -> list[Finding]:
+    """``prior_suspect`` where a value is so far ``off`` those of a perfect unit that its prior cannot be."""
+    far = np.abs(off) > LIMITS.far_from_prior * np.hypot(prior_u, u)
+    names_far = [name for name, each in zip(found, far.tolist(), strict=True) if each]
+    if not names_far:
+        return []
+    text = f"{counted_names(names_far, 6)}: far outside the stated prior; widen it, or check units and signs"
+    return [Finding("prior_suspect", text)]
 
 
 def _verdict(
@@ -236,7 +281,7 @@ def _verdict(
         )
     if fit.chi2 > limit:
         return Status.INCONSISTENT, (
-            f"the recording contradicts model or noise: chi-square {fit.chi2:.4g}, expected {fit.dof} and at most "
+            f"the recording contradicts model or noise: chi-square {fit.chi2:.4g}, expected {fit.dof:.0f} and at most "
             f"{limit:.4g}; residuals are {statistics['turn_residual_rms']:.2g} times the noise over turns and "
             f"{statistics['rest_residual_rms']:.2g} times within rests"
         )
@@ -253,5 +298,5 @@ def _verdict(
         )
     return Status.OK, (
         f"{counted(len(left), 'coefficient')} from {counted(int(statistics['intervals']), 'rest')}, chi-square "
-        f"{fit.chi2:.4g} with {fit.dof} degrees of freedom"
+        f"{fit.chi2:.4g} with {fit.dof:.0f} degrees of freedom"
     )

@@ -23,7 +23,7 @@ from inercal.keys import (
     quantity,
     within,
 )
-from inercal.strapdown.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, Frame
+from inercal.strapdown.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, USUAL, Frame
 from inercal.units import Quantity
 
 Term = Literal["k2", "size", "delay", "asymmetry", "g_sensitivity"]
@@ -163,7 +163,7 @@ class StrapdownSettings:
         "lower has x along that of x and y in the plane of x and y",
         "upper",
     )
-    terms: tuple[Term, ...] = ("k2", "size", "delay")
+    terms: tuple[Term, ...] = USUAL
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="time_base",

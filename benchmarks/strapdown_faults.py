@@ -1,0 +1,117 @@
+"""Faults of a unit turned by hand, one by one: shift in u, verdict, and the name that the fault is given.
+
+    python benchmarks/strapdown_faults.py --draws 20
+    python benchmarks/strapdown_faults.py --sound 100
+
+Recordings come from benchmarks/independent/strapdown.py, which shares no code with inercal. The shift is the largest
+error of a coefficient over its u, rms over the draws. The results are kept in
+docs/uncertainty/strapdown-faults.md, by hand.
+"""
+
+import argparse
+import os
+from collections import Counter
+from dataclasses import replace
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from independent import strapdown
+
+from inercal.findings import CODES, Harm, Status
+from inercal.geometry.site import Site
+from inercal.records.record import record_of
+from inercal.strapdown.settings import Noise, Prior, Rests, StrapdownSettings
+from inercal.strapdown.task import calibrate
+from inercal.units import parse_unit
+
+SEED = 20261123
+TEST, DPH = strapdown.Test(), strapdown.DEG_PER_H
+SETTINGS = StrapdownSettings(
+    Site(strapdown.G, (), strapdown.LATITUDE),
+    Noise(TEST.angle_walk, TEST.velocity_walk),
+    rests=Rests(velocity=TEST.vibration),
+    prior=Prior(30 * DPH, 1e-3, 1e-3, 5e-2, 1e-3, 1e-3, 1e-5, 0.05, 5e-3, 5e-4, 50 * DPH / 9.8),
+)
+#: name -> (fault, change of the unit, change of the study)
+CASES = {
+    "none": ({}, {}, {}),
+    **{
+        f"drift of a gyro by force, {size:g} deg/h/g": ({}, {"g": np.full((3, 3), size * DPH / 9.8)}, {})
+        for size in (1.0, 10.0)
+    },
+    **{
+        f"asymmetry of {1e6 * size:g} ppm": ({}, {"asymmetry": np.full(3, size)}, {}) for size in (2e-5, 2e-4)
+    },
+    "accelerometers 20 mm apart, not fitted": ({}, {}, {"terms": ("k2", "delay")}),
+    "accelerometers 4 ms late, not fitted": ({}, {"late": 4e-3}, {"terms": ("k2", "size")}),
+    "K2 of 50 ug/g^2, not fitted": ({}, {}, {"terms": ("size", "delay")}),
+    **{f"gyros drift by {size:g} deg/h": ({"ramp_gyro": size * DPH}, {}, {}) for size in (1.0, 10.0)},
+    **{
+        f"accelerometers drift by {1e6 * size:g} ug": ({"ramp_acc": size * 9.8}, {}, {})
+        for size in (5e-5, 5e-4)
+    },
+    **{f"latitude wrong by {size:g} deg": ({}, {}, {"wrong": np.radians(size)}) for size in (1.0, 10.0)},
+    **{f"sway of {1e3 * size:g} mm/s at rest": ({"sway": size}, {}, {}) for size in (5e-4, 5e-3)},
+    "a knock of 5 mm/s in a rest": ({"knock": 5e-3}, {}, {}),
+    **{f"{count} samples lost in a turn": ({"lost": count}, {}, {}) for count in (1, 5)},
+    "gyro clips at 1.0 rad/s": ({"clip": 1.0}, {}, {}),
+    "gyros with 100 ppm of the square of 1 rad/s": ({"square": 1e-4}, {}, {}),
+    "clock off by 50 ppm": ({"clock": 5e-5}, {}, {}),
+}
+
+
+def estimated(seed, fault, changes, study):
+    """The estimate of a draw, and its errors over u by symbol."""
+    rng = np.random.default_rng([SEED, seed])
+    made = replace(strapdown.unit(rng), **changes)
+    t, acc, gyro = strapdown.record(rng, made, TEST, strapdown.Faults(**fault))
+    units = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
+    columns = [
+        (f"{sensor}_{axis}", units[sensor], values[:, i])
+        for sensor, values in (("acc", acc), ("gyro", gyro))
+        for i, axis in enumerate("xyz")
+    ]
+    study = dict(study)
+    site = replace(SETTINGS.site, latitude=strapdown.LATITUDE + study.pop("wrong", 0.0))
+    estimate = calibrate(record_of(columns, t), replace(SETTINGS, site=site, **study)).estimate
+    truth = made.truth()
+    return estimate, {
+        name: (estimate[name].value - truth[name]) / estimate[name].u for name in estimate.names
+    }
+
+
+def row(name, draws, first=0):
+    """A row of the table."""
+    shifts, passed, verdicts, named = [], [], Counter(), Counter()
+    for seed in range(first, first + draws):
+        estimate, errors = estimated(seed, *CASES[name])
+        verdicts[estimate.status.value] += 1
+        named.update(each.code for each in estimate.findings if CODES[each.code].harm is not Harm.NEVER)
+        if errors:
+            shifts.append(max(map(abs, errors.values())))
+            if estimate.status is Status.OK:
+                passed.append(shifts[-1])
+    size = f"{np.sqrt(np.mean(np.square(shifts))):.1f}" if shifts else "-"
+    counts = ", ".join(f"{word} {count}" for word, count in verdicts.most_common())
+    codes = ", ".join(f"`{code}` {count}" for code, count in named.most_common())
+    return f"| {name} | {size} | {counts} | {sum(each > 4.0 for each in passed)} | {codes} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--draws", type=int, default=20)
+    parser.add_argument("--sound", type=int, default=0, help="only so many sound recordings")
+    options = parser.parse_args()
+    print(
+        "| fault | largest error [u] | verdicts | ok with more than 4 u | names |\n| --- | --- | --- | --- | --- |"
+    )
+    if options.sound:
+        print(row("none", options.sound, 1000))
+        return
+    for name in CASES:
+        print(row(name, options.draws), flush=True)
+
+
+if __name__ == "__main__":
+    main()

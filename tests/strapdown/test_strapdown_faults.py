@@ -1,0 +1,81 @@
+"""What the model leaves out is named, or ends the verdict; a sound record does neither.
+
+Records come from benchmarks/independent/strapdown.py, which shares no code with the program.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import strapdown_faults as faults
+from scipy.stats import chi2
+
+from inercal.findings import Status
+
+
+def result_of(name, seed=0):
+    return faults.estimated(seed, *faults.CASES[name])
+
+
+@pytest.mark.slow
+def test_a_sound_record_of_another_simulator_is_ok_and_met():
+    runs = [result_of("none", seed) for seed in range(3)]
+    for estimate, _ in runs:
+        assert estimate.status is Status.OK
+        assert {each.code for each in estimate.findings} <= {"at_prior", "stated_exact"}
+    z = np.array([list(errors.values()) for _, errors in runs])
+    # coefficients of a run are correlated: their covariance tells the size of all together
+    assert np.abs(z).max() < 4.5
+    squares = []
+    for estimate, errors in runs:
+        off = np.array([errors[name] * estimate[name].u for name in estimate.names])
+        squares.append(off @ np.linalg.solve(estimate.covariance, off))
+    low, high = chi2.ppf([5e-4, 1.0 - 5e-4], z.size)
+    assert low < np.sum(squares) < high
+
+
+def named(name, words):
+    """Assert that the effect of a case is the one that is named, and that it does harm."""
+    estimate, _ = result_of(name)
+    assert estimate.status in (Status.SUSPECT, Status.INCONSISTENT)
+    (finding,) = (
+        each for each in estimate.findings if each.code in ("unmodelled", "bias_drift", "site_suspect")
+    )
+    assert words in finding.message
+    assert finding.harm
+
+
+def test_a_term_outside_the_model_is_named():
+    named("drift of a gyro by force, 10 deg/h/g", 'add "g_sensitivity" to terms')
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("asymmetry of 200 ppm", 'add "asymmetry" to terms'),
+        ("accelerometers 4 ms late, not fitted", 'add "delay" to terms'),
+        ("accelerometers 20 mm apart, not fitted", 'add "size" to terms'),
+        ("K2 of 50 ug/g^2, not fitted", 'add "k2" to terms'),
+        ("gyros drift by 10 deg/h", "biases of the gyros that drift"),
+        ("accelerometers drift by 500 ug", "biases of the accelerometers that drift"),
+        ("latitude wrong by 10 deg", "check site.latitude"),
+    ],
+)
+def test_every_effect_outside_the_model_is_named(name, words):
+    named(name, words)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    "name", ["sway of 5 mm/s at rest", "5 samples lost in a turn", "gyro clips at 1.0 rad/s"]
+)
+def test_what_no_term_explains_ends_the_verdict(name):
+    assert not result_of(name)[0].status.done
+
+
+def test_a_prior_that_cannot_be_is_doubted():
+    narrow = replace(faults.SETTINGS.prior, scale=2e-5)
+    estimate, _ = faults.estimated(0, {}, {}, {"prior": narrow})
+    assert "prior_suspect" in {each.code for each in estimate.findings}
+    assert estimate.status is not Status.OK
