@@ -94,6 +94,12 @@ class Twin:
                 a, b = self.place[s], self.place[output]
                 A[a, b], A[b, a], A[b, b] = 1.0, -(of.frequency**2), -2.0 * of.damping * of.frequency
                 N[b, b] = 4.0 * of.damping * of.frequency * of.level**2
+        for name, k in self.place.items():
+            if name.startswith("b_"):
+                of_gyro = name in ("b_g", "b_roll", "b_yaw")
+                N[k, k] = (
+                    self.settings.noise.gyro_walk if of_gyro else self.settings.noise.accelerometer_walk
+                ) ** 2
         size = N.max()
         block = expm(np.block([[-A, N / size], [np.zeros((n, n)), A.T]]) * dt)
         F = block[n:, n:].T

@@ -10,7 +10,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from fusion_twin import Twin, believed_of, beyond, motion_of, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sting_study import BASE, DEG, G, scenario, study
+from sting_study import BASE, DEG, NOISE, G, scenario, study
 
 from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.fusion import smoother
@@ -27,6 +27,7 @@ from inercal.units import Quantity, parse_unit
 
 ROLLED = Attitude(roll=Quantity(0.5, 1e-3, parse_unit("rad"), ""))
 COUPLED = Disturbances(yaw=Oscillation(1.0 * DEG, 8.0), roll=Oscillation(2.0 * DEG, 3.0))
+WANDERING = replace(NOISE, accelerometer_walk=1e-3 * G, gyro_walk=0.1 * DEG)
 CASES = {
     "8": ({"states": 8}, False),
     "11, rolled": ({"states": 11, "attitude": ROLLED}, False),
@@ -35,6 +36,7 @@ CASES = {
     "19, delay": ({"states": 19, "timing": Timing(gyro_delay=None)}, False),
     "8, known delay": ({"states": 8, "timing": Timing(gyro_delay=2e-3)}, False),
     "8, spatial": ({"states": 8, "disturbances": COUPLED}, True),
+    "8, spatial, walks": ({"states": 8, "noise": WANDERING, "disturbances": COUPLED}, True),
     "19, spatial, delay": (
         {"states": 19, "disturbances": COUPLED, "timing": Timing(gyro_delay=None)},
         True,

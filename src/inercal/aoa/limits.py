@@ -30,6 +30,12 @@ class Limits:
     far_ratio: float = 1.5
     """Times what is expected at most, from which a coefficient contradicts its prior."""
 
+    prior_chance: float = 1e-4
+    """Chance of a sound recording by which its coefficients together may be as far from their priors as they are."""
+
+    shown_share: float = 0.1
+    """Share of the prior's variance of a combination of coefficients that a recording must have taken away."""
+
     lost_starts: int = 10
     """New starts of the fusion, beside one in ten rows, from which it is given up."""
 
@@ -232,6 +238,13 @@ class Limits:
 
     line_power: float = 30.0
     """Spectral density of a line over that beside it."""
+
+    common_k2: float = 1e-4 / STANDARD_GRAVITY
+    """Second-order coefficient [s^2/m] of an accelerometer, 100 ug/g^2, by which vibration is judged where the study
+    states none."""
+
+    told_offset: float = 0.25
+    """Offset of the angle by it, over u, from which it is said; from 1 on it harms."""
 
     lowest_line: float = 20.0
     """Frequency [Hz] below which a line may be flexure of the sting, which is a state of the filter."""

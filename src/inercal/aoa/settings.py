@@ -51,6 +51,8 @@ _OF_PLACES = Bounds(
 )
 _ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
 _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg to 45 deg")
+_WALK = within(0.0, math.inf, "a random walk of 0 or more")
+_K2 = within(0.0, 0.1, "a coefficient from 0 to 0.1 s^2/m")
 _WAIT = within(0.0, 1e6, "a time of 0 or more")
 _WITHIN = within(-5.0, 5.0, "a position within 5 m of the pivot (mm given as m?)")
 _PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
@@ -70,6 +72,18 @@ class Noise:
     )  # fmt: skip
     gyro: float = quantity("of a sample of a gyro", "rate", REQUIRED, example="0.2 deg/s", bounds=DEVIATION)
     gyro_bias: float = quantity("of the gyros' biases", "rate", REQUIRED, example="5 deg/h", bounds=DEVIATION)
+    accelerometer_walk: float = quantity(
+        "random walk of each accelerometer's bias, for the fusion", "acceleration random walk", "0 ug/sqrt(s)",
+        example="10 ug/sqrt(s)", bounds=_WALK,
+    )  # fmt: skip
+    gyro_walk: float = quantity(
+        "random walk of each gyro's bias, for the fusion", "rate random walk", "0 deg/h/sqrt(s)",
+        example="0.1 deg/h/sqrt(s)", bounds=_WALK,
+    )  # fmt: skip
+    rectification: float = quantity(
+        "largest second-order coefficient K2 of an accelerometer: the offset that vibration makes by it is in u",
+        "quadratic", "0 ug/g^2", example="100 ug/g^2", bounds=_K2,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,7 +100,8 @@ class Resonance:
 class Prior:
     """Prior of the errors of the sensors: standard deviations about 0.
 
-    ``heave`` and ``axial`` are the sting's flexure.
+    ``heave`` and ``axial`` are the sting's flexure; ``rectified`` [m/s^2] is of the offset of each accelerometer by the
+    vibration of a recording.
     """
 
     lever_common: float = quantity(
@@ -100,6 +115,7 @@ class Prior:
     )
     heave: Resonance = Resonance(2.0 * math.pi * 9.0, 0.3, 0.01 * STANDARD_GRAVITY)
     axial: Resonance = Resonance(2.0 * math.pi * 12.0, 0.5, 0.01 * STANDARD_GRAVITY)
+    rectified: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,9 @@ def simulate(
     values = _limited(values, other, step)[before:]
     noise = np.array([settings.noise.accelerometer] * n + [settings.noise.gyro] * 3)
     values += noise * rng.standard_normal(values.shape)
+    walk = np.array([settings.noise.accelerometer_walk] * n + [settings.noise.gyro_walk] * 3)
+    if walk.any():
+        values += np.cumsum(walk * math.sqrt(step) * rng.standard_normal(values.shape), axis=0)
     values = _spoiled(values, settings, rng)
     theta, rate, acceleration = moved(t)
     spatial = other.roll is not None or other.yaw is not None

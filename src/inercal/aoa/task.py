@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.diagnosis.choice import decided, of_delay, of_vibration
+from inercal.aoa.diagnosis.choice import decided, of_delay, of_rectification, of_vibration
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
@@ -140,6 +140,9 @@ def measure(
         # between the samples of a slower sensor there are no spectra of both
         if not any(each.code == "other_clock" for each in recording.findings):
             findings += of_delay(delay, of, filtered)
+        known_u = angles.u[np.isfinite(angles.u)]
+        if len(known_u):
+            findings += of_rectification(recording, settings, float(np.median(known_u)))
     else:
         progress(label(methods))
         angles = by_methods(recording, settings, methods)

@@ -54,7 +54,8 @@ class Hypothesis(Generic[Case]):
     Of a parameter [SI], ``step`` is the change for the derivative, ``bounds`` are the values that are believed,
     ``prior`` is the standard deviation about 0, infinite without one. The hypothesis was picked of so many
     ``alternatives``, so many ``times``; ``left_out`` counts the scalars that the case without it leaves out, each of
-    which counts 1.
+    which counts 1. ``derivative`` gives the change (..., m) of the residuals of a case where it is taken out, for those
+    that know it without differences.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Hypothesis(Generic[Case]):
     left_out: int = 0
     where: str = ""
     harm: tuple[str, ...] = EVERYTHING
+    derivative: Callable[[Case], Array] | None = None
 
     def chance(self, risk: float) -> float:
         """Fall of the sum of squares that chance exceeds with the probability ``risk`` at most."""
@@ -207,7 +209,9 @@ def _ranked(
         if not each.parameters:
             return judge.misfit(case) - judge.misfit(one.case) - each.chance(share)
         after = _least_squares_of([*held, slopes(case, each, z, judge)], z, [*fitted, one])
-        return (after.gained - before) / after.left - each.chance(share)
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers of no use explain nothing
+            gain = (after.gained - before) / after.left - each.chance(share)
+        return gain if math.isfinite(gain) else -math.inf
 
     gains = [surplus(each) for each in asked]
     order = sorted(range(len(asked)), key=lambda k: -gains[k])
@@ -222,7 +226,7 @@ def _believed(fit: Fitted[Case]) -> bool:
 
 def _clear(fit: Fitted[Case]) -> bool:
     """True where a parameter differs from 0; a hypothesis without parameters was tried as a whole."""
-    return not len(fit.values) or bool(np.abs(fit.values / fit.u).max() > CLEAR)
+    return not len(fit.values) or bool((np.abs(fit.values) > CLEAR * fit.u).any())
 
 
 def refitted(case: Case, fitted: Sequence[Fitted[Case]], judge: Judge[Case]) -> Fits[Case]:
@@ -252,6 +256,8 @@ def _without(case: Case, fitted: Sequence[Fitted[Case]]) -> Case:
 
 def slopes(case: Case, hypothesis: Hypothesis[Case], z: Array, judge: Judge[Case]) -> Array:
     """Derivative (..., m) of the residuals ``z`` (...) of a case by the parameters of a hypothesis."""
+    if hypothesis.derivative is not None:
+        return hypothesis.derivative(case)
     m, step = len(hypothesis.parameters), hypothesis.step
     # of a long recording one copy, of seven digits, is enough
     out = np.empty((*z.shape, m), dtype=np.float32 if z.size > _LONG else np.float64)

@@ -142,6 +142,24 @@ class Limits:
     small_errors: int = 5
     """Constant errors that are looked for, one after the other."""
 
+    wandering: int = 5
+    """Cosines of time, from half a period of the recording on, of which a bias is sought that wanders."""
+
+    small_delay: float = 0.1
+    """Time [s] up to which encoders or accelerometers are believed to be late."""
+
+    nearly_white: float = 1e-6
+    """Probability of innovations as correlated, by chance, from which states of the rig explain them."""
+
+    alike_misfit: float = 6.0
+    """Sum of squares by which a constant error may explain less than the likeliest and still be called as possible."""
+
+    alike_fits: int = 3
+    """Constant errors that are fitted to see which are alike."""
+
+    columns_at_once: int = 1 << 21
+    """Angles of a recording times parameters, up to which their columns are found in one run."""
+
     lock_cosine: float = 0.2
     """Cosine of the inner gimbal's angle below which innovations are left out: encoder noise is overstated there."""
 

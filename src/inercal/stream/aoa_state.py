@@ -68,19 +68,21 @@ def kept(state: AoaState, row: Array) -> AoaState:
 
 def choice_of(settings: AoaSettings, final: bool) -> Array:
     """All that was decided, as numbers of a state: 1 where ``final``, 0 for the rate alone; rate, low pass, snap (0 for
-    the usual one), delay and the prior of its rest, flexure, notches."""
+    the usual one), delay and the prior of its rest, flexure, rectified vibration, notches."""
     band, snap = settings.band, settings.estimator.snap or 0.0
     low = math.nan if band.low_pass is None else band.low_pass
     delay = settings.timing.gyro_delay_about, settings.prior.gyro_delay
     flexure = settings.prior.heave
     shaken = flexure.frequency, flexure.damping, flexure.level
-    return np.array([float(final), band.rate, low, snap, *delay, *shaken, *band.notch])
+    rectified = settings.prior.rectified
+    return np.array([float(final), band.rate, low, snap, *delay, *shaken, rectified, *band.notch])
 
 
 def chosen(settings: AoaSettings, choice: Array) -> AoaSettings:
     """The study with what was decided."""
-    _, rate, low, snap, about, rest, frequency, damping, level, *notch = choice.tolist()
-    prior, heave = replace(settings.prior, gyro_delay=rest), Resonance(frequency, damping, level)
+    _, rate, low, snap, about, rest, frequency, damping, level, rectified, *notch = choice.tolist()
+    prior = replace(settings.prior, gyro_delay=rest, rectified=rectified)
+    heave = Resonance(frequency, damping, level)
     if heave != prior.heave:
         prior = replace(prior, heave=heave, axial=heave)
     return replace(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.band import Band
 from inercal.aoa.diagnosis.noise_check import misstated
-from inercal.aoa.diagnosis.spectrum import highest_motion, lines, white_noise
+from inercal.aoa.diagnosis.spectrum import highest_motion, lines, powers, white_noise
 from inercal.aoa.fusion import band as limiting
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.loop import OUTPUTS
@@ -54,7 +54,7 @@ def decided(recording: Recording, settings: AoaSettings) -> AoaSettings:
     stated = settings.band.low_pass is not None
     if stated and settings.estimator.snap is not None:
         return settings
-    settings = _with_delay(recording, settings)
+    settings = _with_delay(recording, _with_offsets(recording, settings))
     plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
     stretches = [_part(recording, rows) for rows in _liveliest(recording)]
     if not stretches:
@@ -103,6 +103,45 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
         )
         findings.append(Finding("wide_flexure", text))
     return findings
+
+
+def of_rectification(recording: Recording, settings: AoaSettings, u: float) -> list[Finding]:
+    """``rectification``: vibration that by a common K2 makes an offset of the angle near its ``u`` [rad], without being
+    in it."""
+    stated, power = settings.noise.rectification, _vibration(recording)
+    k2 = stated or LIMITS.common_k2
+    off = k2 * power / STANDARD_GRAVITY
+    if settings.prior.rectified or not off > LIMITS.told_offset * u:
+        return []
+    advice = (
+        "band and snap are stated, so u has none of it"
+        if stated
+        else "write rectification under [noise], so that u has it"
+    )
+    text = (
+        f"accelerometers feel {math.sqrt(power) / STANDARD_GRAVITY:.2g} g rms above {LIMITS.lowest_line:g} Hz: a K2 of "
+        f"{1e6 * k2 * STANDARD_GRAVITY:.3g} ug/g^2 makes an offset of {math.degrees(off):.2g} deg of it; {advice}"
+    )
+    return [Finding("rectification", text, harm=EVERYTHING if off > u else ())]
+
+
+def _with_offsets(recording: Recording, settings: AoaSettings) -> AoaSettings:
+    """The study with what vibration may make of the stated K2, which lies anywhere up to it."""
+    k2 = settings.noise.rectification
+    if not k2:
+        return settings
+    offset = k2 * _vibration(recording) / math.sqrt(3.0)
+    return replace(settings, prior=replace(settings.prior, rectified=offset))
+
+
+def _vibration(recording: Recording) -> float:
+    """Mean square [m^2/s^4] above `Limits.lowest_line` in the liveliest stretch, of the accelerometer that feels most;
+    0 of a short recording."""
+    rows = next(_liveliest(recording), None)
+    if rows is None:
+        return 0.0
+    frequency, density = powers(recording.t[rows], recording.acc[rows])
+    return float(density[frequency > LIMITS.lowest_line].sum(axis=0).max() * frequency[1])
 
 
 def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:

@@ -34,13 +34,15 @@ class FitQuality:
 
     ``innovations`` (m, N + 1) over their standard deviations; ``theta`` and ``rate`` (m,) [rad, rad/s]; ``off`` the
     distance of each coefficient from its prior, in standard deviations of the prior, by name, at rest without those
-    that only motion shows; ``misfit`` of all in one number.
+    that only motion shows; ``unlikely`` the squared distance of all of them together, over the largest expected one;
+    ``misfit`` of all in one number.
     """
 
     innovations: Array
     theta: Array
     rate: Array
     off: dict[str, float]
+    unlikely: float
 
     @property
     def by_sensor(self) -> Array:
@@ -63,7 +65,7 @@ class FitQuality:
     @property
     def fits(self) -> bool:
         """True where no sensor and no coefficient is beyond what its noise and its prior explain."""
-        return bool(self.white and np.abs(self._far).max() < LIMITS.far_ratio)
+        return bool(self.white and np.abs(self._far).max() < LIMITS.far_ratio and self.unlikely < 1.0)
 
     @property
     def _far(self) -> Array:
@@ -115,14 +117,33 @@ def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19
     posed = problem(asked, recording.spatial)
     with np.errstate(all="ignore"):
         state, outputs = _followed(posed, recording.t, recording.rows)
-        at = [*posed.nuisances.values()]
+        still = rms(outputs[:, 2]) < settings.noise.gyro
+        shown = {k: at for k, at in posed.nuisances.items() if not (still and k.startswith(_BY_MOTION))}
+        at = [*shown.values()]
         off = (state.x[at] - posed.mean[at]) / np.sqrt(np.diag(posed.covariance)[at])
         off = np.nan_to_num(off, nan=1e6)
-    still = rms(outputs[:, 2]) < settings.noise.gyro
-    named = dict(zip(posed.nuisances, off.tolist(), strict=True))
-    if still:
-        named = {name: each for name, each in named.items() if not name.startswith(_BY_MOTION)}
-    return FitQuality(outputs[:, OUTPUTS:], outputs[:, 0], outputs[:, 2], named)
+        together = _together(off, posed.covariance[np.ix_(at, at)], state.P[np.ix_(at, at)])
+    named = dict(zip(shown, off.tolist(), strict=True))
+    return FitQuality(outputs[:, OUTPUTS:], outputs[:, 0], outputs[:, 2], named, together)
+
+
+def _together(off: Array, prior: Array, posterior: Array) -> float:
+    """Squared distance of coefficients (p,) from their prior, over that which chance exceeds once in ten thousand.
+
+    Estimates lie about the mean of the prior with its covariance less that of the posterior (p, p); counted are the
+    combinations of which the recording shows a share. A fault that none shows alone, such as an axis that is turned
+    where positions and heights take its effect, shows so.
+    """
+    from scipy.special import chdtri
+
+    u = np.sqrt(np.diag(prior))
+    gained = (prior - posterior) / np.outer(u, u)
+    if not np.isfinite(gained).all():
+        return math.inf
+    variances, combinations = np.linalg.eigh(gained)
+    seen = variances > LIMITS.shown_share
+    squares = np.square(combinations.T @ off)[seen] / variances[seen]
+    return float(squares.sum() / chdtri(seen.sum(), LIMITS.prior_chance)) if seen.any() else 0.0
 
 
 def _followed(posed: FilterProblem, t: Array, rows: Array) -> tuple[State, Array]:

@@ -29,6 +29,7 @@ from inercal.aoa.fusion.model import (
     gyro,
     transition,
     turning,
+    wander,
 )
 from inercal.aoa.limits import LIMITS
 from inercal.estimate.kalman import Row, empty_row
@@ -158,6 +159,7 @@ def go_on(belief: Belief, step: Step, model: Model, F: Array, Q: Array, work: Ar
     if roll >= 0:
         theta, phi = turning(x, step, model, F, Q)
     congruent(P, moving, F, Q, work)
+    wander(P, step.dt, model)
     for i in range(d):
         work[0, i] = 0.0
         for j in range(d):
@@ -326,9 +328,7 @@ def _advance(
     row, ahead = empty_row(WIDEST), np.empty(n)
     of, entry = row.places, row.values
     last, snap, spatial, remember = -1.0, 0.0, places.roll >= 0, len(steps) > 0
-    surprised = False
-    for i in range(count + 1):
-        surprised = surprised or turns[2 + i] >= PATIENCE
+    surprised = (turns[2 : count + 3] >= PATIENCE).any()
     for k in range(m):
         dt = step_of(intervals[k])
         p, y = 0.0, 0.0

@@ -65,8 +65,9 @@ class Constants(NamedTuple):
     """Constants of the model, in SI.
 
     ``snap`` is a spectral density; ``accelerometer_noise``, ``gyro_noise`` and ``turn_noise`` (of the gyros for roll
-    and yaw) are variances; ``gate`` is the largest square of an innovation over its variance. The resonators of the
-    sting, for heave and axial motion, have an angular frequency, a damping, and a level of the output.
+    and yaw) are variances; ``accelerometer_walk`` and ``gyro_walk`` what those of the biases gain in a second; ``gate``
+    is the largest square of an innovation over its variance. The resonators of the sting, for heave and axial motion,
+    have an angular frequency, a damping, and a level of the output.
     """
 
     gravity: float
@@ -74,6 +75,8 @@ class Constants(NamedTuple):
     accelerometer_noise: float
     gyro_noise: float
     turn_noise: float
+    accelerometer_walk: float
+    gyro_walk: float
     gyro_delay: float
     common_delay: float
     common_delay_u: float
@@ -265,6 +268,16 @@ def transition(dt: float, model: Model, F: Array, Q: Array) -> None:
 
 
 @kernel
+def wander(P: Array, dt: float, model: Model) -> None:
+    """Add to P (n, n) what the biases of the gyro and the accelerometers wander in ``dt`` [s]; of other gyros,
+    `turning`."""
+    constants = model.constants
+    P[GYRO_BIAS, GYRO_BIAS] += constants.gyro_walk * dt
+    for i in range(BIASES, BIASES + model.places.accelerometers):
+        P[i, i] += constants.accelerometer_walk * dt
+
+
+@kernel
 def _resonate(dt: float, of: Resonator, i: int, F: Array, Q: Array) -> None:
     """Put transition and noise of a resonator into the rows ``i`` and ``i + 1`` of ``F`` and ``Q``."""
     w0, zeta, level = of
@@ -303,4 +316,5 @@ def turning(x: Array, step: Step, model: Model, F: Array, Q: Array) -> tuple[flo
     Q[a, a] = (1.0 + c * c * tangent * tangent) * noise
     Q[0, a] = -s * c * tangent * noise
     Q[a, 0] = Q[0, a]
+    Q[a + 1, a + 1] = Q[a + 2, a + 2] = model.constants.gyro_walk * dt
     return x[0] + c * turned + s * y * dt, x[roll] + dt * (p + across * tangent)

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from inercal.aoa.band import WHOLE, Band
-from inercal.aoa.fusion.model import Constants, Model, Places
+from inercal.aoa.fusion.model import BIASES, Constants, Model, Places
 from inercal.aoa.layout import Layout
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
@@ -127,6 +127,9 @@ def problem(
     places = Places(n, size, **parts, moving=moving)
     if posterior is not None:
         _known_before(names, mean, covariance, posterior)
+    # of the vibration of this recording, which no earlier run knows
+    biases = np.arange(BIASES, BIASES + n)
+    covariance[biases, biases] += prior.rectified**2
     return FilterProblem(
         layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry, settings.band
     )
@@ -143,6 +146,8 @@ def _constants(settings: AoaSettings) -> Constants:
         accelerometer_noise=noise.accelerometer**2 / every,
         gyro_noise=noise.gyro**2 / every,
         turn_noise=noise.gyro**2 / every,
+        accelerometer_walk=noise.accelerometer_walk**2,
+        gyro_walk=noise.gyro_walk**2,
         gyro_delay=timing.gyro_delay or 0.0,
         common_delay=timing.common_delay,
         common_delay_u=timing.common_delay_u,

@@ -139,8 +139,14 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource
         levels = ("heave_level", "axial_level") if begin == ("s_", "flexure_") else ()
         return BudgetSource(name, "B", u, unit, levels=levels, states=states)
 
+    of_bias = ("accelerometer bias", noise.accelerometer_bias)
+    if prior.rectified:
+        of_bias = (
+            "accelerometer bias with rectified vibration",
+            float(np.hypot(of_bias[1], prior.rectified)),
+        )
     of_states = (
-        of_prior("accelerometer bias", noise.accelerometer_bias, "m/s^2", *accelerometers),
+        of_prior(*of_bias, "m/s^2", *accelerometers),
         of_prior("gyro bias", noise.gyro_bias, "rad/s", "b_g", "b_roll", "b_yaw"),
         of_prior("lever arms", lever, "m", "dr_"),
         of_prior("heights", prior.height, "m", "zo_"),
@@ -157,11 +163,18 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource
         )
     if zero is not None:
         of_inputs.append(BudgetSource("stated zero", "B", zero.u, "rad", zero=True))
+    of_walks = (
+        BudgetSource(
+            "accelerometer walk", "B", noise.accelerometer_walk, "m/s^2/sqrt(s)", ("accelerometer_walk",)
+        ),
+        BudgetSource("gyro walk", "B", noise.gyro_walk, "rad/s/sqrt(s)", ("gyro_walk",)),
+    )
     return (
         BudgetSource("accelerometer noise", "A", noise.accelerometer, "m/s^2", ("accelerometer_noise",)),
         BudgetSource("gyro noise", "A", noise.gyro, "rad/s", ("gyro_noise", "turn_noise")),
         *(each for each in of_states if each.states),
         *of_inputs,
+        *(each for each in of_walks if each.u),
         BudgetSource("motion between samples", "B", 1.0, "1", ("snap",)),
     )
 

@@ -64,6 +64,35 @@ def sensitivities(
 
     ``attitudes`` (n, 4), ``coefficients`` and ``restarts`` as of `inercal.selfcal.before.bounds.recorded_bounds`.
     """
+    return -_carried(recording, problem, attitudes, coefficients, names, restarts, np.empty((0, 6, 0)))[3:]
+
+
+def innovation_slopes(
+    recording: Recording,
+    problem: FilterProblem,
+    attitudes: Array,
+    coefficients: Array,
+    names: Sequence[str],
+    restarts: Sequence[int] = (),
+) -> Array:
+    """Changes (n - 1, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities`
+    are of the estimates; 0 where nothing was measured."""
+    slopes = np.zeros((len(attitudes), 6, len(names)))
+    _carried(recording, problem, attitudes, coefficients, names, restarts, slopes)
+    return slopes[1:]
+
+
+def _carried(
+    recording: Recording,
+    problem: FilterProblem,
+    attitudes: Array,
+    coefficients: Array,
+    names: Sequence[str],
+    restarts: Sequence[int],
+    slopes: Array,
+) -> Array:
+    """Sensitivities (3 + p, m) of the errors of attitude and states at the end; ``slopes`` (n, 6, m), or (0, 6, m), are
+    written."""
     p, m = len(coefficients), len(names)
     states = problem.states
     place = np.full(len(ALL), -1, dtype=np.int64)
@@ -82,12 +111,13 @@ def sensitivities(
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
         rows, steps = slice(first, last), slice(first, max(last - 1, 0))
-        carry(P, S, Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows]), full, model)
+        path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows])
+        carry(P, S, path, full, model, slopes[rows])
         if last < len(q):
             P[:3], P[:, :3], S[:3] = 0.0, 0.0, 0.0
             P[np.diag_indices(3)] = anew(problem, th[last]).sigma ** 2
         first = last
-    return -S[3:]
+    return S
 
 
 def _on_encoders(P: Array, S: Array, wide: FilterProblem, th: Array, c: Array, rate: Array) -> None:
@@ -105,9 +135,10 @@ def _on_encoders(P: Array, S: Array, wide: FilterProblem, th: Array, c: Array, r
 
 
 @kernel
-def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
+def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: Array) -> None:
     """Covariance ``P`` (n, n) of the error state and sensitivities ``S`` (n, m) along a path, in place; ``c`` is the
-    whole full vector, linear form; in the layout considered states have the places behind the n."""
+    whole full vector, linear form; in the layout considered states have the places behind the n. ``slopes`` (rows, 6,
+    m), or none, receive those of the normalised innovations."""
     q, th, dt, w, seen, warm = path
     world, noise, gate, layout = model
     n, place = len(P), layout.place
@@ -135,10 +166,15 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
             if seen[k, 3]:
-                roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                roots, variances = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
                 wide = encoder_columns(
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                 )
+                for i in range(3 if len(slopes) > 0 else 0):
+                    row.places[0], row.values[0] = i, 1.0
+                    for a in range(wide):
+                        row.places[1 + a], row.values[1 + a] = columns.places[a], -columns.axes[a, i]
+                    _shown(P, S, row, 1 + wide, variances[i], slopes[k, 3 + i])
                 for i in range(3):
                     root = roots[i]
                     for j in range(i + 1):
@@ -149,6 +185,10 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel) -> None:
                         row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
                     _update(P, S, row, i + 1 + wide, 1.0, gain)
             sensed = sensing(at, read, earth_e, up_e, warm[k], c)
+            for i in range(3 if len(slopes) > 0 else 0):
+                if seen[k, i] and admitted(i, gate, near):
+                    size = accelerometer_row(i, sensed, c, place, up_e, row)
+                    _shown(P, S, row, size, variance, slopes[k, i])
             for i in range(3):
                 if seen[k, i] and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
@@ -192,6 +232,24 @@ def _carry_step(
     for i in range(3):
         for k in range(m):
             S[i, k] = shift[i, k]
+
+
+@kernel
+def _shown(P: Array, S: Array, row: Row, size: int, r: float, slope: Array) -> None:
+    """Slopes (m,) of a normalised innovation of variance ``r`` beside that of the error state."""
+    places, values, n, total = row.places, row.values, len(P), r
+    for a in range(size):
+        for b in range(size):
+            if places[a] < n and places[b] < n:
+                total += values[a] * values[b] * P[places[a], places[b]]
+    for k in range(len(slope)):
+        seen = 0.0
+        for a in range(size):
+            if places[a] < n:
+                seen += values[a] * S[places[a], k]
+            elif places[a] == n + k:
+                seen += values[a]
+        slope[k] = seen / math.sqrt(total) if total > 0.0 else math.nan
 
 
 @kernel

@@ -20,7 +20,9 @@ from inercal.findings import EVERYTHING, Finding
 from inercal.instruments.terms import shown_unit
 from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, sound, sum_of_squares, white
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
+from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
+from inercal.selfcal.diagnosis.rig_errors import WANDERING
 from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
 from inercal.selfcal.filters.filter_result import FilterResult
@@ -79,9 +81,12 @@ def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Fin
     fair = (recording, meant)
     errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), systematic)
     now = filtered(corrected)
-    # a walk of the gyros larger than stated looks like many errors, none of which makes innovations white
-    if errors and not white(corrected, now) and (walk := restless_gyros(fair)) is not None:
-        return [walk]
+    # what is no constant error looks like many, none of which makes innovations white, or like biases that wander
+    unexplained = bool(errors) and not white(corrected, now)
+    if unexplained or any(each.hypothesis.name in WANDERING.values() for each in errors):
+        walk = restless_gyros(fair) or (needed_states(fair) if unexplained else None)
+        if walk is not None:
+            return [walk]
     rest = misstated(corrected, now)
     if errors and any(finding.code == "contradiction" for finding in rest):
         return misstated(fair, filtered(fair))  # errors that leave a contradiction are none

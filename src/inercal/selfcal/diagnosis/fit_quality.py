@@ -25,7 +25,7 @@ class ErrorState:
     def residuals(self, case: Case) -> Array:
         """(n - 1, 6) normalised innovations."""
         innovations = filtered(case).innovations  # its own, and large
-        innovations[_near_lock(case[0])] = np.nan
+        innovations[near_lock(case[0])] = np.nan
         return innovations
 
     def misfit(self, case: Case) -> float:
@@ -44,11 +44,11 @@ def filtered(case: Case) -> FilterResult:
 def regular(recording: Recording, result: FilterResult) -> Array:
     """Normalised innovations (n - 1, 6), NaN near gimbal lock."""
     innovations = result.innovations.copy()
-    innovations[_near_lock(recording)] = np.nan
+    innovations[near_lock(recording)] = np.nan
     return innovations
 
 
-def _near_lock(recording: Recording) -> NDArray[np.bool_]:
+def near_lock(recording: Recording) -> NDArray[np.bool_]:
     """Steps (n - 1,) that end near gimbal lock."""
     angle = recording.th[1:, 1]
     return np.asarray(~(np.abs(np.cos(angle)) >= LIMITS.lock_cosine) & np.isfinite(angle))

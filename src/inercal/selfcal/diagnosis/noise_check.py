@@ -13,6 +13,7 @@ from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, white
+from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 
@@ -44,7 +45,7 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
         return findings
     if not wide and whiteness(z) > LIMITS.risk:
         return []
-    return [restless_gyros(case) or _unexplained(z)]
+    return [restless_gyros(case) or needed_states(case) or _unexplained(z)]
 
 
 def _even(columns: Array, mean: float) -> bool:

@@ -7,8 +7,9 @@ stated uncertainty for a prior.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +18,10 @@ from inercal.arrays import Array
 from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, refitted, search, sigmas, tried
 from inercal.findings import EVERYTHING
 from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.rotations import boxminus, exp, rotate
-from inercal.instruments.terms import shown_unit
+from inercal.geometry.rotations import boxminus
 from inercal.records.places import counted
 from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, regular
+from inercal.selfcal.diagnosis.rig_errors import rig_errors
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
@@ -52,7 +53,22 @@ def likely(recording: Recording, problem: FilterProblem, systematic: Stated) -> 
 
 def small_errors(case: Case, systematic: Stated = None) -> tuple[Fits[Case], Case]:
     """Constant errors beside those of the systematic inputs, and the case without any of them."""
-    return search(case, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, systematic)
+    return search(
+        case, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, systematic, _with_those_alike
+    )
+
+
+def _with_those_alike(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
+    """Of the likeliest fits that explain as much the one with the fewest parameters, and the others beside it."""
+    some = list(itertools.islice(fits, LIMITS.alike_fits))
+    if len(some) < 2:
+        return some[0] if some else None
+    misfits = [JUDGE.misfit(fit[-1].case) for fit in some]
+    equal = [
+        fit for fit, misfit in zip(some, misfits, strict=True) if misfit <= min(misfits) + LIMITS.alike_misfit
+    ]
+    first, *others = sorted(equal, key=lambda fit: len(fit[-1].values))
+    return [*first[:-1], replace(first[-1], alike=tuple(fit[-1] for fit in others))]
 
 
 def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
@@ -66,53 +82,8 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     )
     if not case[1].states.has("delay"):
         yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
-    states = case[1].states
-    if not states.has("gamma"):
-        yield _vector(
-            "mounting",
-            "gamma",
-            _other_mounting,
-            "rad",
-            "the sensors are turned on the platform, against the axis of its joint",
-            "the angles are not those of the sensors' axes: align them, or take the turn out of the angles",
-        )
-    if not states.has("beta"):
-        yield _vector(
-            "base",
-            "beta",
-            _other_base,
-            "rad",
-            "the base or the zero of the encoders is turned",
-            "set extended = true under [filter], or correct heading and tilt under [rig]",
-        )
-    if not states.has("kg1"):
-        yield _vector(
-            "scale",
-            "kg1",
-            _other_scale,
-            "1",
-            "the gyros have scale errors",
-            "set extended = true under [filter]",
-        )
+    yield from rig_errors(case)
     yield from _harmonics(case, now)
-
-
-def _vector(
-    name: str, symbol: str, without: Callable[[Case, Array], Case], dimension: str, what: str, advice: str
-) -> Hypothesis[Case]:
-    """An error about three axes, of an SI unit."""
-    parameters = tuple(f"{symbol}_{axis}" for axis in "xyz")
-    unit, size = shown_unit(dimension)
-
-    def says(fit: Fitted[Case]) -> str:
-        seen = [
-            f"{parameter} = {value / size:.3g} +- {u / size:.1g} {unit}"
-            for parameter, value, u in zip(parameters, fit.values, fit.u, strict=True)
-            if abs(value) > LIMITS.shown_sigmas * u
-        ] or [f"{', '.join(parameters)} together"]
-        return f"{what}, which the model leaves out: {', '.join(seen)}; {advice}"
-
-    return Hypothesis(name, "unmodelled", says, without, parameters, 1e-5)
 
 
 def _delay(fit: Fitted[Case]) -> str:
@@ -134,13 +105,6 @@ def _latitude(fit: Fitted[Case]) -> str:
         f"the earth rate seen is that of latitude {math.degrees(seen):.2f} +- {math.degrees(u):.1g} deg, stated is "
         f"{math.degrees(stated_latitude):.2f} deg: check latitude and heading"
     )
-
-
-def _other_mounting(case: Case, values: Array) -> Case:
-    """Sensors turned by gamma [rad] against the axes of the encoders: ``q_bp = q_encoders qexp(gamma)``."""
-    recording, problem = case
-    turn = exp(values)
-    return replace(recording, acc=rotate(turn, recording.acc), rate=rotate(turn, recording.rate)), problem
 
 
 def _other_earth(case: Case, values: Array) -> Case:
@@ -169,20 +133,6 @@ def _delayed(case: Case, values: Array) -> Case:
     after = np.vstack([recording.rate[1:], recording.rate[-1:]])
     other = before if part > 0.0 else after
     return replace(recording, rate=recording.rate + abs(part) * (other - recording.rate)), problem
-
-
-def _other_base(case: Case, values: Array) -> Case:
-    """A base turned by beta [rad]."""
-    recording, problem = case
-    q, world = exp(values), problem.world
-    turned = world._replace(earth=rotate(q, world.earth), up=rotate(q, world.up))
-    return recording, replace(problem, world=turned)
-
-
-def _other_scale(case: Case, values: Array) -> Case:
-    """Gyros with scale errors."""
-    recording, problem = case
-    return replace(recording, rate=recording.rate * (1.0 + values)), problem
 
 
 def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:

@@ -136,7 +136,8 @@ def shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
         read.after[1] - read.before[1],
         read.after[2] - read.before[2],
     )
-    return square * (x * x + y * y + z * z) / (dt * dt)
+    x, y, z = x / dt, y / dt, z / dt
+    return square * (x * x + y * y + z * z)
 
 
 @kernel

@@ -66,7 +66,8 @@ class Recording:
         """The n - 1 steps from row to row."""
         rate = self.rate
         warm = np.zeros(len(rate)) if self.warm is None else self.warm[1:]
-        return Steps(self.dt, rate, self.acc[1:], self.th[1:], np.vstack([rate[1:], rate[-1:]]), warm)
+        later = np.vstack([rate[1:], np.zeros_like(rate[-1:])])  # behind the last row it may as well stop
+        return Steps(self.dt, rate, self.acc[1:], self.th[1:], later, warm)
 
     @property
     def walking(self) -> Array:

@@ -1,0 +1,224 @@
+"""Errors of the rig that are no states, as hypotheses: each kind of `inercal.selfcal.platform.states`, sensors that are
+late, and biases that wander.
+
+The innovations change with an error of the rig as its column in the model says; a run of the error-state filter beside
+the errors that are sought gives these columns (`inercal.selfcal.before.considered`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.hypotheses import Fitted, Hypothesis
+from inercal.instruments.terms import shown_unit
+from inercal.selfcal.before.considered import innovation_slopes
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, near_lock
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import ALL, STATES, TEMPERATURE, UNIT_OF, twins
+
+Columns = Callable[[Case, Sequence[str]], Array]
+"""Change (n - 1, 6, m) of the innovations of a case where an error of each of some parameters (m,) is taken out."""
+
+_EXTENDED = "set extended = true under [filter]"
+
+#: kind -> what is wrong, and what to do where naming it under [model] is not enough
+_WORDS: Final[Mapping[str, tuple[str, str]]] = {
+    "beta": (
+        "the base or the zero of the encoders is turned",
+        f"{_EXTENDED}, or correct heading and tilt under [rig]",
+    ),
+    "kg1": ("the gyros have scale errors", _EXTENDED),
+    "gamma": (
+        "the sensors are turned on the platform, against the axis of its joint",
+        "name gamma in states under [model], or align them",
+    ),
+    "non_orthogonality": ("the axes of the joints are not orthogonal", ""),
+    "zero_y": ("the inner encoder does not read zero where its joint is at zero", ""),
+    "k2": ("the accelerometers have second-order errors", ""),
+    "levers": ("the accelerometers are not at the centre of the gimbals", ""),
+    "scale_asymmetry": ("the scale of the gyros is not the same both ways", ""),
+    "g_sensitivity": ("the gyros drift by specific force", ""),
+    "sag": ("gravity turns the sensors on the platform", ""),
+    "kg0_T1": ("the gyro biases change with temperature", ""),
+    "ka0_T1": ("the accelerometer biases change with temperature", ""),
+    "ka1_T1": ("the accelerometer scales change with temperature", ""),
+}
+
+WANDERING: Final = {"ka0": "accelerometer biases wander", "kg0": "gyro biases wander"}
+"""Biases -> the hypothesis that they wander."""
+
+#: parameter of a delay -> its sensors
+_LATE: Final = {"tau_enc": "encoders", "tau_a": "accelerometers"}
+
+
+def rig_errors(case: Case) -> Iterator[Hypothesis[Case]]:
+    """Hypotheses of errors of the rig, without those that nobody can tell from others of them on this path."""
+    recording, problem = case
+    still = np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0) < LIMITS.still_joint
+    left_out = twins(tuple(_WORDS), np.flatnonzero(still).tolist())
+    kinds = dict[str, tuple[str, ...]]()
+    for kind in _WORDS:
+        names = tuple(name for name in STATES[kind].parameters if name not in left_out)
+        known = any(name in problem.names for name in STATES[kind].parameters)
+        if names and not known and (recording.warm is not None or kind not in TEMPERATURE):
+            kinds[kind] = names
+    late = tuple(name for name in _LATE if name not in problem.names)
+    columns = _together(case, (*(name for names in kinds.values() for name in names), *late))
+    for kind, names in kinds.items():
+        yield _kind(kind, names, columns)
+    for name in late:
+        yield _delay(name, columns)
+    yield _asymmetry()
+    for of, words in WANDERING.items():
+        if f"{of}_walk_x" not in problem.names:
+            yield _wander(of, words)
+
+
+def _together(case: Case, names: tuple[str, ...]) -> Columns:
+    """Columns of some parameters of one case, all found in one run, where there is room for them, and then kept."""
+    kept = list[Array]()
+
+    def columns(asked: Case, some: Sequence[str]) -> Array:
+        if asked is not case or len(names) * case[0].th.size > LIMITS.columns_at_once:
+            return _columns(asked, some)
+        if not kept:
+            kept.append(_columns(case, names))
+        return kept[0][:, :, [names.index(name) for name in some]]
+
+    return columns
+
+
+def _columns(case: Case, names: Sequence[str]) -> Array:
+    """Change (n - 1, 6, m) of the innovations where an error of each of ``names`` (m,) is taken out."""
+    recording, problem = case
+    now = filtered(case)
+    assert now.history is not None
+    along = now.history.attitude, now.coefficients
+    slopes = innovation_slopes(recording, problem, *along, names, now.restarts)
+    slopes[near_lock(recording)] = np.nan
+    return -slopes
+
+
+def _stated_with(names: Sequence[str]) -> Callable[[Case, Array], Case]:
+    """The case with errors of some parameters stated."""
+
+    def without(case: Case, values: Array) -> Case:
+        recording, problem = case
+        stated = problem.states.stated.copy()
+        stated[[ALL.index(name) for name in names]] += values
+        return recording, replace(problem, vector=replace(problem.states, stated=stated))
+
+    return without
+
+
+def _shown(names: Sequence[str], unit: str, fit: Fitted[Case]) -> str:
+    """Values of those parameters that are large, in words."""
+    shown, size = shown_unit(unit)
+    seen = [
+        f"{name} = {value / size:.3g} +- {u / size:.1g} {shown}"
+        for name, value, u in zip(names, fit.values, fit.u, strict=True)
+        if abs(value) > LIMITS.shown_sigmas * u
+    ]
+    return ", ".join(seen or [f"{', '.join(names)} together"])
+
+
+def _kind(kind: str, names: tuple[str, ...], columns: Columns) -> Hypothesis[Case]:
+    """An error of the rig."""
+    what, advice = _WORDS[kind]
+    remedy = advice or f"name {'temperature' if kind in TEMPERATURE else kind} in states under [model]"
+
+    def says(fit: Fitted[Case]) -> str:
+        return f"{what}, which the model leaves out: {_shown(names, UNIT_OF[names[0]], fit)}; {remedy}"
+
+    return Hypothesis(
+        kind, "unmodelled", says, _stated_with(names), names, derivative=lambda case: columns(case, names)
+    )
+
+
+def _delay(name: str, columns: Columns) -> Hypothesis[Case]:
+    """Encoders or accelerometers that are late."""
+
+    def says(fit: Fitted[Case]) -> str:
+        late = float(fit.values[0])
+        how = "late" if late > 0.0 else "early"
+        return (
+            f"{_LATE[name]} are {1e3 * abs(late):.3g} ms {how}: name delay in states under [model], "
+            "or shift their times"
+        )
+
+    return Hypothesis(
+        name,
+        "command_shift",
+        says,
+        _stated_with((name,)),
+        (name,),
+        bounds=(-LIMITS.small_delay, LIMITS.small_delay),
+        derivative=lambda case: columns(case, (name,)),
+    )
+
+
+def _asymmetry() -> Hypothesis[Case]:
+    """Accelerometers whose scale differs with the sign of the force; no state has it."""
+    names = tuple(f"scale of accelerometer {i} forward less backward" for i in "xyz")
+
+    def without(case: Case, values: Array) -> Case:
+        recording, problem = case
+        return replace(recording, acc=recording.acc - 0.5 * values * np.abs(recording.acc)), problem
+
+    def derivative(case: Case) -> Array:
+        recording, problem = case
+        signs = 0.5 * np.sign(np.nan_to_num(recording.acc))
+        parts = [
+            _columns((replace(recording, warm=np.ascontiguousarray(signs[:, k])), problem), (name,))
+            for k, name in enumerate(STATES["ka1_T1"].parameters)
+        ]
+        return np.concatenate(parts, axis=-1)
+
+    def says(fit: Fitted[Case]) -> str:
+        shown = _shown(names, "1", fit)
+        return f"the scale of the accelerometers is not the same both ways: {shown}; take it out of their readings"
+
+    return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=derivative)
+
+
+def _wander(of: str, words: str) -> Hypothesis[Case]:
+    """Biases ``ka0`` or ``kg0`` that wander about their means: cosines of time, of half a period, a whole one .."""
+    parameters = tuple(f"{of}_{i} {j}" for j in range(1, LIMITS.wandering + 1) for i in "xyz")
+
+    def without(case: Case, values: Array) -> Case:
+        recording, problem = case
+        biases = _waves(recording) @ values.reshape(-1, 3)
+        if of == "ka0":
+            return replace(recording, acc=recording.acc - biases), problem
+        return replace(recording, rate=recording.rate + biases[1:]), problem
+
+    def derivative(case: Case) -> Array:
+        recording, problem = case
+        parts = [
+            _columns(
+                (replace(recording, warm=np.ascontiguousarray(wave)), problem), STATES[f"{of}_T1"].parameters
+            )
+            for wave in _waves(recording).T
+        ]
+        return np.concatenate(parts, axis=-1)
+
+    def says(fit: Fitted[Case]) -> str:
+        unit, size = shown_unit(UNIT_OF[f"{of}_x"])
+        course = _waves(fit.case[0]) @ fit.values.reshape(-1, 3)
+        worst = int(np.argmax(np.ptp(course, axis=0)))
+        about = f"{of}_{'xyz'[worst]} by {np.ptp(course[:, worst]) / size:.2g} {unit}"
+        return f"{words}, {about}: name bias_walk, or temperature, in states under [model]"
+
+    return Hypothesis(words, "unmodelled", says, without, parameters, derivative=derivative)
+
+
+def _waves(recording: Recording) -> Array:
+    """Cosines of time (n, LIMITS.wandering) over a recording."""
+    through = (recording.t - recording.t[0]) / (recording.t[-1] - recording.t[0])
+    return np.asarray(np.cos(np.pi * np.multiply.outer(through, np.arange(1, LIMITS.wandering + 1))))

@@ -1,0 +1,91 @@
+"""Errors of the rig that are no states are named, on records of a simulator that shares no code."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from independent import selfcal as platform
+from independent.selfcal import ARCSEC, DEG_H, PPM, THREE, UG, Drive, Faults, G
+
+from inercal.estimate.hypotheses import slopes
+from inercal.records.read import read
+from inercal.selfcal.diagnosis.examination import diagnose
+from inercal.selfcal.diagnosis.fit_quality import JUDGE
+from inercal.selfcal.diagnosis.rig_errors import rig_errors
+from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.reading import recording_of
+from inercal.studies.load import load_selfcal_study
+
+DRIVE = Drive(THREE, ramp=0.4)
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rig") / "study.toml"
+    path.write_text(platform.study(more='[model]\nstates = "paper"\n'))
+    return load_selfcal_study(path)
+
+
+def recorded(settings, folder, faults, seed=3):
+    platform.simulated(np.random.default_rng([20261123, seed]), DRIVE, faults=faults).write(
+        folder / "record.csv"
+    )
+    return recording_of(read([folder / "record.csv"]), settings)
+
+
+@pytest.mark.slow
+def test_columns_of_innovations_are_differences(settings, tmp_path):
+    """Each hypothesis of the rig: its derivative, and the innovations of the filter run again with it taken out."""
+    case = (recorded(settings, tmp_path, Faults(warming=2.0)), problem(settings))
+    z = JUDGE.residuals(case)
+    for each in rig_errors(case):
+        exact = slopes(case, each, z, JUDGE)
+        for k in range(0, len(each.parameters), 4):
+            size = 1e-3 / np.nanmax(np.abs(exact[..., k]))
+            by_runs = slopes(case, replace(each, derivative=None, step=size), z, JUDGE)[..., k]
+            off = np.nanmax(np.abs(exact[..., k] - by_runs)) / np.nanmax(np.abs(exact[..., k]))
+            # of late encoders the two sides differ where a turn begins
+            assert off < (0.2 if each.name == "tau_enc" else 0.002), each.parameters[k]
+
+
+NAMED = {
+    "gamma": (Faults(gamma=np.array([3.0, -3.0, 3.0]) * ARCSEC), "turned on the platform"),
+    "non-orthogonality": (Faults(non_orthogonality=np.array([5.0, -5.0]) * ARCSEC), "not orthogonal"),
+    "zero_y": (Faults(zero=np.array([0.0, 5.0, 0.0]) * ARCSEC), "does not read zero"),
+    "base": (Faults(base=np.array([5.0, 0.0, 5.0]) * ARCSEC), "base or the zero"),
+    "k2": (Faults(k2=np.array([5e-6, -5e-6, 5e-6]) / G), "second-order"),
+    "levers": (
+        Faults(levers=0.05 * np.array([[1, -1, 1], [1, 1, -1], [-1, 1, 1.0]])),
+        "centre of the gimbals",
+    ),
+    "asymmetry": (
+        Faults(asymmetry=np.array([20.0, -20.0, 20.0]) * PPM),
+        "accelerometers is not the same both ways",
+    ),
+    "g-sensitivity": (
+        Faults(g_sensitivity=0.05 * DEG_H),
+        "equally possible: the gyros drift by specific force",
+    ),
+    "sag": (Faults(sag=2 * ARCSEC), "gravity turns"),
+    "kg1": (Faults(gyro_scale=np.array([10.0, -10.0, 10.0]) * PPM), "scale errors"),
+    "delay_encoder": (Faults(delay_encoder=1e-3), "encoders are 1 ms late"),
+    "delay_accelerometer": (Faults(delay_accelerometer=5e-3), "accelerometers are 4.98 ms late"),
+    "delay_gyro": (Faults(delay_gyro=1e-3), "later than its commands"),
+    "warm": (Faults(warming=1.0, bias_by_k=np.array([10.0, -10.0, 10.0]) * UG), "temperature"),
+    "flicker": (Faults(flicker=2 * UG), "wander"),
+}
+
+
+QUICK = ("gamma", "levers", "flicker")
+"""Of the standard tests; all of them are a campaign."""
+
+
+@pytest.mark.parametrize(
+    "fault", [each if each in QUICK else pytest.param(each, marks=pytest.mark.campaign) for each in NAMED]
+)
+def test_each_is_named(fault, settings, tmp_path):
+    faults, words = NAMED[fault]
+    made, of = recorded(settings, tmp_path, faults), problem(settings)
+    found = diagnose(made, of, estimate(made, of, history=False))
+    assert [words in each.message for each in found] == [True], [each.message for each in found]
