@@ -12,6 +12,7 @@ is said to do harm.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import os
 import tempfile
@@ -146,19 +147,25 @@ def calibrated(states: str, number: int, drawn: Faults):
         return ic.calibrate(ic.read(folder / "record.csv"), folder / "study.toml").estimate
 
 
+@functools.cache
+def without_fault(states: str, number: int) -> np.ndarray:
+    """The 18 coefficients of a record without a fault, with the same noise."""
+    return calibrated(states, number, Faults()).values[:18]
+
+
 def summary_of(states: str, fault: str, size: int, draws: int) -> dict:
     """Shift, verdicts and words of a fault."""
     rng = np.random.default_rng([SEED, list(ALL).index(fault), size])
     shift, errors, verdicts, said = [], [], Counter(), Counter()
     for number in range(draws):
         drawn = ALL[fault][size][1](rng)
-        sound, done = (calibrated(states, number, each) for each in (Faults(), drawn))
+        done = calibrated(states, number, drawn)
         verdicts[done.status.value] += 1
         harmful = {" ".join(f"{f.code}: {f.message}".split()[:8]) for f in done.findings if f.harm}
         said.update(harmful)
         if len(done.names):
             values, u = done.values[:18], done.u[:18]
-            shift.append((values - sound.values[:18]) / u)
+            shift.append((values - without_fault(states, number)) / u)
             if done.status.value == "ok":
                 errors.append(np.abs((values - TRUTH) / u).max())
     rms = np.sqrt(np.mean(np.square(shift), axis=0)) if shift else np.full(18, np.nan)
@@ -173,18 +180,18 @@ def summary_of(states: str, fault: str, size: int, draws: int) -> dict:
     }
 
 
-def table(results: dict[str, dict]) -> str:
-    """Markdown of a campaign."""
-    lines = ["| fault | size | shift | ok | worst of those ok | verdicts | said |", "|---" * 7 + "|"]
-    for key, each in results.items():
-        fault, size = key.split("|")
-        verdicts = ", ".join(f"{name} {count}" for name, count in each["verdicts"].items())
-        words = "; ".join(f"{text} ({count})" for text, count in each["said"].items())
-        lines.append(
-            f"| {fault} | {size} | {each['rms']:.1f} u of {each['name']} | {100 * each['ok']:.0f} % "
-            f"| {each['worst_ok']:.1f} u | {verdicts} | {words} |"
-        )
-    return "\n".join(lines)
+HEAD = "| fault | size | shift | ok | worst of those ok | verdicts | said |\n" + "|---" * 7 + "|"
+
+
+def row(key: str, each: dict) -> str:
+    """Markdown of one fault."""
+    fault, size = key.split("|")
+    verdicts = ", ".join(f"{name} {count}" for name, count in each["verdicts"].items())
+    words = "; ".join(f"{text} ({count})" for text, count in each["said"].items())
+    return (
+        f"| {fault} | {size} | {each['rms']:.1f} u of {each['name']} | {100 * each['ok']:.0f} % "
+        f"| {each['worst_ok']:.1f} u | {verdicts} | {words} |"
+    )
 
 
 def main() -> None:
@@ -202,11 +209,17 @@ def main() -> None:
             f"{fault}|{ALL[fault][k][0]}": pool.submit(summary_of, given.states, fault, k, given.draws)
             for fault, k in asked
         }
-        results = {key: each.result() for key, each in waiting.items()}
-    if given.out is not None:
-        given.out.parent.mkdir(parents=True, exist_ok=True)
-        given.out.write_text(json.dumps(results, indent=1))
-    print(table(results))
+        results = {}
+        print(HEAD)
+        for (
+            key,
+            each,
+        ) in waiting.items():  # kept and printed as they come: a campaign that is cut off leaves these
+            results[key] = each.result()
+            print(row(key, results[key]), flush=True)
+            if given.out is not None:
+                given.out.parent.mkdir(parents=True, exist_ok=True)
+                given.out.write_text(json.dumps(results, indent=1))
 
 
 if __name__ == "__main__":
