@@ -74,33 +74,61 @@ def rig_errors(case: Case) -> Iterator[Hypothesis[Case]]:
         yield _kind(kind, names, columns)
     for name in late:
         yield _delay(name, columns)
-    yield _asymmetry()
+    yield _asymmetry(case)
     for of, words in WANDERING.items():
         if f"{of}_walk_x" not in problem.names:
-            yield _wander(of, words)
+            yield _wander(case, of, words)
 
 
 def _together(case: Case, names: tuple[str, ...]) -> Columns:
-    """Columns of some parameters of one case, all found in one run, where there is room for them, and then kept."""
-    kept = list[Array]()
+    """Columns of some parameters, all found in one run, where there is room for them, and then kept."""
+    all_of = _kept(case, len(names), lambda _: _columns(case, names))
 
     def columns(asked: Case, some: Sequence[str]) -> Array:
-        if asked is not case or len(names) * case[0].th.size > LIMITS.columns_at_once:
+        if len(names) * case[0].th.size > LIMITS.columns_at_once:
             return _columns(asked, some)
-        if not kept:
-            kept.append(_columns(case, names))
-        return kept[0][:, :, [names.index(name) for name in some]]
+        return all_of(asked)[:, :, [names.index(name) for name in some]]
 
     return columns
 
 
+def _kept(case: Case, count: int, columns: Callable[[Case], Array]) -> Callable[[Case], Array]:
+    """So many columns, where there is room for them, of the first case for all: a refit moves them by next to nothing,
+    and takes its residuals anew, so that it ends in the same place."""
+    first = list[Array]()
+
+    def of(asked: Case) -> Array:
+        if count * case[0].th.size > LIMITS.columns_at_once:
+            return columns(asked)
+        if not first:
+            first.append(columns(asked))
+        return first[0]
+
+    return of
+
+
 def _columns(case: Case, names: Sequence[str]) -> Array:
     """Change (n - 1, 6, m) of the innovations where an error of each of ``names`` (m,) is taken out."""
+    return _columns_by(case, [(case[0].warm, names)])
+
+
+def _columns_by(case: Case, errors: Sequence[tuple[Array | None, Sequence[str]]]) -> Array:
+    """The same of errors ``(course, names)``: those of temperature go with the ``course`` (n,) [K] instead."""
     recording, problem = case
     now = filtered(case)
     assert now.history is not None
     along = now.history.attitude, now.coefficients
-    slopes = innovation_slopes(recording, problem, *along, names, now.restarts)
+    parts = [
+        innovation_slopes(
+            recording if course is recording.warm else replace(recording, warm=course),
+            problem,
+            *along,
+            names,
+            now.restarts,
+        )
+        for course, names in errors
+    ]
+    slopes = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
     slopes[near_lock(recording)] = np.nan
     return -slopes
 
@@ -163,7 +191,7 @@ def _delay(name: str, columns: Columns) -> Hypothesis[Case]:
     )
 
 
-def _asymmetry() -> Hypothesis[Case]:
+def _asymmetry(about: Case) -> Hypothesis[Case]:
     """Accelerometers whose scale differs with the sign of the force; no state has it."""
     names = tuple(f"scale of accelerometer {i} forward less backward" for i in "xyz")
 
@@ -172,22 +200,20 @@ def _asymmetry() -> Hypothesis[Case]:
         return replace(recording, acc=recording.acc - 0.5 * values * np.abs(recording.acc)), problem
 
     def derivative(case: Case) -> Array:
-        recording, problem = case
-        signs = 0.5 * np.sign(np.nan_to_num(recording.acc))
-        parts = [
-            _columns((replace(recording, warm=np.ascontiguousarray(signs[:, k])), problem), (name,))
-            for k, name in enumerate(STATES["ka1_T1"].parameters)
-        ]
-        return np.concatenate(parts, axis=-1)
+        signs = 0.5 * np.sign(np.nan_to_num(case[0].acc)).T
+        names = STATES["ka1_T1"].parameters
+        return _columns_by(
+            case, [(np.ascontiguousarray(sign), (name,)) for sign, name in zip(signs, names, strict=True)]
+        )
 
     def says(fit: Fitted[Case]) -> str:
         shown = _shown(names, "1", fit)
         return f"the scale of the accelerometers is not the same both ways: {shown}; take it out of their readings"
 
-    return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=derivative)
+    return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=_kept(about, 3, derivative))
 
 
-def _wander(of: str, words: str) -> Hypothesis[Case]:
+def _wander(about: Case, of: str, words: str) -> Hypothesis[Case]:
     """Biases ``ka0`` or ``kg0`` that wander about their means: cosines of time, of half a period, a whole one .."""
     parameters = tuple(f"{of}_{i} {j}" for j in range(1, LIMITS.wandering + 1) for i in "xyz")
 
@@ -199,14 +225,8 @@ def _wander(of: str, words: str) -> Hypothesis[Case]:
         return replace(recording, rate=recording.rate + biases[1:]), problem
 
     def derivative(case: Case) -> Array:
-        recording, problem = case
-        parts = [
-            _columns(
-                (replace(recording, warm=np.ascontiguousarray(wave)), problem), STATES[f"{of}_T1"].parameters
-            )
-            for wave in _waves(recording).T
-        ]
-        return np.concatenate(parts, axis=-1)
+        names = STATES[f"{of}_T1"].parameters
+        return _columns_by(case, [(np.ascontiguousarray(wave), names) for wave in _waves(case[0]).T])
 
     def says(fit: Fitted[Case]) -> str:
         unit, size = shown_unit(UNIT_OF[f"{of}_x"])
@@ -215,7 +235,8 @@ def _wander(of: str, words: str) -> Hypothesis[Case]:
         about = f"{of}_{'xyz'[worst]} by {np.ptp(course[:, worst]) / size:.2g} {unit}"
         return f"{words}, {about}: name bias_walk, or temperature, in states under [model]"
 
-    return Hypothesis(words, "unmodelled", says, without, parameters, derivative=derivative)
+    kept = _kept(about, len(parameters), derivative)
+    return Hypothesis(words, "unmodelled", says, without, parameters, derivative=kept)
 
 
 def _waves(recording: Recording) -> Array:
