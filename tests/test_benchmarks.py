@@ -51,7 +51,7 @@ def test_each_part_gives_rows(quick):
             assert row.ratio is None or row.peer
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_table_objects_and_picture_are_written(quick, tmp_path):
     told = {
         "date": "2026-11-22T00:00:00+00:00",

@@ -63,7 +63,7 @@ def test_the_papers_method_comes_out_as_stated(ratios, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("states", "low"), [(8, 0.8), (19, 0.5)])
+@pytest.mark.parametrize(("states", "low"), [(8, 0.8), pytest.param(19, 0.5, marks=pytest.mark.campaign)])
 def test_uncertainties_are_those_of_the_errors(states, low):
     """Mean of (error / u)^2 between ``low`` and 1.2 over many draws, of which there are 24 here.
 

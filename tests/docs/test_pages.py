@@ -130,7 +130,7 @@ def test_a_page_runs_and_prints_what_it_shows(page, folder, capsys):
     follow(page, folder, run, capsys)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_page_runs_in_processes_of_their_own_too(folder, capsys):
     follow(APART, folder, run_apart, capsys)
 

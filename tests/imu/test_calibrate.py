@@ -259,7 +259,7 @@ def heading_kept(rng, count):
     ("white", "latitude_known"),
     [
         (2e-6, True),
-        (8.7e-5, False),
+        pytest.param(8.7e-5, False, marks=pytest.mark.campaign),
         pytest.param(2e-6, False, marks=pytest.mark.campaign),
         pytest.param(8.7e-5, True, marks=pytest.mark.campaign),
     ],

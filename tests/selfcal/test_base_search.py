@@ -137,7 +137,7 @@ def test_in_other_frames(frame, axes, tilt):
     assert_allclose(told.base.tilt, tilt, atol=60 * ARCSEC)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_at_high_latitude_errors_are_as_large_as_stated():
     """At 85 degrees earth rate has an eleventh of its north; headings all round, errors within chi-square's band."""
     values, headings = [], []

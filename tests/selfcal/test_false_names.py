@@ -75,7 +75,7 @@ def test_coloured_noise_is_no_walk_of_the_gyros(sensor, along):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [4.0, 30.0, 300.0])
+@pytest.mark.parametrize("factor", [4.0, 30.0, pytest.param(300.0, marks=pytest.mark.campaign)])
 def test_a_walk_larger_than_stated_is_told_with_the_range_that_fits(factor):
     restless = replace(STUDY.noise, angle_random_walk=factor * STUDY.noise.angle_random_walk)
     message = only(named(recorded(replace(STUDY, noise=restless))), "excess_scatter").message

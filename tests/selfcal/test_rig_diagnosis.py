@@ -77,10 +77,11 @@ NAMED = {
 }
 
 
-QUICK = ("gamma", "levers", "flicker")
+QUICK = ("gamma", "flicker")
 """Of the standard tests; all of them are a campaign."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", [each if each in QUICK else pytest.param(each, marks=pytest.mark.campaign) for each in NAMED]
 )
