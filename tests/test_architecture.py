@@ -36,6 +36,7 @@ FLOORS = [
     {"report"},
     {"stream"},
     {"examples"},
+    {"laboratory"},
     {"validate"},
     {"face"},
     {"cli", "__main__"},

@@ -72,6 +72,7 @@ Map, lower floors first; each imports only from those above its own line
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     studies, report, examples  files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
+    laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     face                       the verbs of Python, and the results that they give back
     cli                        one module per verb

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
+from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError, StudyError
@@ -120,7 +120,7 @@ def aoa(
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Measure the angle of attack of a wind-tunnel model."""
     keys = [*(overrides or ()), *how.keys]
@@ -168,7 +168,7 @@ def _runs(
     stream: bool,
     map_file: Path | None,
     span: Span,
-    output: ReportOutput,
+    output: ResultOutput,
 ) -> int:
     """Measure the runs of a table."""
     from inercal._jit import compiling
@@ -202,7 +202,7 @@ def _runs(
     return give(result, output, 0.0, "runs")
 
 
-def _live(made: list[Aoa], settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
+def _live(made: list[Aoa], settings: AoaSettings, interval: float, output: ResultOutput) -> Estimators:
     """Prepare a measurement row by row; ``made`` receives it."""
     from inercal._jit import compiling
     from inercal.aoa.fusion.live_band import load_kernels

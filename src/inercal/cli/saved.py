@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import FileOutput, MapFile, ReportOutput, Span, read_record, reading
+from inercal.cli.options import FileOutput, MapFile, ResultOutput, Span, read_record, reading
 from inercal.cli.outcome import WHOLE, emit, give
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.errors import InputError
@@ -100,7 +100,7 @@ def compare(
     second: Annotated[Path, Parameter(help="The later one, of the same instrument.")],
     /,
     *,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Compare two calibrations of one instrument."""
     from inercal.estimate.compare import Saved

@@ -11,6 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 from cyclopts.help import PlainFormatter
 
 from inercal import __version__
+from inercal.cli.tree_laboratory import LABORATORY
 from inercal.errors import UsageError
 
 if TYPE_CHECKING:
@@ -247,6 +248,7 @@ COMMANDS = {
         "Exit code 1: a case failed.",
         "inercal validate --report validation.html",
     ),
+    **LABORATORY,
     ("schema", ""): (
         "inercal.cli.package:schema",
         "Print one JSON Schema that covers every kind of study file, for editors and checkers.",
@@ -273,6 +275,7 @@ _GROUPS = {
     "calibrate": "Calibrate an instrument from a recording.",
     "design": "Design a test before it is made.",
     "simulate": "Simulate a recording of a test.",
+    "store": "The store of a laboratory: results kept for years.",
 }
 
 
