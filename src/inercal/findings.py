@@ -118,6 +118,7 @@ CODES: dict[str, Code] = {
     "flexure": Code("the support of the model shakes its sensors", _ALWAYS),
     "wide_flexure": Code("the support shakes the model beyond its usual flexure, which u allows for", _NEVER),
     "band_limited": Code("vibration is taken out of the sensors, motion above the band with it", _NEVER),
+    "beyond_limits": Code("an angle is beyond the limits that the study states", _NEVER),
     "rectification": Code("vibration makes an offset of the accelerometers", _BY_SIZE),
     "unmodelled": Code("the recording shows errors that the model leaves out", _BY_SIZE, rank=9),
     "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE, rank=10),

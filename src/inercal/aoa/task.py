@@ -24,6 +24,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.reference.sensor_fit import Verified, fit
 from inercal.aoa.reference.static_fit import at_rests_alone, static_fit
+from inercal.aoa.result.alarms import beyond_limits
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.outcome import assemble, assemble_paper
@@ -147,6 +148,7 @@ def measure(
         progress(label(methods))
         angles = by_methods(recording, settings, methods)
     compared = _compared(zeroed, settings, angles, progress) if compare else {}
+    findings = [*findings, *beyond_limits(angles, recording.t, settings)]
     progress("assembling")
     at_rest = points(recording, angles, settings)
     judged: dict[str, Errors] = {}

@@ -19,6 +19,7 @@ from inercal.aoa.fusion.band import BandState
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.loop import BESIDE, MOTION, OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.fusion.watch import watched
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.errors import RecordError
@@ -134,6 +135,7 @@ def load_kernels(problem: FilterProblem) -> None:
     row[0, 0] = 0.0
     LimitedLive(replace(problem, band=Band(np.inf, (1.0,), 10.0))).feed_rows(row)
     carried_on(np.zeros((1, MOTION)), np.zeros(1), problem.constants)
+    watched(np.zeros(1), row[:, : problem.count + 1], problem.constants.gate)
 
 
 def _apart(state: LimitedState) -> LimitedState:

@@ -18,6 +18,7 @@ import numpy as np
 from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.fusion.watch import watched
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
@@ -86,7 +87,8 @@ def by_fusion(
     recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
 ) -> Angles:
     """The angles of the fusion, with the roll where gyros track it; stated inputs count in their uncertainty."""
-    angles = of_fusion(filtered, settings.estimator.states)
+    nis = watched(recording.t, filtered.innovations, problem.constants.gate)
+    angles = replace(of_fusion(filtered, settings.estimator.states), nis=nis)
     if (tracked := tracked_roll(recording, problem, filtered)) is not None:
         angles = replace(angles, roll=tracked[0], roll_u=tracked[1])
 
