@@ -88,7 +88,7 @@ def chart(series: Series) -> Chart:
 
 
 def _expected(series: Series, k: int) -> tuple[Array, Array, Array]:
-    """What calibration k should find by those before it: weights, means and sigmas of a mixture over s.
+    """Distribution of calibration k by those before it: weights, means and sigmas of a mixture over s.
 
     The common part of u is the same in all, and cancels.
     """
