@@ -18,11 +18,10 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from inercal.arrays import Array
-from inercal.laboratory.wander import Series, prior_of
+from inercal.laboratory.wander import Series, prior_of, rising
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -110,8 +109,4 @@ def _quantile(weights: Array, means: Array, sigmas: Array, p: float) -> float:
     """Quantile of a mixture of normal distributions."""
     spread = 40.0 * sigmas
     low, high = float((means - spread).min()), float((means + spread).max())
-    return float(
-        brentq(
-            lambda x: float(weights @ ndtr((x - means) / sigmas)) - p, low, high, xtol=1e-12 * (high - low)
-        )
-    )
+    return rising(lambda x: float(weights @ ndtr((x - means) / sigmas)), p, low, high)
