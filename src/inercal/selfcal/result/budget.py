@@ -88,8 +88,8 @@ def considered(
 def _wandering(noise: Noise, lasts: float, u: Mapping[str, float]) -> dict[str, tuple[float, str]]:
     """Biases that wander about their means, of which a recording that ``lasts`` [s] has another mean: the variance of
     the mean of an exponentially correlated process (A. Gelb, Applied Optimal Estimation, 1974, section 3.8)."""
-    ratio = LIMITS.walk_time / lasts
-    of_mean = math.sqrt(LIMITS.walk_time * ratio * (1.0 - ratio * -math.expm1(-1.0 / ratio)))
+    x = lasts / LIMITS.walk_time
+    of_mean = math.sqrt(LIMITS.walk_time * (0.5 - x / 6.0 if x < 1e-3 else (1.0 + math.expm1(-x) / x) / x))
     walks = {"kg0": ("gyro_walk", noise.gyro_walk), "ka0": ("accelerometer_walk", noise.accelerometer_walk)}
     found = []
     for bias, (key, usual) in walks.items():
