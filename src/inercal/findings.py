@@ -112,6 +112,8 @@ CODES: dict[str, Code] = {
     "no_coefficients": Code("nothing is known of the instrument by which table errors act", _NEVER),
     "not_at_rest": Code("the instrument moves, or is disturbed, where it should be at rest", _BY_SIZE),
     "bad_verdict": Code("a calibration that is used ended with a bad verdict", _ALWAYS),
+    "calibration_left_out": Code("calibrations that are not ok do not count in a history", _NEVER),
+    "undated": Code("a calibration does not say when it was measured", _NEVER),
     "other_model": Code("two calibrations are not of the same kind", _ALWAYS),
     "same_recording": Code("two calibrations rest on the same recording", _NEVER),
     "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),

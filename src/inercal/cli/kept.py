@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import Output, ReportOutput, StoreOption, working
+from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit
 from inercal.errors import InercalError, InputError
 
@@ -22,12 +22,10 @@ def keep(
     result: Annotated[Path, Parameter(help="Result that a command wrote to --out (.json or .toml).")],
     /,
     *,
-    report: Annotated[Path | None, Parameter(help="Its report, kept beside it.")] = None,
-    instrument: Annotated[
-        str | None, Parameter(help='"maker, model, serial" of the instrument, where the result does not say.')
-    ] = None,
+    instrument: InstrumentOption = None,
     store: StoreOption = None,
     output: Output = Output(),  # noqa: B008  (frozen)
+    report: Annotated[Path | None, Parameter(help="Its report, kept beside it.")] = None,
 ) -> None:
     """Keep a result that was made elsewhere."""
     from inercal._files import read_bytes
@@ -73,7 +71,7 @@ def instruments(*, store: StoreOption = None, output: Output = Output()) -> None
 
 def results(
     *,
-    instrument: Annotated[str | None, Parameter(help="Serial number of the instrument.")] = None,
+    instrument: InstrumentOption = None,
     since: Annotated[str | None, Parameter(help='First day, such as "2026-01-31".')] = None,
     status: Annotated[str | None, Parameter(help='Only results of this status, such as "ok".')] = None,
     store: StoreOption = None,

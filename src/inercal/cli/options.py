@@ -156,6 +156,11 @@ StoreOption = Annotated[
 ]
 
 
+InstrumentOption = Annotated[
+    str | None, Parameter(help='The instrument: its serial number, or "maker, model, serial".')
+]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class ResultOutput(ReportOutput):
@@ -163,12 +168,7 @@ class ResultOutput(ReportOutput):
 
     keep: Annotated[bool, Parameter(help="Keep the result, its files and report in the store.")] = False
     store: StoreOption = None
-    instrument: Annotated[
-        str | None,
-        Parameter(
-            help='With --keep: "maker, model, serial" of the instrument, where the study does not say.'
-        ),
-    ] = None
+    instrument: InstrumentOption = None
 
     def check(self, suffixes: Sequence[str], inputs: Iterable[str | Path | None] = ()) -> None:
         """Fail before any work is done where a result could not be written or kept; raises `InputError`."""

@@ -54,6 +54,14 @@ LABORATORY = {
         "(.json or .toml), --report the page that was kept with it.",
         "inercal show 6fee8a0a58 --report cal.html",
     ),
+    ("history", ""): (
+        "inercal.cli.history:history",
+        "Follow the coefficients of an instrument from calibration to calibration.\n\nControl charts, drift and random "
+        "walk, the value to expect at a date with its uncertainty, and with --tolerance conformity and the date of the "
+        "next calibration. --out writes the result (.json or .toml) or all calibrations (.csv), --report a page with "
+        "the charts. Exit code 1: the last calibration alarms, or is outside a tolerance.",
+        "inercal history 1234 --coefficient K1 --tolerance spec.toml --report history.html",
+    ),
     ("supersede", ""): (
         "inercal.cli.kept:supersede",
         "Say that a result takes the place of another of the same instrument, and why.\n\nBoth stay in the store; "
