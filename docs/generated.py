@@ -295,7 +295,9 @@ def reference_types() -> str:
     from inercal.instruments.reference_types import reference_types as types
 
     rows = [(code(kind), meaning, code(unit)) for kind, (meaning, unit) in types().items()]
-    return table(("type", "meaning", "unit"), [*rows, *((code(kind), said, "") for kind, said in OTHERS.items())])
+    return table(
+        ("type", "meaning", "unit"), [*rows, *((code(kind), said, "") for kind, said in OTHERS.items())]
+    )
 
 
 # limits ---------------------------------------------------------------------------------------------------------------

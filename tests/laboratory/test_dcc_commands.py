@@ -84,7 +84,10 @@ def test_a_certificate_is_applied_and_compared(folder, capsys):
     sets = ["--set", "item.model=node", "--set", "item.serial=S7"]
     assert run(["calibrate", "imu", *recorded, "--study", "ferraris.toml", *sets, "--out", "r.json"]) == 0
     data = json.loads((folder / "r.json").read_text())
-    assert {key: data["traceability"][key] for key in ("model", "serial")} == {"model": "node", "serial": "S7"}
+    assert {key: data["traceability"][key] for key in ("model", "serial")} == {
+        "model": "node",
+        "serial": "S7",
+    }
     assert run(["certificate", "r.json", "--lab", "lab.toml", "--number", "1", "--out", "c.xml"]) == 0
     for calibration, out in (("r.json", "a.csv"), ("c.xml", "b.csv")):
         assert run(["apply", calibration, *recorded, "--out", out]) == 0
