@@ -18,11 +18,10 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from inercal.arrays import Array
-from inercal.laboratory.wander import Series, prior_of
+from inercal.laboratory.wander import Series, prior_of, rising
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -88,7 +87,7 @@ def chart(series: Series) -> Chart:
 
 
 def _expected(series: Series, k: int) -> tuple[Array, Array, Array]:
-    """What calibration k should find by those before it: weights, means and sigmas of a mixture over s.
+    """Distribution of calibration k by those before it: weights, means and sigmas of a mixture over s.
 
     The common part of u is the same in all, and cancels.
     """
@@ -110,8 +109,4 @@ def _quantile(weights: Array, means: Array, sigmas: Array, p: float) -> float:
     """Quantile of a mixture of normal distributions."""
     spread = 40.0 * sigmas
     low, high = float((means - spread).min()), float((means + spread).max())
-    return float(
-        brentq(
-            lambda x: float(weights @ ndtr((x - means) / sigmas)) - p, low, high, xtol=1e-12 * (high - low)
-        )
-    )
+    return rising(lambda x: float(weights @ ndtr((x - means) / sigmas)), p, low, high)

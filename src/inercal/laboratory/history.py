@@ -13,6 +13,7 @@ from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.shown import units_shown
 from inercal.findings import Finding, Status
+from inercal.instruments.terms import shown_unit
 from inercal.laboratory.chart import Chart, chart
 from inercal.laboratory.specification import Conformity, Specification, conformity, group_of
 from inercal.laboratory.wander import Interval, Series, Wandering, wandering
@@ -159,7 +160,7 @@ def _course(
 ) -> Course:
     """One coefficient."""
     rows = sorted(rows, key=lambda row: (day_of(row)[0], row["made"]))
-    ((shown, size),) = units_shown(rows[0]["command"], [unit])
+    shown, size = _shown(rows[0]["command"], unit)
     dates = tuple(day_of(row)[0] for row in rows)
     begin = dates[0]
 
@@ -185,6 +186,13 @@ def _course(
     expected = None if wander is None else wander.at((at - begin).days / YEAR)
     ids = tuple(row["id"] for row in rows)
     return Course(name, shown, dates, ids, series, k * u, E_n, chart(series), wander, expected, judged, due)
+
+
+def _shown(command: str, unit: str) -> tuple[str, float]:
+    """The unit for people, and how many of ``unit`` it is: in that of the field for what is in SI."""
+    if command == "calibrate turntable" and unit != "1":
+        return shown_unit(unit)
+    return units_shown(command, [unit])[0]
 
 
 def _due(wander: Wandering, limits: tuple[float, float], begin: date) -> date | None:
