@@ -135,6 +135,18 @@ def minimal():
 def test_a_new_lab_and_nothing_overwritten(folder, capsys):
     assert run(["new", "lab"]) == 2
     assert "lab.toml: exists already" in capsys.readouterr().err
-    assert run(["new", "lab", "--out", "mine.toml"]) == 0
+    assert (
+        run(
+            ["new", "lab", "--out", "mine.toml", "--set", "customer.name=Flight", "--set", "order.number=A-1"]
+        )
+        == 0
+    )
     assert 'fill in each "?"' in capsys.readouterr().out
-    assert tomllib.loads((folder / "mine.toml").read_text())["laboratory"]["name"] == "?"
+    stated = tomllib.loads((folder / "mine.toml").read_text())
+    assert (stated["laboratory"]["name"], stated["customer"]["name"], stated["order"]["number"]) == (
+        "?",
+        "Flight",
+        "A-1",
+    )
+    assert run(["new", "lab", "--out", "other.toml", "--set", "customer.nme=x"]) == 2
+    assert "customer.nme: unknown key, did you mean name?" in capsys.readouterr().err

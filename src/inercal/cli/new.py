@@ -83,7 +83,11 @@ def new_aoa(
     _new("aoa", files or [], overrides or [], output, rate)
 
 
-def new_lab(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen)
+def new_lab(
+    *,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
     """Write what a laboratory states in its certificates, to be filled in."""
     from inercal._files import write_text
     from inercal.estimate.result import without_coefficients
@@ -93,7 +97,7 @@ def new_lab(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (froze
     path = output.out or Path("lab.toml")
     if path.exists():
         raise InputError(path, "exists already, expected a new file name (--out)")
-    write_text(path, lab_template(path))
+    write_text(path, lab_template(path, overrides or ()))
     words = f'{path}: fill in each "?" and look it over'
     emit(without_coefficients("new lab", words, {"lab": str(path)}), words, output)
 

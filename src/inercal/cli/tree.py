@@ -253,7 +253,7 @@ COMMANDS = {
         "equipment and conditions, and the results themselves as files. --html writes it as a page. Only results that "
         "are ok get one. With --read a certificate of anybody is read and its numbers printed; `inercal apply` and "
         "`inercal compare` take one in the place of a calibration.",
-        "inercal certificate cal.json --lab lab.toml --number C-2026-1 --out cal.xml --html cal.html",
+        "inercal certificate cal.json --lab lab.toml --number 7 --out cal.xml",
     ),
     ("validate", ""): (
         "inercal.cli.validate:validate",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,6 +25,7 @@ from inercal.studies.laboratory import (
     LaboratoryTable,
     PlaceTable,
 )
+from inercal.studies.load import put
 from inercal.studies.schema import TomlSchema
 from inercal.studies.starting import UNKNOWN
 from inercal.units import shown
@@ -96,7 +98,7 @@ class LabFile(Strict):
     )
 
 
-_STARTING = {
+_STARTING: dict[str, Any] = {
     "persons": [{"name": UNKNOWN, "role": "head of laboratory", "signs": True}],
     "laboratory": dict.fromkeys(("name", "street", "post_code", "city", "country"), UNKNOWN),
     "customer": dict.fromkeys(("name", "city"), UNKNOWN),
@@ -123,10 +125,17 @@ _NEEDED = {
 """Table -> keys without which there is no certificate."""
 
 
-def lab_template(path: str | Path = "lab.toml") -> str:
-    """A ``lab.toml`` with every key in it, each explained."""
+def lab_template(path: str | Path = "lab.toml", overrides: Iterable[str] = ()) -> str:
+    """A ``lab.toml`` with every key in it, each explained; ``overrides`` are keys to state, ``"customer.name=Acme"``.
+
+    Raises `InputError` for a key that it cannot have.
+    """
     schema = LabFile.model_json_schema(schema_generator=TomlSchema)
-    return _HEAD.format(path=path) + commented(schema, schema["$defs"], _STARTING)
+    stated = deepcopy(_STARTING)
+    for override in overrides:
+        put(stated, override, Path(path).parent)
+    check(LabFile, stated, path, InputError)
+    return _HEAD.format(path=path) + commented(schema, schema["$defs"], stated)
 
 
 def read_lab(path: str | Path) -> LabFile:
