@@ -42,6 +42,7 @@ from inercal.studies.common import (
     site_of,
 )
 from inercal.studies.fields import ExactText, QuantityText, refusal
+from inercal.studies.laboratory import Equipment, Item, ItemTable, Laboratory, LaboratoryTable, traced
 from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
 from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
@@ -238,6 +239,9 @@ class AoaStudyFile(Strict):
     goal: Stated[Goal] = Field(
         default=Goal(), title="Goal", description="uncertainty that a design is to reach"
     )
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -269,7 +273,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
         design=_design(file.design, path),
         goal=file.goal,
-        traceability=file.traceability.model_dump(),
+        traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
