@@ -73,7 +73,7 @@ def rows(seeds: range, rate: float, smoothed: bool) -> Iterator[tuple[str, np.nd
                 )
                 both[k] += np.array(figures) / len(seeds)
             paper = (of_paper(recording, smoothed) - run.theta)[late] / DEG
-            errors[number] = np.sqrt(figures[0]), np.sqrt(np.mean(paper**2))
+            errors[number] = np.sqrt(figures[0]), np.sqrt(np.nanmean(paper**2))
         both[:, :2] = np.sqrt(both[:, :2])
         yield f"{name}, {kind}", both, errors
 
