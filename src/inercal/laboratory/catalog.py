@@ -47,7 +47,7 @@ class Listed:
     @property
     def date(self) -> str:
         """When it was measured, where that was stated, else when it was kept: the day."""
-        return (self.measured or self.made)[:10]
+        return str(self.measured or self.made)[:10]
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def results(
     if status is not None:
         query = query.where(Result.status == status)
     with reading(store.engine, store.where) as connection:
-        found = [_row(row) for row in connection.execute(query).mappings()]
+        found = [_row(row, store.where) for row in connection.execute(query).mappings()]
     found = [each for each in found if since is None or each.date >= since]
     return sorted(found, key=lambda each: (each.date, each.made, each.id))
 
@@ -134,14 +134,19 @@ def _listed() -> Any:
     )
 
 
-def _row(row: Any) -> Listed:
-    """A row of that query."""
+def _row(row: Any, where: str) -> Listed:
+    """A row of that query; raises `InputError` for one that no store writes."""
     item = (
         None
         if row["serial"] is None
         else Item(row["maker"], row["model"], row["serial"], row["owner"], row["kind"])
     )
     own = ("id", "command", "status", "message", "made", "measured", "operator", "version")
+    if any(row[key] is None for key in own):
+        raise InputError(
+            where,
+            "a row of the results was damaged, expected one as it was written: see `inercal store check`",
+        )
     return Listed(**{key: row[key] for key in own}, instrument=item, superseded_by=row["by_id"])
 
 
@@ -189,7 +194,9 @@ def show(store: Store, identity: str) -> Shown:
     """A result whole; raises `InputError` where there is none, or its object is missing or was changed."""
     identity = find(store, identity)
     with reading(store.engine, store.where) as connection:
-        listed = _row(connection.execute(_listed().where(Result.id == identity)).mappings().one())
+        listed = _row(
+            connection.execute(_listed().where(Result.id == identity)).mappings().one(), store.where
+        )
         row = connection.execute(select(Result).where(Result.id == identity)).mappings().one()
         files = connection.execute(
             select(SourceOf.path, SourceOf.sha256, Recording.place)

@@ -97,7 +97,7 @@ def _chain(events: list[dict[str, Any]]) -> list[str]:
             faults.append(f"event {expected}: missing, the next is {row['number']}")
             return faults
         if hash_of(row) != row["hash"]:
-            faults.append(f"event {expected} ({row['kind']} {row['subject'][:SHORT]}): was changed")
+            faults.append(f"event {expected} ({row['kind']} {str(row['subject'])[:SHORT]}): was changed")
         elif row["previous"] != previous:
             faults.append(f"event {expected}: does not follow the one before, which was changed")
         previous = row["hash"]
@@ -144,13 +144,14 @@ def _told(kind: str, digests: dict[str, str], events: list[dict[str, Any]]) -> l
     what = {"keep": "result", "supersede": "supersession of", "certificate": "certificate"}[kind]
     told = {row["subject"]: row["digest"] for row in events if row["kind"] == kind}
     faults = [
-        f"{what} {subject[:SHORT]}: missing, an event tells of it" for subject in told.keys() - digests.keys()
+        f"{what} {str(subject)[:SHORT]}: missing, an event tells of it"
+        for subject in told.keys() - digests.keys()
     ]
     for subject, digest in digests.items():
         if subject not in told:
-            faults.append(f"{what} {subject[:SHORT]}: added by hand, no event tells of it")
+            faults.append(f"{what} {str(subject)[:SHORT]}: added by hand, no event tells of it")
         elif told[subject] != digest:
-            faults.append(f"{what} {subject[:SHORT]}: its rows were changed")
+            faults.append(f"{what} {str(subject)[:SHORT]}: its rows were changed")
     return sorted(faults)
 
 

@@ -97,6 +97,8 @@ def _refusing(where: str) -> Iterator[None]:
     except DBAPIError as error:
         said = " ".join(str(error.orig).split())
         raise InputError(where, f"the database says: {said[:300]}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(where, "the database holds text that is not UTF-8: its file was damaged") from error
 
 
 def version_of(engine: Engine, where: str) -> str | None:

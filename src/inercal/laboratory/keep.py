@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from inercal.errors import InputError
-from inercal.estimate.files import to_json
+from inercal.estimate.files import plain_objects, to_json
 from inercal.estimate.result import Estimate
 from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import writing
@@ -132,19 +132,19 @@ def keep(
         "id": identity,
         "object": store.objects.add(text.encode()),
         "report": None if report is None else store.objects.add(report),
-        "command": estimate.command,
+        "command": data["command"],
         "version": data["inercal"],
         "program": program() if made_here else "",
         "made": now(),
-        "measured": estimate.traceability.get("date", ""),
-        "operator": estimate.traceability.get("operator", ""),
-        "status": estimate.status.value,
-        "message": estimate.message,
+        "measured": str(data["traceability"].get("date") or ""),
+        "operator": str(data["traceability"].get("operator") or ""),
+        "status": data["status"]["code"],
+        "message": data["status"]["message"],
     }
     rows = Rows(
         result,
         () if item is None else (item.maker, item.model, item.serial),
-        tuple((source.sha256, source.path) for source in estimate.inputs),
+        tuple((source["sha256"], source["path"]) for source in data["inputs"]),
         coefficients_of(estimate),
     )
     with writing(store.engine, store.where) as connection:
@@ -181,13 +181,13 @@ def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:
     common = None if estimate.common is None else estimate.common.diagonal()
     return tuple(
         {
-            "name": p.name,
+            "name": plain_objects(p.name),
             **{
                 key: _finite(value)
                 for key, value in (("value", p.value), ("u", p.u), ("expanded", p.U), ("k", p.k))
             },
             "dof": _finite(p.dof),
-            "unit": p.unit,
+            "unit": plain_objects(p.unit),
             "common": None if common is None else _finite(math.sqrt(max(float(common[i]), 0.0))),
         }
         for i, p in enumerate(estimate.parameters.values())
