@@ -20,10 +20,13 @@ from typing import IO
 
 import numpy as np
 import pytest
+from certified import LAB
+from made import result
 from new_studies import FILL
 
 from inercal.cli import main, run
 from inercal.cli.tree import COMMANDS as TREE
+from inercal.estimate.files import save
 from inercal.estimate.runs import Serial
 from inercal.examples import EXAMPLES, FOLDER
 from inercal.laboratory.catalog import results
@@ -44,6 +47,7 @@ COMMANDS = {
     "new turntable": "new turntable --out NEW.toml",
     "new selfcal": "new selfcal --out NEW.toml",
     "new aoa": "new aoa --out NEW.toml",
+    "new lab": "new lab --out NEW.toml",
     "inspect": "inspect log.csv --report NEW.html",
     "inspect result": "inspect log.csv --out NEW.json",
     "calibrate imu": "calibrate imu log.csv --study imu.toml --out NEW.json --report NEW.html",
@@ -74,6 +78,7 @@ COMMANDS = {
     "compare": "compare cal.json cal.json --out NEW.json",
     "convert": "convert cal.json --to kalibr --out NEW.yaml",
     "show": "show KEPT --store store --out NEW.json",
+    "certificate": "certificate ok.json --lab lab.toml --number 1 --out NEW.xml --html NEW.html",
     "history": "history cal.json --out NEW.json",
     "validate": "validate --out NEW.json",
     "schema": "schema --out NEW.json",
@@ -119,6 +124,8 @@ def folder(tmp_path_factory) -> Path:
     done = run(["calibrate", "imu", str(path / "log.csv"), "--study", str(path / "imu.toml"),
                 "--out", str(path / "cal.json"), "--quiet"])  # fmt: skip
     assert done == 0
+    save(result(), path / "ok.json")
+    (path / "lab.toml").write_text(LAB)
     store = ["--store", str(path / "store")]
     assert run(["store", "init", *store, "--quiet"]) == 0
     assert run(["keep", str(path / "cal.json"), "--instrument", "17", *store, "--quiet"]) == 0

@@ -82,6 +82,9 @@ def test_a_number_changed_by_hand_is_found(tmp_path):
     path = certified(tmp_path, made())
     value = repr(float(made().values[0]))
     path.write_text(path.read_text().replace(value, "1.25", 1))
+    with pytest.raises(InputError, match=r"states other numbers in .* than beside the covariance"):
+        read_certificate(path)
+    path.write_text(certified(tmp_path, made()).read_text().replace(value, "1.25"))
     with pytest.raises(InputError, match=r"states other numbers in .* than the result inside"):
         read_certificate(path)
 
@@ -114,6 +117,8 @@ HEAD = (
     'schemaVersion="3.1.1">'
 )
 TAIL = "</dcc:digitalCalibrationCertificate>"
+BEGUN = "<dcc:measurementResult><dcc:results><dcc:result><dcc:data><dcc:quantity>"
+ENDED = "</dcc:quantity></dcc:data></dcc:result></dcc:results></dcc:measurementResult>"
 LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
 HOSTILE = {
     "entity": (f"<!DOCTYPE a [<!ENTITY b 'c'>]>{HEAD}&b;{TAIL}", "declares a document type"),
@@ -131,8 +136,7 @@ HOSTILE = {
     "bytes": (bytes(range(256)) * 100, "no whole XML"),
     "zeros": (b"\0" * 2**20, "no whole XML"),
     "other": ("<html/>", "XML of another kind"),
-    "number": (f"{HEAD}<dcc:measurementResult><dcc:results><dcc:quantity><si:real><si:value>ten</si:value></si:real>"
-               f"</dcc:quantity></dcc:results></dcc:measurementResult>{TAIL}", "a number that is none"),
+    "number": (f"{HEAD}{BEGUN}<si:real><si:value>ten</si:value></si:real>{ENDED}{TAIL}", "a number that is none"),
 }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-from certified import DAY, LAB, certified, lab_of, mixed
+from certified import DAY, LAB, certified, lab_of, mixed, with_units
 from lxml import etree
 from made import result as made
 from scipy import stats
@@ -16,6 +16,8 @@ from inercal.findings import Status
 from inercal.instruments.dsi import dsi
 from inercal.laboratory.certificate.elements import NAMESPACES, factor, plain
 from inercal.laboratory.certificate.lab import LabFile, lab_template, read_lab
+from inercal.laboratory.certificate.page import page
+from inercal.laboratory.certificate.reading import read_certificate
 from inercal.laboratory.certificate.schema import fault
 from inercal.laboratory.certificate.written import certificate
 from rows import for_each
@@ -147,6 +149,37 @@ def test_results_of_one_instrument_join_and_of_several_do_not(tmp_path):
     assert "found results of several instruments (serial '1' and '2')" in refused(tmp_path, one, other)
     named = [replace(noise, traceability={"instrument": text}) for text in ("G 1", "G 2")]
     assert "several instruments ('G 1' and 'G 2')" in refused(tmp_path, *named)
+
+
+def test_conformity_by_the_stated_rule(tmp_path):
+    """Simple acceptance and the guard band disagree where a value is within its limits by less than U."""
+    estimate = replace(made(values=(1.0, 1.0, 0.5), u=0.01), dof=np.full(3, np.inf))
+    limits = 'K1 = ["0.99", "1.3"]\nM_xy = "0.4 rad"\n'
+    estimate = with_units(estimate, "1", "1", "rad")
+    for rule, verdicts in (("simple acceptance", "pass pass fail"), ("guard band", "fail fail fail")):
+        lab = lab_of(tmp_path, f'{LAB}[specification]\ndecision = "{rule}"\n{limits}')
+        root = etree.fromstring(certificate([estimate], lab, "C", DAY))
+        assert texts(root, ".//dcc:metaData/dcc:conformity") == verdicts.split()
+        assert texts(root, ".//dcc:statement/dcc:conformity") == ["fail"]
+        assert texts(root, ".//dcc:metaData/dcc:data//si:value") == [
+            "0.99",
+            "1.3",
+            "0.99",
+            "1.3",
+            "-0.4",
+            "0.4",
+        ]
+        (said,) = root.xpath(".//dcc:statement[@refType='basic_conformity']", namespaces=NAMESPACES)
+        assert rule in said.findtext("dcc:declaration/dcc:content", namespaces=NAMESPACES)
+    probability = stats.norm.cdf(30) - stats.norm.cdf(-1)
+    (first, *_) = texts(root, ".//dcc:metaData/dcc:declaration/dcc:content")
+    assert float(first.rpartition(" ")[2]) == pytest.approx(probability, rel=1e-9)
+    path = tmp_path / "certificate.xml"
+    path.write_bytes(etree.tostring(root))
+    assert [q.label for q in read_certificate(path).results[0].quantities] == list(estimate.names)
+    assert "fail: 0.99 to 1.3" in page(read_certificate(path))
+    lab = f'{LAB}[specification]\nD_F_x = "1 deg/h"\n'
+    assert "specification.D_F_x: found limits of what no result has" in refused(tmp_path, made(), text=lab)
 
 
 def test_what_gets_no_certificate(tmp_path):

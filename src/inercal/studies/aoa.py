@@ -42,7 +42,15 @@ from inercal.studies.common import (
     site_of,
 )
 from inercal.studies.fields import ExactText, QuantityText, refusal
-from inercal.studies.laboratory import Equipment, Item, ItemTable, Laboratory, LaboratoryTable, traced
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
 from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
@@ -242,6 +250,7 @@ class AoaStudyFile(Strict):
     item: Item = ItemTable()
     laboratory: Laboratory = LaboratoryTable()
     equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 

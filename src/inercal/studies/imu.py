@@ -43,7 +43,15 @@ from inercal.studies.common import (
 from inercal.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.studies.fields import QuantityText, refusal
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.studies.laboratory import Equipment, Item, ItemTable, Laboratory, LaboratoryTable, traced
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.rig import RigTable, chain_of
 from inercal.studies.tables import as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_unit, shown
@@ -251,6 +259,7 @@ class ImuStudyFile(Strict):
     item: Item = ItemTable()
     laboratory: Laboratory = LaboratoryTable()
     equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 

@@ -100,6 +100,16 @@ Equipment = Annotated[
         examples=[{"table": {"name": "rate table", "certificate": "K-2026-117"}}],
     ),
 ]
+Tolerances = Annotated[
+    dict[str, str | list[str]],
+    Field(
+        default_factory=dict,
+        title="Specification",
+        description="limits of coefficients by name or group, for statements of conformity; two, or one about zero; "
+        "beside them decision: simple acceptance (if absent), guard band, or a risk",
+        examples=[{"decision": "guard band", "K1_x": ["-50 ppm", "50 ppm"], "D_F": "2 deg/h"}],
+    ),
+]
 
 
 def traced(texts: Mapping[str, str], item: ItemTable) -> dict[str, str]:

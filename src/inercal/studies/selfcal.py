@@ -36,7 +36,15 @@ from inercal.studies.common import (
     site_on_earth,
 )
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive
-from inercal.studies.laboratory import Equipment, Item, ItemTable, Laboratory, LaboratoryTable, traced
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.platform import GimbalsTable, PlanTable, base_of, gimbals_of, limits_of, plan_of
 from inercal.studies.platform_model import ModelTable, model_of, on_rig, true_errors
 from inercal.studies.rig import Angle
@@ -163,6 +171,7 @@ class SelfcalStudyFile(Strict):
     item: Item = ItemTable()
     laboratory: Laboratory = LaboratoryTable()
     equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 

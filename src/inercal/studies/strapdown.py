@@ -43,7 +43,15 @@ from inercal.studies.fields import (
     refusal,
 )
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.studies.laboratory import Equipment, Item, ItemTable, Laboratory, LaboratoryTable, traced
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_unit, shown
 
@@ -190,6 +198,7 @@ class StrapdownStudyFile(Strict):
     item: Item = ItemTable()
     laboratory: Laboratory = LaboratoryTable()
     equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 

@@ -23,7 +23,15 @@ from inercal.studies.common import (
 )
 from inercal.studies.fields import QuantityText
 from inercal.studies.instrument import InstrumentTable, instrument_of
-from inercal.studies.laboratory import Equipment, Item, ItemTable, Laboratory, LaboratoryTable, traced
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
 from inercal.studies.tables import as_typed, settings_of, table_of
@@ -241,6 +249,7 @@ class TurntableStudyFile(Strict):
     item: Item = ItemTable()
     laboratory: Laboratory = LaboratoryTable()
     equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 

@@ -34,9 +34,17 @@ GENERAL = (
 
 
 def administrative(
-    lab: LabFile, number: str, issued: str, supersedes: str | None, types: Iterable[str]
+    lab: LabFile,
+    number: str,
+    issued: str,
+    supersedes: str | None,
+    types: Iterable[str],
+    conformity: _Element | None,
 ) -> _Element:
-    """The element ``administrativeData``; ``types`` are the reference types that the certificate uses."""
+    """The element ``administrativeData``; ``types`` are the reference types that the certificate uses.
+
+    ``conformity`` is the statement of that, where there is one.
+    """
     return dcc(
         "administrativeData",
         dcc("dccSoftware", software()),
@@ -50,7 +58,7 @@ def administrative(
         ),
         dcc("respPersons", *(_person(each.name, each.role, each.signs) for each in lab.persons)),
         _contact("customer", lab.customer),
-        _statements(lab),
+        _statements(lab, conformity),
     )
 
 
@@ -165,7 +173,7 @@ def _person(name: str, role: str, signs: bool) -> _Element:
     )
 
 
-def _statements(lab: LabFile) -> _Element:
+def _statements(lab: LabFile, conformity: _Element | None) -> _Element:
     """Statements of every certificate, and those of the laboratory."""
     rows = [
         dcc("statement", dcc("norm", norm), dcc("reference", clause), words("declaration", text))
@@ -182,4 +190,4 @@ def _statements(lab: LabFile) -> _Element:
         )
     )
     rows += [dcc("statement", words("declaration", text)) for text in lab.statements.remarks]
-    return dcc("statements", *rows)
+    return dcc("statements", *rows, conformity)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from inercal.errors import InputError
+from inercal.instruments.dsi import as_written, dsi, is_coherent
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -88,6 +89,18 @@ def real(
         )
     named = si("label", label) if label else None
     return si("real", named, si("value", number(value)), si("unit", unit), unc)
+
+
+def of_result(
+    value: float, unit: str, expanded: tuple[float, float, float] | None = None, label: str = ""
+) -> _Element:
+    """A number of a result in SI; where its ``unit`` is no SI unit, in that one too."""
+    own = real(value, as_written(unit), expanded, label)
+    if is_coherent(unit):
+        return own
+    text, size = dsi(unit)
+    in_si = None if expanded is None else (expanded[0] * size, *expanded[1:])
+    return si("hybrid", real(value * size, text, in_si, label), own)
 
 
 def file(name: str, mime: str, content: bytes, ref_type: str) -> _Element:

@@ -24,6 +24,7 @@ from inercal.studies.laboratory import (
     ItemTable,
     LaboratoryTable,
     PlaceTable,
+    Tolerances,
 )
 from inercal.studies.load import put
 from inercal.studies.schema import TomlSchema
@@ -93,6 +94,7 @@ class LabFile(Strict):
     order: OrderTable = Field(default=OrderTable(), title="Order", description="the order, and its days")
     item: Item = ItemTable()
     conditions: Conditions = ConditionsTable()
+    specification: Tolerances
     statements: StatementsTable = Field(
         default=StatementsTable(), title="Statements", description="statements of the laboratory"
     )
@@ -110,7 +112,8 @@ _STARTING: dict[str, Any] = {
 
 _HEAD = """\
 # What a laboratory states in its certificates. Fill in each "?"; take the "# " from keys that you know.
-# The studies of the results may have the tables [laboratory], [item], [equipment] and [conditions] too: those win.
+# The studies of the results may have the tables [laboratory], [item], [equipment], [specification] and
+# [conditions] too: those win.
 #
 # Next: inercal certificate RESULT.json --lab {path} --number N --out certificate.xml
 
@@ -154,7 +157,8 @@ def joined(lab: LabFile, estimates: Sequence[Estimate], where: object) -> LabFil
         study = estimate.provenance.get("settings") or {}
         for table in ("laboratory", "conditions"):
             given[table] |= study.get(table, {})
-        given["equipment"] |= study.get("equipment", {})
+        for table in ("equipment", "specification"):
+            given[table] |= study.get(table, {})
     given["item"] |= _one_item(estimates)
     if not (given["item"]["model"] or given["item"]["serial"]):
         given["item"] |= _named(estimates)

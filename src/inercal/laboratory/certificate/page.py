@@ -12,7 +12,7 @@ from inercal.estimate.rounding import rounded
 from inercal.instruments.dsi import dsi
 from inercal.instruments.terms import shown_unit
 from inercal.laboratory.certificate.elements import NAMESPACES
-from inercal.laboratory.certificate.reading import Certificate, Quantity, quantities_in, text
+from inercal.laboratory.certificate.reading import Certificate, Quantity, quantities_in, quantities_of, text
 from inercal.report.style import plain_unit
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Row:
-    """A number as it is printed: name, value, U, k, unit, and value and U in the unit of the field."""
+    """A number as it is printed: name, value, U, k, unit, both in the unit of the field, and whether it conforms."""
 
     symbol: str
     name: str
@@ -30,6 +30,7 @@ class _Row:
     k: str
     unit: str
     field: str
+    limits: str
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ def _section(element: _Element) -> _Section:
     tables = [
         (
             text(each, "dcc:name/dcc:content"),
-            [_row(quantity) for one in _plain(each) for quantity in quantities_in(one)],
+            [_row(quantity, "", _limits(one)) for one in _plain(each) for quantity in quantities_in(one)],
         )
         for each in element.iterfind("dcc:results/dcc:result", NAMESPACES)
     ]
@@ -188,7 +189,7 @@ def _plain(result: _Element) -> Sequence[_Element]:
     """The quantities of a result but for the covariance, which only a machine wants."""
     return [
         each
-        for each in result.iterfind("dcc:data//dcc:quantity", NAMESPACES)
+        for each in quantities_of([result])
         if "inertial_covariance" not in each.get("refType", "").split()
     ]
 
@@ -206,13 +207,21 @@ def _equipment(element: _Element) -> tuple[str, ...]:
     )
 
 
-def _row(quantity: Quantity, name: str = "") -> _Row:
+def _limits(element: _Element) -> str:
+    """Conformity of a quantity and its limits, in its own unit; empty where none is stated."""
+    verdict = text(element, "dcc:measurementMetaData/dcc:metaData/dcc:conformity")
+    ends = element.iterfind("dcc:measurementMetaData/dcc:metaData/dcc:data/dcc:quantity", NAMESPACES)
+    values = [f"{quantity.value:.6g}" for each in ends for quantity in quantities_in(each, last=True)]
+    return f"{verdict}: {' to '.join(values)}" if values else verdict
+
+
+def _row(quantity: Quantity, name: str = "", limits: str = "") -> _Row:
     """A number rounded by its uncertainty, and the same in the unit of the field."""
     words = (name or quantity.name).removeprefix(f"{quantity.label}: ")
     value, U = _rounded(quantity.value, quantity.U, quantity.k)
     k = "" if math.isnan(quantity.k) else f"{quantity.k:.2f}"
     unit = "" if quantity.unit == "1" else plain_unit(quantity.unit)
-    return _Row(quantity.label, words, value, U, k, unit, _in_field(quantity))
+    return _Row(quantity.label, words, value, U, k, unit, _in_field(quantity), limits)
 
 
 def _rounded(value: float, U: float, k: float) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -24,6 +24,7 @@ from inercal.instruments.reference_types import PREFIX
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES
 from inercal.laboratory.certificate.parsing import parsed, tree_of
 from inercal.laboratory.certificate.schema import VERSION, fault
+from inercal.units import shown
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -146,18 +147,30 @@ def _measured(element: _Element, path: str | Path) -> Measured:
     """One measurement result."""
     region = None
     quantities: list[Quantity] = []
-    for each in element.iterfind("dcc:results//dcc:quantity", NAMESPACES):
+    for each in quantities_of(element.iterfind("dcc:results/dcc:result", NAMESPACES)):
         if f"{PREFIX}covariance" in each.get("refType", "").split():
             region = _region(each)
         else:
             quantities += quantities_in(each)
     estimate = _inside(element, path)
     found = Measured(text(element, "dcc:name/dcc:content"), tuple(quantities), region, estimate)
+    if region is not None and not _consistent(found.quantities, region):
+        raise InputError(
+            path, f"states other numbers in {shown(found.name)} than beside the covariance, expected the same"
+        )
     if estimate is not None and not _agree(found, estimate):
         raise InputError(
-            path, f"states other numbers in {found.name!r} than the result inside, expected the same"
+            path, f"states other numbers in {shown(found.name)} than the result inside, expected the same"
         )
     return found
+
+
+def quantities_of(results: Iterable[_Element]) -> Iterator[_Element]:
+    """The quantities of results, but for those inside another, as its limits."""
+    for each in results:
+        for found in each.iterfind("dcc:data//dcc:quantity", NAMESPACES):
+            if next(found.iterancestors(f"{{{DCC}}}measurementMetaData"), None) is None:
+                yield found
 
 
 def quantities_in(element: _Element, last: bool | None = None) -> Iterator[Quantity]:
@@ -250,6 +263,13 @@ def _inside(element: _Element, path: str | Path) -> Estimate | None:
             except InputError as error:
                 raise InputError(path, f"holds a result that cannot be read: {error.message}") from error
     return None
+
+
+def _consistent(quantities: Sequence[Quantity], region: Region) -> bool:
+    """True where numbers that stand beside the covariance too are the same there."""
+    stated = {each.label: (each.value, each.U) for each in quantities if each.label}
+    there = zip(region.names, region.values.tolist(), region.U.tolist(), strict=True)
+    return all(stated.get(name, (value, U)) == (value, U) for name, value, U in there)
 
 
 def _agree(found: Measured, estimate: Estimate) -> bool:

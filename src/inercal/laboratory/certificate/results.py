@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,21 +17,35 @@ from inercal.instruments.dsi import as_written, dsi, from_dsi, is_coherent
 from inercal.instruments.reference_types import PREFIX, reference_type
 from inercal.instruments.terms import term
 from inercal.laboratory.certificate.administration import software
-from inercal.laboratory.certificate.elements import dcc, factor, file, number, plain, real, si, words
+from inercal.laboratory.certificate.conformity import stated
+from inercal.laboratory.certificate.elements import (
+    dcc,
+    factor,
+    file,
+    number,
+    of_result,
+    plain,
+    real,
+    si,
+    words,
+)
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from inercal.estimate.result import Parameter
     from inercal.laboratory.certificate.lab import LabFile
+    from inercal.laboratory.specification import Conformity
     from inercal.studies.laboratory import EquipmentTable
     from inercal.units import Quantity
 
 KELVIN = 273.15
 
 
-def measured(estimate: Estimate, lab: LabFile, report: bytes | None) -> _Element:
-    """The element ``measurementResult`` of one result."""
+def measured(
+    estimate: Estimate, lab: LabFile, conform: Mapping[str, Conformity], report: bytes | None
+) -> _Element:
+    """The element ``measurementResult`` of one result; ``conform`` says of coefficients whether they do."""
     _refuse_unknown(estimate)
     files = [
         file(
@@ -54,7 +68,11 @@ def measured(estimate: Estimate, lab: LabFile, report: bytes | None) -> _Element
         dcc("influenceConditions", *conditions) if conditions else None,
         dcc(
             "results",
-            _result("Coefficients", f"{PREFIX}coefficients", map(_coefficient, estimate.parameters.values())),
+            _result(
+                "Coefficients",
+                f"{PREFIX}coefficients",
+                [_coefficient(p, conform.get(p.name)) for p in estimate.parameters.values()],
+            ),
             _result("Covariance of the coefficients", f"{PREFIX}covariance", [_covariance(estimate)]),
             _result("Result as a file", f"{PREFIX}files", files),
         ),
@@ -186,16 +204,13 @@ def _condition(name: str, ref_type: str, value: _Element) -> _Element:
     )
 
 
-def _coefficient(p: Parameter) -> _Element:
-    """A coefficient in SI; where its own unit is no SI unit, in that one too."""
-    text, size = dsi(p.unit)
-    own = real(p.value, as_written(p.unit), (p.U, p.k, COVERAGE), p.name)
-    if not is_coherent(p.unit):
-        in_si = real(p.value * size, text, (p.U * size, p.k, COVERAGE), p.name)
-        own = si("hybrid", in_si, own)
+def _coefficient(p: Parameter, conform: Conformity | None) -> _Element:
+    """A coefficient in SI; where its own unit is no SI unit, in that one too; with its conformity."""
+    value = of_result(p.value, p.unit, (p.U, p.k, COVERAGE), p.name)
     found = term(p.name)
     name = p.name if found is None else f"{p.name}: {found.name}"
-    return dcc("quantity", words("name", name), own, ref_type=reference_type(p.name))
+    judgement = None if conform is None else stated(conform, p.unit)
+    return dcc("quantity", words("name", name), value, judgement, ref_type=reference_type(p.name))
 
 
 def _covariance(estimate: Estimate) -> _Element:

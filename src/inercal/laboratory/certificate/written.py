@@ -11,10 +11,12 @@ from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.laboratory.certificate.administration import administrative
+from inercal.laboratory.certificate.conformity import judged, limits_used, statement
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES, XSI, plain
 from inercal.laboratory.certificate.lab import LabFile, joined, sources_known
 from inercal.laboratory.certificate.results import measured
 from inercal.laboratory.certificate.schema import VERSION, fault
+from inercal.laboratory.specification import Conformity, Specification, specification_of
 
 
 def certificate(
@@ -68,18 +70,31 @@ def certificate(
             )
     stated = joined(lab, estimates, where)
     sources_known(stated.equipment, estimates, where)
+    specification, verdicts = _conformity(stated, estimates, where)
     pages = [*reports, *[None] * (len(estimates) - len(reports))]
     results = etree.Element(f"{{{DCC}}}measurementResults", nsmap=NAMESPACES)
-    results.extend(measured(estimate, stated, page) for estimate, page in zip(estimates, pages, strict=True))
-    types = [text for each in results.iter() if (text := each.get("refType")) is not None]
+    each = zip(estimates, verdicts, pages, strict=True)
+    results.extend(measured(estimate, stated, verdict, page) for estimate, verdict, page in each)
+    types = [text for one in results.iter() if (text := one.get("refType")) is not None]
     root = etree.Element(f"{{{DCC}}}digitalCalibrationCertificate", nsmap={**NAMESPACES, "xsi": XSI})
     root.set("schemaVersion", VERSION)
     root.set(f"{{{XSI}}}schemaLocation", f"{DCC} https://ptb.de/dcc/v{VERSION}/dcc.xsd")
-    root.append(administrative(stated, number, issued.isoformat(), supersedes, types))
+    found = [each for verdict in verdicts for each in verdict.values()]
+    conform = statement(specification, found) if found else None
+    root.append(administrative(stated, number, issued.isoformat(), supersedes, types, conform))
     root.append(results)
     etree.indent(root, " ")
     wrong = fault(root)
     if wrong is not None:
         raise InputError("certificate", f"does not meet the schema DCC {VERSION}: {wrong}")
     made: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
-    return made
+    return made + b"\n"
+
+
+def _conformity(
+    lab: LabFile, estimates: Sequence[Estimate], where: object
+) -> tuple[Specification, list[dict[str, Conformity]]]:
+    """The specification, and of each result what conforms."""
+    specification = specification_of(lab.specification, where)
+    limits_used(specification, estimates, where)
+    return specification, [judged(estimate, specification) for estimate in estimates]

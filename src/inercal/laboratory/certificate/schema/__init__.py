@@ -29,4 +29,11 @@ def fault(root: _Element) -> str | None:
     if schema.validate(root):
         return None
     first = schema.error_log[0]
-    return f"line {first.line}: {first.message.replace('{https://ptb.de/dcc}', '').replace('{https://ptb.de/si}', '')}"
+    words = (
+        " ".join(first.message.split()).replace("{https://ptb.de/dcc}", "").replace("{https://ptb.de/si}", "")
+    )
+    return f"line {first.line}: {words if len(words) < _LONGEST else f'{words[:_LONGEST]}...'}"
+
+
+_LONGEST = 300
+"""Characters of a message of the schema."""
