@@ -64,7 +64,7 @@ def rows(quick: bool) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as servers:
         places: dict[str, tuple[str, str | None]] = {"SQLite": (str(Path(folder) / "store"), None)}
         if postgresql.programs() is not None and not quick:
-            url = servers.enter_context(postgresql.started(Path(folder) / "server"))
+            url = servers.enter_context(postgresql.started())
             places["PostgreSQL"] = (f"{url}/postgres", str(Path(folder) / "objects"))
         for kind, place in places.items():
             store = filled(place, instruments, calibrations)

@@ -7,11 +7,11 @@ from inercal.laboratory.store import make_store
 
 
 @pytest.fixture(scope="session")
-def server(tmp_path_factory):
+def server():
     """URL of a PostgreSQL server of the tests' own, without a database's name."""
     if postgresql.programs() is None:
         pytest.skip("no PostgreSQL server is installed (Debian: postgresql)")
-    with postgresql.started(tmp_path_factory.mktemp("postgresql")) as url:
+    with postgresql.started() as url:
         yield url
 
 

@@ -5,6 +5,7 @@ import os
 import shutil
 import socket
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,25 +29,25 @@ def run(*command: object) -> None:
 
 
 @contextmanager
-def started(folder: Path) -> Iterator[str]:
-    """URL of a server whose data are in a folder, without a database's name; it is stopped at the end."""
+def started() -> Iterator[str]:
+    """URL of a server, without a database's name; its data lie in a folder of its own, gone with it at the end.
+
+    (The folders of pytest are closed to other users, and so to the user that the server runs as.)
+    """
     where = programs()
     assert where is not None
-    folder.mkdir(exist_ok=True)
     user = "postgres" if os.geteuid() == 0 else getpass.getuser()
-    if os.geteuid() == 0:
-        shutil.chown(folder, "postgres")
-        for above in folder.parents:
-            if above not in (Path("/"), Path("/tmp")) and above.stat().st_uid == os.geteuid():
-                above.chmod(above.stat().st_mode | 0o011)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    data = folder / "data"
-    run(where / "initdb", "-D", data, "-U", user, "-A", "trust", "-E", "UTF8", "--no-sync")
-    options = f"-F -p {port} -c listen_addresses=127.0.0.1 -k {folder}"
-    run(where / "pg_ctl", "-D", data, "-o", options, "-l", folder / "log", "-w", "start")
-    try:
-        yield f"postgresql://{user}@127.0.0.1:{port}"
-    finally:
-        run(where / "pg_ctl", "-D", data, "-m", "immediate", "stop")
+    with tempfile.TemporaryDirectory(prefix="inercal-postgresql-") as folder:
+        if os.geteuid() == 0:
+            shutil.chown(folder, "postgres")
+        data = Path(folder) / "data"
+        run(where / "initdb", "-D", data, "-U", user, "-A", "trust", "-E", "UTF8", "--no-sync")
+        options = f"-F -p {port} -c listen_addresses=127.0.0.1 -k {folder}"
+        run(where / "pg_ctl", "-D", data, "-o", options, "-l", Path(folder) / "log", "-w", "start")
+        try:
+            yield f"postgresql://{user}@127.0.0.1:{port}"
+        finally:
+            run(where / "pg_ctl", "-D", data, "-m", "immediate", "stop")

@@ -8,17 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput
+from inercal.cli.options import FileOutput, StoreOption
 from inercal.cli.outcome import emit
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
     from inercal.laboratory.certificate.reading import Certificate
+    from inercal.laboratory.store import Store
 
 
 def certificate(
     results: Annotated[
-        list[Path] | None, Parameter(help="Results of one instrument that commands wrote to --out.")
+        list[str] | None,
+        Parameter(
+            help="Results of one instrument: files that commands wrote to --out, or results of the store."
+        ),
     ] = None,
     /,
     *,
@@ -35,6 +40,7 @@ def certificate(
     ] = None,
     html: Annotated[Path | None, Parameter(help="Write the certificate as a readable page.")] = None,
     read: Annotated[Path | None, Parameter(help="Read this certificate, of anybody, and print it.")] = None,
+    store: StoreOption = None,
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write a digital calibration certificate, or read one."""
@@ -62,53 +68,108 @@ def certificate(
         raise InputError(
             "--page", f"found {len(page)} of {len(results)} results, expected one of each at most"
         )
-    output.check((".xml",), [*results, lab, *(page or [])])
-    _write(results, lab, number, supersedes, page or [], html, output)
+    output.check((".xml",), [*map(Path, results), lab, *(page or [])])
+    _write(results, lab, number, supersedes, page or [], html, store, output)
 
 
 def _write(
-    results: list[Path],
+    results: list[str],
     lab: Path,
     number: str,
     supersedes: str | None,
     pages: list[Path],
     html: Path | None,
+    store: str | None,
     output: FileOutput,
 ) -> None:
-    """Write the certificate and its page, whole or not at all."""
+    """Write the certificate and its page, whole or not at all, and enter it into the store."""
+    from contextlib import AbstractContextManager, nullcontext
     from datetime import UTC, datetime
 
     from inercal._files import read_bytes, write_bytes, write_text
-    from inercal.estimate.files import load
     from inercal.estimate.result import without_coefficients
     from inercal.laboratory.certificate.lab import read_lab
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import certificate_of
     from inercal.laboratory.certificate.written import certificate as written
+    from inercal.laboratory.issue import issuing
     from inercal.records.places import counted
     from inercal.records.read import source_of
 
     stated = read_lab(lab)
-    estimates = [load(path) for path in results]
-    reports = []
+    opened = _store(store)
+    reports: list[bytes | None] = []
     for path in pages:
         try:
             reports.append(read_bytes(path))
         except OSError as error:
             raise InputError(path, f"cannot be read ({error.strerror}), expected a report") from error
-    made = written(estimates, stated, number, datetime.now(UTC).date(), reports, supersedes, lab)
+    reports += [None] * (len(results) - len(reports))
+    found = [_result(each, opened, report) for each, report in zip(results, reports, strict=True)]
+    estimates = [estimate for estimate, _ in found]
+    given = [report for _, report in found]
+    made = written(estimates, stated, number, datetime.now(UTC).date(), given, supersedes, lab)
     assert output.out is not None
-    readable = None if html is None else page(certificate_of(made, output.out))
-    write_bytes(output.out, made)
-    if html is not None and readable is not None:
-        write_text(html, readable)
-        output.say(f"page: {html}")
+    readable = page(certificate_of(made, output.out))
+    entering: AbstractContextManager[None] = nullcontext()
+    if opened is not None:
+        kept = [
+            _kept(opened, each, estimate, report)
+            for each, (estimate, report) in zip(results, found, strict=True)
+        ]
+        entering = issuing(opened, number, made, readable.encode(), kept, supersedes)
+    with entering:
+        write_bytes(output.out, made)
+        if html is not None:
+            write_text(html, readable)
+            output.say(f"page: {html}")
     count = sum(len(estimate.names) for estimate in estimates)
     of = f"{counted(count, 'coefficient')} of {counted(len(results), 'result')}"
     words = f"certificate {number}: {of} in {output.out}"
+    words += f", entered in {opened.where}" if opened is not None else "; no store keeps it or its number"
     data = {"number": number, "out": str(output.out), "html": None if html is None else str(html)}
-    sources = tuple(source_of(path) for path in (*results, lab, *pages))
+    sources = tuple(source_of(path) for path in (*map(Path, results), lab, *pages) if path.is_file())
     emit(without_coefficients("certificate", words, data, sources), words, output)
+
+
+def _store(given: str | None) -> Store | None:
+    """The store that is named, by option or environment, or the user's own where there is one."""
+    import os
+
+    from inercal.laboratory.place import VARIABLE, place_of
+    from inercal.laboratory.store import open_store
+
+    folder = place_of(given).folder
+    if (
+        given is None
+        and VARIABLE not in os.environ
+        and (folder is None or not (folder / "store.db").is_file())
+    ):
+        return None
+    return open_store(given)
+
+
+def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Estimate, bytes | None]:
+    """A result of a file or of the store, and its report."""
+    from inercal.estimate.files import load
+
+    if Path(given).is_file() or store is None:
+        return load(given), report
+    from inercal.laboratory.catalog import show
+
+    shown = show(store, given)
+    kept = None if shown.report is None else store.objects.read(shown.report)
+    return shown.estimate, kept if report is None else report
+
+
+def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) -> str:
+    """Identity of a result in the store, where it is kept first if it came as a file."""
+    from inercal.laboratory.catalog import find
+    from inercal.laboratory.keep import item_of, keep
+
+    if Path(given).is_file():
+        return keep(store, estimate, item_of(estimate), report, made_here=False).id
+    return find(store, given)
 
 
 def _read(path: Path, html: Path | None, output: FileOutput) -> None:

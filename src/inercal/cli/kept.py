@@ -147,6 +147,7 @@ def show(
         ("file", f"{path} ({sha256[:SHORT]})" + (f", at {at}" if at else ""))
         for path, sha256, at in found.files
     ]
+    facts += [("equipment", text) for text in found.references]
     facts += [("certificate", number) for number in found.certificates]
     if listed.superseded_by:
         facts.append(("superseded by", f"{listed.superseded_by[:SHORT]}: {found.reason}"))

@@ -60,7 +60,7 @@ LABORATORY = {
         "walk, the value to expect at a date with its uncertainty, and with --tolerance conformity and the date of the "
         "next calibration. --out writes the result (.json or .toml) or all calibrations (.csv), --report a page with "
         "the charts. Exit code 1: the last calibration alarms, or is outside a tolerance.",
-        "inercal history 1234 --coefficient K1 --tolerance spec.toml --report history.html",
+        "inercal history 1234 --tolerance spec.toml --report history.html",
     ),
     ("supersede", ""): (
         "inercal.cli.kept:supersede",

@@ -129,7 +129,7 @@ def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: s
         for row in theirs["instrument"]
     }
     references = {
-        row["id"]: _number(target, Reference, row, ("name", "serial", "certificate"))
+        row["id"]: _number(target, Reference, row, ("name", "serial", "certificate", "valid_until"))
         for row in theirs["reference"]
     }
     files = set(target.execute(select(Recording.sha256)).scalars())

@@ -20,9 +20,11 @@ from inercal.laboratory.tables import (
     Coefficient,
     Instrument,
     Recording,
+    Reference,
     Result,
     SourceOf,
     Supersession,
+    Used,
 )
 
 SHORT = 10
@@ -60,6 +62,7 @@ class Shown:
     report: str | None
     program: str
     files: tuple[tuple[str, str, str | None], ...]
+    references: tuple[str, ...]
     reason: str
     certificates: tuple[str, ...]
 
@@ -204,6 +207,11 @@ def show(store: Store, identity: str) -> Shown:
             .where(SourceOf.result_id == identity)
             .order_by(SourceOf.position)
         ).all()
+        references = connection.execute(
+            select(Reference.name, Reference.serial, Reference.certificate)
+            .join(Used, Used.reference_id == Reference.id)
+            .where(Used.result_id == identity)
+        ).all()
         reason = connection.execute(
             select(Supersession.reason).where(Supersession.result_id == identity)
         ).scalar()
@@ -218,6 +226,7 @@ def show(store: Store, identity: str) -> Shown:
         row["report"],
         row["program"],
         tuple((path, sha256, place) for path, sha256, place in files),
+        tuple(", ".join(filter(None, row)) for row in references),
         reason or "",
         numbers,
     )

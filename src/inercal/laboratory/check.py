@@ -22,9 +22,11 @@ from inercal.laboratory.tables import (
     Event,
     Instrument,
     Recording,
+    Reference,
     Result,
     SourceOf,
     Supersession,
+    Used,
 )
 
 
@@ -117,13 +119,23 @@ def _results(connection: Connection) -> dict[str, Rows]:
     for row in connection.execute(select(Coefficient).order_by(Coefficient.position)).mappings():
         own = {key: value for key, value in row.items() if key not in ("result_id", "position")}
         coefficients.setdefault(row["result_id"], []).append(own)
+    used: dict[str, list[dict[str, str]]] = {}
+    query = select(
+        Used.result_id, Reference.name, Reference.serial, Reference.certificate, Reference.valid_until
+    )
+    for row in connection.execute(query.join(Reference, Reference.id == Used.reference_id)).mappings():
+        used.setdefault(row["result_id"], []).append({k: v for k, v in row.items() if k != "result_id"})
     found = {}
     for row in connection.execute(select(Result)).mappings():
         identity = row["id"]
         own = {key: value for key, value in row.items() if key != "instrument_id"}
         instrument = () if row["instrument_id"] is None else names.get(row["instrument_id"], ("",))
         found[identity] = Rows(
-            own, instrument, tuple(sources.get(identity, ())), tuple(coefficients.get(identity, ()))
+            own,
+            instrument,
+            tuple(sources.get(identity, ())),
+            tuple(coefficients.get(identity, ())),
+            tuple(sorted(used.get(identity, ()), key=lambda row: tuple(row.values()))),
         )
     return found
 

@@ -19,7 +19,7 @@ from inercal.estimate.result import Estimate
 from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import writing
 from inercal.laboratory.store import Store
-from inercal.laboratory.tables import Coefficient, Instrument, Recording, Result, SourceOf
+from inercal.laboratory.tables import Coefficient, Instrument, Recording, Reference, Result, SourceOf, Used
 
 LARGE = 1 << 30
 """Bytes beyond which a file is kept by reference: its path and SHA-256."""
@@ -146,6 +146,7 @@ def keep(
         () if item is None else (item.maker, item.model, item.serial),
         tuple((source["sha256"], source["path"]) for source in data["inputs"]),
         coefficients_of(estimate),
+        references_of(data),
     )
     with writing(store.engine, store.where) as connection:
         if connection.execute(select(Result.id).where(Result.id == identity)).first():
@@ -161,19 +162,19 @@ def keep(
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of a result: its own without the instrument's number, the instrument, files and coefficients."""
+    """The rows of a result: its own without the instrument's number, instrument, files, coefficients, references."""
 
     result: Mapping[str, Any]
     instrument: tuple[str, ...]
     sources: tuple[tuple[str, str], ...]
     coefficients: tuple[Mapping[str, Any], ...]
+    references: tuple[Mapping[str, str], ...]
 
     @property
     def digest(self) -> str:
         """SHA-256 of all rows."""
-        return digest_of(
-            [dict(self.result), self.instrument, self.sources, [dict(row) for row in self.coefficients]]
-        )
+        more = [[dict(row) for row in many] for many in (self.coefficients, self.references)]
+        return digest_of([dict(self.result), self.instrument, self.sources, *more])
 
 
 def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:
@@ -194,6 +195,19 @@ def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:
     )
 
 
+def references_of(data: Mapping[str, Any]) -> tuple[dict[str, str], ...]:
+    """Rows of the standards, tables and rigs that the study of a result states as ``[equipment.NAME]``, by name."""
+    settings = data["provenance"].get("settings")
+    stated = settings.get("equipment") if isinstance(settings, Mapping) else None
+    keys = ("name", "serial", "certificate", "valid_until")
+    rows = [
+        {key: str(each.get(key) or "") for key in keys}
+        for each in (stated.values() if isinstance(stated, Mapping) else ())
+        if isinstance(each, Mapping)
+    ]
+    return tuple(dict(zip(keys, row, strict=True)) for row in sorted({tuple(row.values()) for row in rows}))
+
+
 def _finite(value: float) -> float | None:
     """The number, or None where it is not finite."""
     return value if math.isfinite(value) else None
@@ -208,7 +222,9 @@ def add_rows(connection: Connection, rows: Rows, instrument_id: int | None) -> N
         for i, (sha256, path) in enumerate(rows.sources)
     ]
     coefficients = [{"result_id": identity, "position": i, **row} for i, row in enumerate(rows.coefficients)]
-    for table, values in ((SourceOf, sources), (Coefficient, coefficients)):
+    numbers = dict.fromkeys(_reference(connection, row) for row in rows.references)
+    used = [{"result_id": identity, "reference_id": number} for number in numbers]
+    for table, values in ((SourceOf, sources), (Coefficient, coefficients), (Used, used)):
         if values:
             connection.execute(insert(table), values)
 
@@ -221,6 +237,15 @@ def _instrument(connection: Connection, item: Item) -> int:
         values = {"kind": item.kind, "owner": item.owner, "notes": ""}
         row = {"maker": item.maker, "model": item.model, "serial": item.serial, **values}
         number = connection.execute(insert(Instrument).values(**row).returning(Instrument.id)).scalar_one()
+    return number
+
+
+def _reference(connection: Connection, row: Mapping[str, str]) -> int:
+    """The number of a reference, which is added where it is new."""
+    same = (getattr(Reference, key) == row[key] for key in row)
+    number = connection.execute(select(Reference.id).where(*same)).scalar()
+    if number is None:
+        number = connection.execute(insert(Reference).values(**row).returning(Reference.id)).scalar_one()
     return number
 
 

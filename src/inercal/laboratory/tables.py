@@ -49,7 +49,10 @@ class Reference(Base):
     """A standard, table or rig that a calibration used: its certificate, and until when that is valid."""
 
     __tablename__ = "reference"
-    __table_args__ = (UniqueConstraint("name", "serial", "certificate"), {"sqlite_strict": True})
+    __table_args__ = (
+        UniqueConstraint("name", "serial", "certificate", "valid_until"),
+        {"sqlite_strict": True},
+    )
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[Words]
     serial: Mapped[Words]

@@ -37,7 +37,7 @@ def upgrade() -> None:
         "reference",
         sa.Column("id", sa.Integer(), primary_key=True),
         *map(words, ("name", "serial", "certificate", "valid_until")),
-        sa.UniqueConstraint("name", "serial", "certificate"),
+        sa.UniqueConstraint("name", "serial", "certificate", "valid_until"),
         **STRICT,
     )
     op.create_table(
