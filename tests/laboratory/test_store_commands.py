@@ -6,7 +6,7 @@ import re
 import pytest
 
 from inercal.cli import run
-from inercal.examples import FOLDER
+from inercal.examples import EXAMPLES, FOLDER
 
 FILES = ("ferraris.csv.gz", "ferraris-map.toml", "ferraris.toml")
 CALIBRATE = ["calibrate", "imu", "ferraris.csv.gz", "--map", "ferraris-map.toml", "--study", "ferraris.toml"]
@@ -140,6 +140,56 @@ def test_a_result_is_superseded_once_with_a_reason(lab, capsys):
     assert f"superseded by  {two}" in capsys.readouterr().out
     assert run(["supersede", one, two, "--reason", "again"]) == 2
     assert "already" in capsys.readouterr().err
+
+
+WITH_RESULTS = {
+    "calibrate imu", "calibrate strapdown", "calibrate turntable", "selfcal", "aoa", "allan", "temperature",
+    "sensitivity", "compare", "validate",
+    *(f"design {kind}" for kind in ("positions", "tolerances", "selfcal", "aoa")),
+}  # fmt: skip
+
+
+def test_every_command_with_a_result_can_keep_it(capsys):
+    for words in WITH_RESULTS:
+        assert run([*words.split(), "--help"]) == 0
+        said = capsys.readouterr().out
+        assert all(f"--{option}" in said for option in ("keep", "store", "instrument")), words
+
+
+@pytest.mark.campaign
+def test_every_result_is_kept_and_made_once_more(lab, capsys):
+    """Results of all kinds, on what ships or is simulated: kept, and the same digits again."""
+    for kind in ("turntable", "selfcal", "aoa", "strapdown"):
+        item = ["--set", "item.serial=S1", "--set", "item.model=M"]
+        assert run(["new", kind, "--set", "site.latitude=48 deg", *item, "--quiet"]) == 0
+    for name in ("selfcal", "lasergyro", "thermal"):
+        assert run(["examples", name, "--out", name, "--quiet"]) == 0
+    small = ["--set", "positions.grid={phi1=6,phi2=6}"]
+    assert run(["simulate", "turntable", "turntable.toml", *small, "--out", "tt.csv", "--quiet"]) == 0
+    assert (
+        run(["simulate", "aoa", "aoa.toml", "--set", "motion.duration=5 s", "--out", "m.csv", "--quiet"]) == 0
+    )
+    assert run([*CALIBRATE, "--out", "cal.json", "--quiet"]) == 0
+    noise, sweep = (EXAMPLES[name].command(name).split()[1:] for name in ("lasergyro", "thermal"))
+    commands = [
+        ["calibrate", "turntable", "tt.csv", "--study", "turntable.toml"],
+        ["selfcal", "selfcal/selfcal.csv.gz", "--study", "selfcal/selfcal.toml", "--instrument", "P1"],
+        ["aoa", "m.csv", "--study", "aoa.toml"],
+        [*noise, "--end", "60 s", "--instrument", "L1"],
+        [*sweep, "--instrument", "T1"],
+        ["sensitivity", "turntable.toml", *small],
+        ["design", "positions", "turntable.toml", *small],
+        ["compare", "cal.json", "cal.json"],
+        ["validate"],
+    ]
+    for words in commands:
+        assert run([*words, "--keep", "--quiet"]) in (0, 1), words
+    capsys.readouterr()
+    kept = said(capsys, "results")["result"]["results"]
+    assert len(kept) == len(commands)
+    for row in kept:
+        if row["command"] != "validate":  # its date and times are its result
+            assert said(capsys, "rerun", row["id"])["result"]["sound"], row["command"]
 
 
 def test_copies_travel(lab, capsys):

@@ -253,7 +253,7 @@ def _files(store: Store, estimate: Estimate, made_here: bool) -> tuple[list[dict
     """Rows of the files that a result rests on, which become objects, and notes on those that could not."""
     rows, notes = [], []
     for source in {each.sha256: each for each in estimate.inputs}.values():
-        path = Path(source.path)
+        path = _place(source.path)
         try:
             size = path.stat().st_size
             if size > LARGE:
@@ -273,3 +273,11 @@ def _files(store: Store, estimate: Estimate, made_here: bool) -> tuple[list[dict
             why = error.message if isinstance(error, InputError) else f"cannot be read ({error.strerror})"
             notes.append(f"{source.path}: {why}; kept by its checksum alone")
     return rows, notes
+
+
+def _place(path: str) -> Path:
+    """The file of a path: of this machine, or one that ships with the package, as results of `validate` name them."""
+    from inercal.examples import FOLDER
+
+    shipped = FOLDER.parent / path
+    return shipped if not Path(path).exists() and shipped.is_file() else Path(path)

@@ -30,19 +30,17 @@ from inercal.aoa.fusion.watch import ALL, ALL_COUNT, watched
 from inercal.aoa.fusion.watch import initial as unwatched
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later as later_rows
-from inercal.aoa.reading.from_record import at_range, check_axes, check_unit, indication, of_sensors
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import angle_at
-from inercal.aoa.result.alarms import beyond
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.columns import SUSPECT, columns, rows
 from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.result.verdict import nis_limit
-from inercal.aoa.settings import GYROS, AoaSettings
+from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.findings import Finding
-from inercal.records.column import Column
+from inercal.stream.aoa_sensors import Sensors, watched_limits
 from inercal.stream.aoa_state import AoaState, Leaning, choice_of, chosen, kept
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Alarms, Output, Slots
@@ -90,27 +88,11 @@ class Aoa:
         if (prior := settings.estimator.prior) is not None:
             posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
         self._settings, self._every, self._say, self._where = settings, every, say, lines.where
-        record, names = lines.record, settings.layout.names
-        there = [name for name in names if name in record]
-        check_axes(there, record.columns, settings.layout, lines.where)
-        gyros = [name for name in GYROS if name in record]
-        spatial = all(name in gyros for name in GYROS[1:])
-        if not spatial:
-            settings.attitude.check_pitch_shows()
-        self._remarks = of_sensors(there, gyros, record, settings)
-        places = list(record.columns)
-        used = [*there, *(GYROS if spatial else GYROS[:1])]
-        self._sensors: list[tuple[int, int, Column]] = []
-        for k, name in enumerate((*names, *GYROS)):
-            if name in record and name in used:
-                check_unit(record[name], settings.calibration(name), lines.where)
-                self._sensors.append((k, places.index(name), record[name]))
-        self._temperature = places.index("temperature") if "temperature" in record else -1
-        self._has_gyro = GYROS[0] in record
-        self._posterior, self._spatial = posterior, spatial
+        self._sensors = Sensors(lines, settings)
+        self._posterior, self._spatial = posterior, self._sensors.spatial
         named = [("t", "s"), *columns(settings)]
         self.columns = [f"{name} [{unit}]" for name, unit in named]
-        self._changes = leans(settings, spatial)
+        self._changes = leans(settings, self._spatial)
         self._pose(settings)
         self._after: AoaState | None = None
         self.failure = ""
@@ -129,10 +111,9 @@ class Aoa:
             "stated": repr([(each, gravity_u(settings)) for each in self._changes]),
             "leaning": repr([each.mean.tolist() for each in self._leaning]),
             "geometry": of.geometry,
-            "sensors": repr([(name, settings.calibration(name)) for name in (*of.layout.names, *GYROS)]),
+            **self._sensors.settings,
             "attitude": repr((settings.attitude, settings.alarm)),
             "zero": repr(settings.zero),
-            "columns": repr([(k, place, column.name) for k, place, column in self._sensors]),
             "every": self._every,
             "band": repr((settings.band, settings.estimator.snap)),
         }
@@ -162,9 +143,12 @@ class Aoa:
         """The state after a row, and the lines of this row and of those that were held until now."""
         if state is not self._after:
             self._go_on_from(state)
-        if self._temperature >= 0 and math.isfinite(sample.values[self._temperature]):
-            state = state._replace(temperature=sample.values[self._temperature])
-        state, values = self._measured(self._remarked(state), sample)
+        state = self._remarked(state)._replace(
+            temperature=self._sensors.temperature(sample, state.temperature)
+        )
+        values, saturated = self._sensors.measured(sample, state.temperature)
+        for k, text in saturated:
+            state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
         n = self._problem.count
         later = sample.t > state.t
         zero_angle = (math.nan, math.nan)
@@ -265,26 +249,11 @@ class Aoa:
         changed = zip(self._leaning, state.beside.values(), strict=True)
         self._others = [LimitedLive(of, each.live, self._where) for of, each in changed]
 
-    def _measured(self, state: AoaState, sample: Sample) -> tuple[AoaState, Array]:
-        """Measured values of a row, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
-        values = np.full(self._problem.count + len(GYROS), np.nan)
-        temperature = None if math.isnan(state.temperature) else state.temperature
-        for k, place, column in self._sensors:
-            how = self._settings.calibration(column.name)
-            indicated = indication(column, np.array(sample.values[place]))
-            measured = how.measured(indicated, temperature)
-            if not at_range(indicated, measured, how):
-                values[k] = measured
-                continue
-            text = f"{column.name}: at its range, such samples are left out"
-            state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
-        return state, values
-
     def _remarked(self, state: AoaState) -> AoaState:
         """The state once the findings on the sensors are given."""
         if state.remarked:
             return state
-        for finding in self._remarks:
+        for finding in self._sensors.remarks:
             self._say(finding)
         return state._replace(remarked=True)
 
@@ -299,7 +268,7 @@ class Aoa:
         """The state with the last row of the gyro, or an alarm where it is silent."""
         if math.isfinite(gyro) or math.isnan(state.heard):
             return state._replace(heard=t)
-        if self._has_gyro and t - state.heard > LIMITS.silent_time:
+        if self._sensors.has_gyro and t - state.heard > LIMITS.silent_time:
             text = f"gyro: no number for {LIMITS.silent_time:g} s; angles go on from accelerometers alone, less well"
             return self._alarm(state, _SILENCE, "gyro_missing", text, t)
         return state
@@ -340,7 +309,7 @@ class Aoa:
         for t, row in zip(answers.t.tolist(), values.tolist(), strict=True):
             if waits and row[_STATUS] == 0.0:
                 row[_STATUS] = SUSPECT
-            state = self._within(state, t, row)
+            state = state._replace(beyond=watched_limits(self._settings, t, row, state.beyond, self._say))
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None
                 if slots is None:
@@ -351,11 +320,3 @@ class Aoa:
         return state._replace(
             unanswered=state.unanswered + without, rows=state.rows + len(answers.t)
         ), outputs
-
-    def _within(self, state: AoaState, t: float, row: Sequence[float]) -> AoaState:
-        """The state with the last time beyond the limits; said where it is the first for a while."""
-        if not self._settings.alarm.stated or row[-1] not in (-1.0, 1.0):
-            return state
-        if not t - state.beyond <= LIMITS.watched_time:
-            self._say(beyond(self._settings, row, t))
-        return state._replace(beyond=t)

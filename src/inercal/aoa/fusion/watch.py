@@ -23,6 +23,10 @@ _BEGUN, _WINDOW, _SUM, _COUNT, _MEAN, ALL, ALL_COUNT = range(7)
 _SETTLING, _LENGTH, _LEAST = LIMITS.settling_time, LIMITS.watched_time, float(LIMITS.watched_innovations)
 
 
+_PART = 100_000
+"""Rows that are copied at a time."""
+
+
 def initial() -> Array:
     """Before the first row: its time [s], the number of the window, sum and number of squared innovations in it, the
     mean of that before; sum at `ALL` and number at `ALL_COUNT` of all."""
@@ -34,8 +38,10 @@ def watched(t: Array, innovations: Array, gate: float, state: Array | None = Non
 
     They go on from a ``state``, which is changed, or are the first.
     """
-    nis = np.empty(len(t))
-    _watch(initial() if state is None else state, t, np.ascontiguousarray(innovations), gate, nis)
+    nis, state = np.empty(len(t)), initial() if state is None else state
+    for k in range(0, len(t), _PART):
+        part = slice(k, k + _PART)
+        _watch(state, t[part], np.ascontiguousarray(innovations[part]), gate, nis[part])
     return nis
 
 

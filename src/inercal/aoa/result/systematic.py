@@ -98,12 +98,17 @@ def by_fusion(
     return _with_stated(angles, settings, run)
 
 
-def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
-    """The angles of the paper's methods (`inercal.aoa.paper.methods.measure`) after a tare by the study's zero; stated
-    inputs count in their uncertainty."""
+def by_methods(
+    recording: Recording,
+    settings: AoaSettings,
+    methods: Methods,
+    by: Callable[[Recording, AoaSettings, Methods], Angles] = measure,
+) -> Angles:
+    """The angles of the paper's methods, ``by`` those of `inercal.aoa.paper.methods`, after a tare by the study's zero;
+    stated inputs count in their uncertainty."""
 
     def angles(chosen: AoaSettings) -> Angles:
-        return measure(tare(recording, chosen), chosen, methods)
+        return by(tare(recording, chosen), chosen, methods)
 
     def run(lean: Lean) -> Array:
         attitude, site = settings.attitude, replace(settings.site, gravity=lean.gravity)
@@ -117,6 +122,8 @@ def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) ->
 def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Array]) -> Angles:
     """The angles with stated inputs in their uncertainty; ``run`` gives theta under a change."""
     changes = leans(settings, angles.roll is not None)
+    if not changes:
+        return angles
     with ThreadPoolExecutor() as pool:
         return widened(angles, settings, changes, list(pool.map(run, changes)))
 
