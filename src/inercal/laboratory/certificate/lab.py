@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field
 from inercal._toml import Strict, check, read_toml
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
+from inercal.laboratory.certificate.elements import plain
 from inercal.studies.commented import commented
 from inercal.studies.common import Conditions, ConditionsTable
 from inercal.studies.fields import refusal
@@ -235,7 +236,7 @@ def _missing(lab: LabFile, estimates: Sequence[Estimate]) -> list[str]:
         f"{table}.{key}"
         for table, needed in _NEEDED.items()
         for key in needed
-        if getattr(getattr(lab, table), key) in ("", UNKNOWN)
+        if plain(getattr(getattr(lab, table), key)) in ("", UNKNOWN)
     ]
     keys += [
         f"{table}.{key}"
@@ -243,7 +244,7 @@ def _missing(lab: LabFile, estimates: Sequence[Estimate]) -> list[str]:
         for key, text in getattr(lab, table)
         if text == UNKNOWN and f"{table}.{key}" not in keys
     ]
-    if not lab.persons or any(person.name in ("", UNKNOWN) for person in lab.persons):
+    if not lab.persons or any(plain(person.name) in ("", UNKNOWN) for person in lab.persons):
         keys.append("persons.name")
     keys += [f"order.{key}" for key in ("begin", "end") if not getattr(lab.order, key)]
     if lab.conditions.temperature is None and not all(e.conditions.get("temperature") for e in estimates):
