@@ -191,6 +191,24 @@ def test_a_calibration_is_applied_without_what_a_sample_does_not_tell(folder, ca
     assert np.linalg.norm(force) == pytest.approx(9.7965, rel=1e-4)
 
 
+def test_rates_beyond_those_of_the_calibration_are_named(folder, capsys):
+    """The calibration says the rates about each axis that it has seen; a record that turns twice as fast is beyond."""
+    assert calibrate("--out", "cal.json") == 0
+    seen = json.loads((folder / "cal.json").read_text())["conditions"]["ranges"]["rate_about_an_axis_rad_s"]
+    record = ic.read("run.npz")
+    rates = np.column_stack([record[f"gyro_{axis}"].values for axis in "xyz"])
+    np.testing.assert_allclose(seen, [rates.min(axis=0), rates.max(axis=0)], rtol=0.05, atol=0.05)
+    assert not [f for f in ic.apply("cal.json", record).findings if f.code == "outside_range"]
+    columns = {
+        name: 2.0 * column.values for name, column in record.columns.items() if name.startswith("gyro")
+    }
+    kept = {name: record[name].values for name in record.columns if name.startswith("acc")}
+    fast = ic.record(t=record["gyro_x"].t, **kept, **columns)
+    found = [f.message for f in ic.apply("cal.json", fast).findings if f.code == "outside_range"]
+    assert found
+    assert all("rate" in text for text in found), found
+
+
 @pytest.mark.parametrize("tool", ["psins", "kalibr", "imu_tk", "imucal"])
 def test_other_tools_are_told_what_they_do_not_hold(tool, folder, capsys):
     calibrate("--out", "cal.json")

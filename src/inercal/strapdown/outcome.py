@@ -209,7 +209,7 @@ def _nuisances(fit: Fit) -> dict[str, dict[str, float]]:
 def _conditions(record: Record, samples: Samples, settings: StrapdownSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid."""
     ranges = {
-        "rate_rad_s": float(np.linalg.norm(samples.rate, axis=1).max()),
+        "rate_about_an_axis_rad_s": [samples.rate.min(axis=0), samples.rate.max(axis=0)],
         "specific_force_along_an_axis_m_s2": [float(samples.force.min()), float(samples.force.max())],
         "duration_s": len(samples.rate) * samples.ts,
         "rate_hz": 1.0 / samples.ts,
