@@ -8,6 +8,7 @@ give the same angles. Times are of one processor.
 """
 
 import os
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -53,12 +54,17 @@ def live(of, recording, rows: int) -> list[float]:
     return each[LIMITS.starting_rows :]
 
 
+def advanced(of, recording, block=0):
+    """The causal filter over a recording; with heads of blocks as the smoother takes them."""
+    return fusion.advance(fusion.initial(of), of, recording.t, recording.rows, last=True, block=block)
+
+
 def of_states(states: int, recording, few: int, rounds: int) -> list[Row]:
     """All rows with so many states; the peers on the first ``few`` samples."""
     settings = study(states, timing=Timing(0.0))
     of, n = problem(settings), len(recording.t)
     told, x, P = plain(of, settings, recording)
-    _, trace = fusion.advance(fusion.initial(of), of, recording.t, recording.rows, last=True)
+    _, trace = advanced(of, recording, smoother.BLOCK)
     peers = {
         f"{named('numpy')}, a loop": lambda: plain_fusion.run_numpy(told, x, P, recording.rows[:few, :4]),
         named("filterpy"): lambda: plain_fusion.run_filterpy(told, x, P, recording.rows[:few, :4]),
@@ -67,13 +73,14 @@ def of_states(states: int, recording, few: int, rounds: int) -> list[Row]:
         gap = np.max(np.abs(run()[:, 0] - trace.out[:few, 0]) / trace.out[:few, 1])
         assert gap < 1e-4, f"{name} differs by {gap:.1e} standard deviations"
     filtered = {
-        "causal": lambda: fusion.advance(fusion.initial(of), of, recording.t, recording.rows, last=True),
-        "back": lambda: smoother.smooth(of, recording.t, recording.rows, trace.starts),
+        "causal": lambda: advanced(of, recording),
+        "before": lambda: advanced(of, recording, smoother.BLOCK),
+        "back": lambda: smoother.smooth(of, recording.t, recording.rows, trace),
     }
     seconds = in_turn(filtered | peers, rounds)
     size, unit, promised = f"{n} rows, {states} states", ("µs a row", 1e6), PROMISED[states]
     causal = [s / n for s in seconds["causal"]]
-    both = [a + s / n for a, s in zip(causal, seconds["back"], strict=True)]
+    both = [(a + b) / n for a, b in zip(seconds["before"], seconds["back"], strict=True)]
     found = [row("Angle of attack, filter", size, unit, causal, at_most=promised[0])]
     found += [
         row("Angle of attack, filter", size, unit, causal, name, [s / few for s in seconds[name]])
@@ -100,7 +107,45 @@ def rows(quick: bool) -> list[Row]:
     return [
         *found,
         Row("Angle of attack, memory of the process", size, "MiB", spread([peak()]), at_most=1024.0),
+        *long_record(2000 if quick else 10_000_000),
     ]
+
+
+def long_record(n: int) -> list[Row]:
+    """A record in memory, from its columns to the verdict, in a process of its own: seconds, and memory in all."""
+    done = subprocess.run(
+        [sys.executable, "-c", LONG, str(n)], env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)),
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    seconds, memory = map(float, done.stdout.split())
+    size = f"{n} rows, 19 states"
+    return [
+        row("Angle of attack, whole record", size, ("s", 1.0), [seconds], at_most=35.0),
+        Row("Angle of attack, whole record, memory", size, "GiB", spread([memory]), at_most=2.0),
+    ]
+
+
+LONG = """
+import dataclasses, sys
+import numpy as np
+from measure import PROCESSOR, peak
+from sting_study import BASE, study
+from inercal.aoa.simulate import simulate, to_record
+from inercal.aoa.task import load_kernels, measure
+n = int(sys.argv[1])
+settings = study(motion=dataclasses.replace(BASE, duration=1e-3 * min(n, 100_000)))
+record = to_record(simulate(settings, np.random.default_rng(1)).recording, settings)
+times = -(-n // len(record["a1"].t))
+t = np.arange(times * len(record["a1"].t)) * 1e-3
+columns = {
+    name: dataclasses.replace(each, t=t, values=np.tile(each.values, times))
+    for name, each in record.columns.items() if name != "theta_ref"
+}
+load_kernels(settings)
+began = PROCESSOR()
+measure(dataclasses.replace(record, columns=columns), settings)
+print(PROCESSOR() - began, peak() / 1024.0)
+"""
 
 
 if __name__ == "__main__":

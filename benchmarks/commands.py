@@ -3,8 +3,9 @@
     python benchmarks/commands.py [--quick]
 
 Kernels are compiled and kept by a first run that is not counted. Beside them `inercal --version`, which is what Python
-and the command line take by themselves, and the first angle of a stream of the angle of attack. Times are those of the
-processor: what one waits on a machine that does nothing else.
+and the command line take by themselves, and the first angle of a stream of the angle of attack; and a long record of a
+model with points, report and result, with the largest memory of a process. Times are those of the processor: what one
+waits on a machine that does nothing else.
 """
 
 import gzip
@@ -16,7 +17,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from measure import Row, alone, in_turn, of_processes, row
+from measure import Row, alone, in_turn, of_processes, row, spread
 
 from inercal.examples import FOLDER
 
@@ -48,6 +49,52 @@ def first_angle(lines: bytes) -> None:
         process.stdout.read()
 
 
+def memory_of(words: list[str]) -> float:
+    """Run a process to its end: its largest memory [MiB]."""
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    _, process.returncode, used = os.wait4(process.pid, 0)
+    assert process.returncode == 0
+    return used.ru_maxrss / 1024.0
+
+
+def long_records(quick: bool) -> list[Row]:
+    """A model at 1 kHz that goes from pause to pause, of a record as text: the causal fusion, and the smoothed one."""
+    pauses, rounds = (3, 1) if quick else (100, 3)
+    found = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        record, study = str(folder / "model.csv"), str(folder / "aoa.toml")
+        done("new", "aoa", "--out", study, "--quiet", "--set", "site.gravity=9.80665 m/s^2")
+        steps = {
+            "first": "0 deg",
+            "last": f"{pauses} deg",
+            "step": "1 deg",
+            "pause": "4.44 s",
+            "move": "1.5 s",
+        }
+        keys = [f"motion.{key}={value}" for key, value in ({"kind": "pitch-pause"} | steps).items()]
+        done(
+            "simulate",
+            "aoa",
+            study,
+            *(word for key in keys for word in ("--set", key)),
+            "--out",
+            record,
+            "--quiet",
+        )
+        lines = [line.rsplit(",", 1)[0] for line in Path(record).read_text(encoding="utf-8").splitlines()]
+        Path(record).write_text("\n".join(lines) + "\n", encoding="utf-8")  # a tunnel has no reference angle
+        size = f"{len(lines) - 1} rows"
+        files = ("--out", str(folder / "points.csv"), "--report", str(folder / "report.html"), "--quiet")
+        for how, limit in (((), 7.0), (("--smooth",), 10.0)):
+            words = ("aoa", record, "--study", study, "--points", *how, *files)
+            what = "`" + " ".join(("aoa --points", *how)) + "` with report"
+            seconds = in_turn({what: lambda words=words: done(*words)}, rounds, of_processes)[what]
+            found.append(row(what, size, ("s", 1.0), seconds, at_most=limit))
+            found.append(Row(f"{what}, memory", size, "MiB", spread([memory_of(command(*words))])))
+    return found
+
+
 def rows(quick: bool) -> list[Row]:
     lines = b"".join(gzip.decompress((FOLDER / "sting.csv.gz").read_bytes()).splitlines(keepends=True)[:2000])
     with tempfile.TemporaryDirectory() as folder:
@@ -61,7 +108,7 @@ def rows(quick: bool) -> list[Row]:
             }
         seconds = in_turn(works, 1 if quick else 5, of_processes)
     promised = {"`selfcal` to the written report": 3.0, "`aoa --stream` to its first angle": 2.0}
-    return [
+    return long_records(quick) + [
         row(
             name,
             "cold process",

@@ -32,6 +32,7 @@ PARTS = {
     "Angle of attack": "aoa_fusion",
     "Streams": "streaming",
     "Commands": "commands",
+    "Laboratory": "laboratory",
     "Errors": "accuracy",
 }
 

@@ -164,11 +164,11 @@ def of_states(quick: bool) -> list[Curve]:
     for states in (8, 11, 15, 19):
         settings = study(states, timing=Timing(0.0))
         of = problem(settings)
-        _, trace = fusion.advance(fusion.initial(of), of, t, rows, last=True)
+        _, trace = fusion.advance(fusion.initial(of), of, t, rows, last=True, block=smoother.BLOCK)
         works[names[0]].append(
             (states, lambda of=of: fusion.advance(fusion.initial(of), of, t, rows, last=True), n)
         )
-        works[names[1]].append((states, lambda of=of, s=trace.starts: smoother.smooth(of, t, rows, s), n))
+        works[names[1]].append((states, lambda of=of, s=trace: smoother.smooth(of, t, rows, s), n))
         if states in (8, 19):
             told = (*plain(of, settings, recording), rows[:few, :4])
             for name, run in zip(names[2:], (plain_fusion.run_numpy, plain_fusion.run_filterpy), strict=True):
@@ -185,7 +185,7 @@ def of_rows(quick: bool) -> list[Curve]:
             study(motion=replace(BASE, duration=1e-3 * n)), np.random.default_rng(1)
         ).recording
         t, rows = recording.t, recording.rows
-        _, trace = fusion.advance(fusion.initial(of), of, t, rows, last=True)
+        _, trace = fusion.advance(fusion.initial(of), of, t, rows, last=True, block=smoother.BLOCK)
         works["inercal, filter"].append(
             (n, lambda t=t, rows=rows: fusion.advance(fusion.initial(of), of, t, rows, last=True), 1)
         )

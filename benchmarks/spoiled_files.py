@@ -63,6 +63,10 @@ def read(name, path, folder):
         from inercal.estimate.files import load
 
         return {"values": load(path).values}, set()
+    if name.startswith("xml"):
+        from inercal.laboratory.certificate.reading import estimate_of_certificate
+
+        return {"values": estimate_of_certificate(path).values}, set()
     if name == "checkpoint":
         from inercal.estimate.checkpoint import load as load_state
 

@@ -96,6 +96,15 @@ def study(kind: str) -> str:
     return _tables(whole["$defs"][f"{kind.capitalize()}StudyFile"], whole["$defs"])
 
 
+def lab() -> str:
+    """Every key of a ``lab.toml``, table by table."""
+    from inercal.laboratory.certificate.lab import LabFile
+    from inercal.studies.schema import TomlSchema
+
+    whole = LabFile.model_json_schema(schema_generator=TomlSchema)
+    return _tables(whole, whole["$defs"])
+
+
 def maps() -> str:
     """Every key of a column map, table by table."""
     from inercal.records.maps import MapEntry, NamedFileEntry
@@ -280,6 +289,17 @@ def _terms(found: Iterable[Any]) -> str:
     )
 
 
+def reference_types() -> str:
+    """The reference types of certificates."""
+    from inercal.instruments.reference_types import OTHERS
+    from inercal.instruments.reference_types import reference_types as types
+
+    rows = [(code(kind), meaning, code(unit)) for kind, (meaning, unit) in types().items()]
+    return table(
+        ("type", "meaning", "unit"), [*rows, *((code(kind), said, "") for kind, said in OTHERS.items())]
+    )
+
+
 # limits ---------------------------------------------------------------------------------------------------------------
 
 
@@ -344,12 +364,14 @@ PARTS: dict[str, Callable[..., str]] = {
     for each in (
         commands,
         study,
+        lab,
         maps,
         status,
         findings,
         terms,
         model_terms,
         noise_terms,
+        reference_types,
         limits,
         public,
         words,

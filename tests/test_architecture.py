@@ -36,6 +36,7 @@ FLOORS = [
     {"report"},
     {"stream"},
     {"examples"},
+    {"laboratory"},
     {"validate"},
     {"face"},
     {"cli", "__main__"},
@@ -161,7 +162,7 @@ WITHIN = {
         "positions rate steps task figures"
     ),
     "aoa": (
-        "limits band layout disturbances settings angles motion reading fusion paper diagnosis reference result "
+        "limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis reference result "
         "simulate design task runs figures"
     ),
     "selfcal": (

@@ -48,7 +48,7 @@ def _once(rng, name, content):
             return _tree(rng, content)
     except Exception:  # spoiled before
         return _bytes(rng, content)
-    if name.startswith(("csv,", "text", "result", "map", "yaml")) or name == "csv":
+    if name.startswith(("csv,", "text", "result", "map", "yaml", "xml")) or name == "csv":
         return _text(rng, content) if rng.random() < 0.8 else _bytes(rng, content)
     return _bytes(rng, content)
 

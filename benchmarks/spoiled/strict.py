@@ -13,6 +13,7 @@ import struct
 import tomllib
 import zipfile
 import zlib
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -232,6 +233,11 @@ def result(data, toml):
     return {"values": np.array([each["value"] for each in whole["parameters"]], float)}
 
 
+def certificate(data):
+    *_, last = ElementTree.fromstring(data).iter("{https://ptb.de/si}valueXMLList")
+    return {"values": np.array(last.text.split(), float)}
+
+
 def columns(name, path):
     """The columns of a file of a format; None where it is spoiled, or the format has no strict parser."""
     data = path.read_bytes()
@@ -263,6 +269,8 @@ def columns(name, path):
                 return bag(path)
             case "result, JSON" | "result, TOML":
                 return result(data, name.endswith("TOML"))
+            case "xml, certificate":
+                return certificate(data)
     except Exception:
         return None
     return None

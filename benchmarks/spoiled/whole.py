@@ -218,6 +218,30 @@ def result(suffix):
         return path.read_bytes()
 
 
+def certificate():
+    """A certificate of that result, as a file."""
+    from datetime import date
+
+    from inercal.laboratory.certificate.lab import LabFile
+    from inercal.laboratory.certificate.written import certificate as written_certificate
+
+    place = {"name": "Acme", "street": "Long Street 1", "city": "Berlin", "country": "DE"}
+    lab = LabFile.model_validate(
+        {
+            "persons": [{"name": "A. Smith"}],
+            "equipment": {},
+            "specification": {},
+            "laboratory": place,
+            "customer": place,
+            "order": {"begin": "2026-01-30", "end": "2026-01-31"},
+            "item": {"model": "G", "serial": "7"},
+            "conditions": {"temperature": "23(1) degC"},
+            "statements": {"traceability": "By the network."},
+        }
+    )
+    return written_certificate([estimate()], lab, "C-1", date(2026, 2, 1))
+
+
 def checkpoint():
     """The state of a stream."""
     from inercal.estimate.checkpoint import save
@@ -270,6 +294,7 @@ FORMATS = {
     "checkpoint": (".state", checkpoint, None),
     "map, TOML": (".map", lambda: (BINARY + '[time]\nrate = "100 Hz"\n').encode(), None),
     "yaml": (".yaml", lambda: YAML.encode(), None),
+    "xml, certificate": (".xml", certificate, None),
 }
 """Name of a format: ending, maker of a whole file, map to read it by."""
 

@@ -2,8 +2,8 @@
 
 This page defines the words. Nothing here computes. In Python, ``import inercal as ic`` brings one verb for each task:
 ``ic.read``, ``ic.record``, ``ic.study``, ``ic.calibrate``, ``ic.runs``, ``ic.simulate``, ``ic.design``,
-``ic.sensitivity``, ``ic.allan``, ``ic.temperature``, ``ic.compare``, ``ic.apply``, ``ic.load``; each has an example in
-its ``help``.
+``ic.sensitivity``, ``ic.allan``, ``ic.temperature``, ``ic.compare``, ``ic.apply``, ``ic.load``, ``ic.keep``,
+``ic.history``; each has an example in its ``help``.
 
 Frames, signs, units
     SI and radians inside. Another unit is written into a name (``bias_deg_per_h``) or beside a number at the
@@ -73,6 +73,7 @@ Map, lower floors first; each imports only from those above its own line
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     studies, report, examples  files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed
+    laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     face                       the verbs of Python, and the results that they give back
     cli                        one module per verb
@@ -87,6 +88,8 @@ if TYPE_CHECKING:
     from inercal.face.calibrations import apply as apply
     from inercal.face.calibrations import compare as compare
     from inercal.face.calibrations import load as load
+    from inercal.face.laboratory import history as history
+    from inercal.face.laboratory import keep as keep
     from inercal.face.noise import allan as allan
     from inercal.face.recordings import read as read
     from inercal.face.recordings import record as record
@@ -110,6 +113,7 @@ _WHERE = {
         "errors": ("CalibrationError", "InputError"),
         "estimate.result": ("Estimate",),
         "face.calibrations": ("apply", "compare", "load"),
+        "face.laboratory": ("history", "keep"),
         "face.noise": ("allan",),
         "face.recordings": ("read", "record"),
         "face.result": ("Result",),

@@ -10,12 +10,15 @@ import pytest
 from scipy.io import netcdf_file
 from sting_study import DEG, study
 
+from inercal.aoa.alarm import Alarm
 from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.result.alarms import beyond_limits
 from inercal.aoa.result.columns import angles_record, columns, points_record, rows
 from inercal.aoa.result.points import points
-from inercal.aoa.settings import Attitude, MotionPlan
+from inercal.aoa.result.systematic import by_fusion, by_methods
+from inercal.aoa.settings import Attitude, Methods, MotionPlan
 from inercal.aoa.simulate import simulate
 from inercal.records.write import SUFFIXES, write_record
 from inercal.units import Quantity, parse_unit
@@ -36,7 +39,8 @@ def measured():
     t = made.t.copy()
     t[100] = t[98]  # a stamp that goes back: the row is left out
     made = replace(made, t=t)
-    return settings, made, of_fusion(estimate(made, problem(settings)), 19)
+    of = problem(settings)
+    return settings, made, by_fusion(made, settings, of, estimate(made, of))
 
 
 def test_columns_are_those_of_the_contract(measured, tmp_path):
@@ -44,10 +48,11 @@ def test_columns_are_those_of_the_contract(measured, tmp_path):
     path = tmp_path / "angles.csv"
     write_record(angles_record(made, angles, settings), path)
     lines = path.read_text().splitlines()
-    assert lines[0] == "t [s],theta [deg],u_theta [deg],rate [deg/s]"
+    assert lines[0] == "t [s],theta [deg],u_theta [deg],rate [deg/s],nis [1],status [1]"
     assert len(lines) == 1 + len(made.t)
-    # a row that was left out has its stamp and no numbers
-    assert lines[1 + 100] == f"{float(made.t[98])!r},,,"
+    # a row that was left out has its stamp and its status, and no numbers
+    assert lines[1 + 100] == f"{float(made.t[98])!r},,,,,2.0"
+    assert [line.rsplit(",", 1)[1] for line in lines[1:100]] == ["0.0"] * 99
 
 
 def columns_of(path):
@@ -74,7 +79,9 @@ def test_every_format_holds_the_angles(measured, tmp_path, suffix):
     settings, made, angles = measured
     write_record(angles_record(made, angles, settings), path := tmp_path / f"angles{suffix}")
     found = columns_of(path)
-    assert set(found) == {"t [s]", "theta [deg]", "u_theta [deg]", "rate [deg/s]"}
+    assert set(found) == {
+        "t [s]", "theta [deg]", "u_theta [deg]", "rate [deg/s]", "nis [1]", "status [1]",
+    }  # fmt: skip
     np.testing.assert_array_equal(found["t [s]"], made.t)
     for name, si in (
         ("theta [deg]", angles.theta),
@@ -88,7 +95,9 @@ def test_alpha_and_beta_are_there_only_where_the_study_states_the_flow(measured)
     settings, made, angles = measured
     rolled = replace(settings, attitude=Attitude(roll=degrees(20.0, 0.1)))
     record = angles_record(made, angles, rolled)
-    assert list(record.columns) == ["theta", "u_theta", "rate", "alpha", "u_alpha", "beta", "u_beta"]
+    assert list(record.columns) == [
+        "theta", "u_theta", "rate", "nis", "status", "alpha", "u_alpha", "beta", "u_beta",
+    ]  # fmt: skip
     theta, phi = angles.theta, 20.0 * DEG
     np.testing.assert_allclose(record["alpha"].si(), np.arctan2(np.sin(theta) * math.cos(phi), np.cos(theta)))
     np.testing.assert_allclose(record["beta"].si(), np.arcsin(np.sin(theta) * math.sin(phi)))
@@ -118,14 +127,44 @@ def test_the_uncertainty_of_a_stated_roll_is_in_the_columns_once(measured):
 
 def test_a_stream_tells_the_rows_of_a_file(measured):
     settings, _, angles = measured
-    whole = rows(angles, settings.attitude)
+    whole = rows(angles, settings)
     columns_of = (angles.theta, angles.u, angles.rate, angles.rate_u)
     one = [
-        rows(Angles("", *(each[k : k + 1] for each in columns_of)), settings.attitude)[0]
+        rows(Angles("", *(each[k : k + 1] for each in columns_of), nis=angles.nis[k : k + 1]), settings)[0]
         for k in (50, 100, 300)
     ]
     np.testing.assert_array_equal(whole[[50, 100, 300]], one)
-    assert whole.shape[1] == len(columns(settings.attitude)) == 3
+    assert whole.shape[1] == len(columns(settings)) == 5
+
+
+def test_rows_beyond_the_limits_have_an_alarm(measured):
+    """Of pitch, or of alpha where the study states how the model lies: 10 deg of pitch are 15 deg of it."""
+    settings, made, angles = measured
+    limits = Alarm(lowest=-1.0 * DEG, highest=14.0 * DEG)
+    watched = replace(settings, alarm=limits)
+    steep = replace(watched, attitude=Attitude(upwash=degrees(5.0)))
+    for chosen, name in ((watched, "theta"), (steep, "alpha")):
+        record = angles_record(made, angles, chosen)
+        known = np.isfinite(angles.theta)
+        np.testing.assert_array_equal(
+            record["alarm"].values[known], 1.0 * (record[name].values[known] > 14.0)
+        )
+        assert np.isnan(record["alarm"].values[~known]).all()
+        (said,) = beyond_limits(angles, made.t, chosen)
+        assert f"{name} is 14" in said.message
+        assert f"so are {int((record['alarm'].values == 1.0).sum())} rows of {len(made.t)}" in said.message
+    assert beyond_limits(angles, made.t, replace(settings, alarm=Alarm(highest=1.0))) == []
+    assert (
+        "below the study's 19 deg"
+        in beyond_limits(angles, made.t, replace(settings, alarm=Alarm(lowest=19.0 * DEG)))[0].message
+    )
+
+
+def test_the_paper_has_no_nis_and_no_status(measured):
+    settings, made, _ = measured
+    record = angles_record(made, by_methods(made, settings, Methods()), settings)
+    assert np.isnan(record["nis"].values).all()
+    assert np.isnan(record["status"].values).all()
 
 
 def test_points_keep_their_numbers(measured, tmp_path):

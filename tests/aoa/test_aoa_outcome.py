@@ -9,7 +9,6 @@ import pytest
 from sting_study import DEG, G, scenario, study
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.diagnosis.fit_quality import of_rows
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.wind_off_zero import with_zero
@@ -111,7 +110,7 @@ def test_the_budget_of_sensors_that_come_late_is_that_of_the_record_from_there_o
     made.acc[:660] = np.nan
     made.gyro[:660] = np.nan
     late, *_ = assembled(settings, made)
-    from_there, *_ = assembled(settings, of_rows(made, np.arange(660, len(made.t))))
+    from_there, *_ = assembled(settings, made.of(np.arange(660, len(made.t))))
     for item, other in zip(late.budget, from_there.budget, strict=True):
         assert item.share == pytest.approx(other.share, rel=1e-5)
     assert sum(item.share.get("theta", 0.0) for item in late.budget) == pytest.approx(1.0, abs=1e-3)

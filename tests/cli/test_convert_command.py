@@ -188,13 +188,14 @@ def test_a_file_of_imu_tk_is_not_overwritten_by_its_second_name(folder, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("count", [50, pytest.param(150, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("tool", CONVENTIONS)
-def test_spoiled_files_of_other_tools_end_with_a_calibration_or_one_line(folder, capsys, tool):
+def test_spoiled_files_of_other_tools_end_with_a_calibration_or_one_line(folder, capsys, tool, count):
     run(["convert", "cal.json", "--to", tool, "--out", "theirs" + CONVENTIONS[tool].suffixes[0], "--quiet"])
     rng = np.random.default_rng(6)
     (name, *more) = FILES[tool]
     whole = (folder / name).read_bytes()
-    for _ in range(50):
+    for _ in range(count):
         spoiled = bytearray(whole)
         match rng.integers(4):
             case 0:

@@ -43,7 +43,9 @@ READ_A_STUDY = {
     *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
-WITHOUT_A_FILE = {"monitor"}
+WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun"} | {
+    f"store {kind}" for kind in ("init", "upgrade", "check", "export", "import")
+}
 TEMPLATES = {
     "imu": (partial(filled, "imu"), load_imu_study),
     "strapdown": (partial(filled, "strapdown"), load_strapdown_study),
@@ -78,8 +80,8 @@ def options(text):
 def test_an_option_has_one_kind_of_value_and_one_text_in_all_commands(helps):
     """Whoever knows one command knows the options of the others; --compare and --stream say what each compares.
 
-    --runs is a number of simulated runs, and of `aoa` the table that lists them."""
-    own = {"--compare", "--stream", "--runs"}
+    --runs is a number of simulated runs, and of `aoa` the table that lists them; `keep` is given a --report."""
+    own = {"--compare", "--stream", "--runs", "--report"}
     meanings = {}
     for command, text in helps.items():
         for name, (value, words) in options(text).items():
@@ -131,8 +133,9 @@ def test_every_help_has_one_shape(helps):
         assert used.startswith(f"Usage: inercal {command} ")
         arguments = re.findall(r"^ {2}([A-Z]+): (.*)$", text, re.MULTILINE)
         named = [name if words.endswith("[required]") else f"[{name}]" for name, words in arguments]
-        study = ["--study", "PATH"] if "--study" in options(text) else []
-        assert used.split()[2 + len(command.split()) :] == [*named, *study, "[OPTIONS]"]
+        needed = ["--study", "PATH"] if "--study" in options(text) else []
+        needed = ["--reason", "STR"] if "--reason" in options(text) else needed
+        assert used.split()[2 + len(command.split()) :] == [*named, *needed, "[OPTIONS]"]
         names = list(options(text))
         assert names[-len(last) :] == last or [n for n in names if n in last] == [
             n for n in last if n in names

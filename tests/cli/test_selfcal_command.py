@@ -37,7 +37,7 @@ def folder(tmp_path_factory) -> Path:
     assert run(["new", "selfcal", "--out", str(study), "--quiet", *FILL]) == 0
     text = study.read_text().replace('"45(26) deg"', '"40 deg"').replace('"0(300) m"', '"0 m"')
     turns = next(line for line in text.splitlines() if line.startswith("turns = [["))
-    study.write_text(text.replace(turns, 'path = "best"'))
+    study.write_text(text.replace(turns, 'path = "best"') + '\n[model]\nstates = "paper"\n')
     assert run(["simulate", "selfcal", str(study), "--seed", "8", "--out", str(out), "--quiet"]) == 0
     rows = out.read_text().splitlines(keepends=True)
     (path / "short.csv").write_text("".join(rows[:400]))

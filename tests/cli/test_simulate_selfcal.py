@@ -175,7 +175,8 @@ def test_the_example_is_copied_with_its_study(tmp_path, capsys):
 
 def test_many_runs_are_judged(folder, capsys):
     """With --runs the study is simulated and calibrated so often; the file, the page and standard output agree."""
-    assert simulated("--runs", "40", "--json", "--out", "mc.json", "--report", "mc.html") == 0
+    paper = ["--set", "model.states=paper"]
+    assert simulated("--runs", "40", *paper, "--json", "--out", "mc.json", "--report", "mc.html") == 0
     data = json.loads(capsys.readouterr().out)
     assert data["status"]["code"] == "ok"
     assert data["result"]["runs"] == data["result"]["converged"] == 40
@@ -231,7 +232,7 @@ def test_many_runs_that_cannot_be(folder, capsys, more, words):
 def test_many_runs_need_a_base_that_is_stated_well(folder, capsys):
     """A filter alone does not find a base that is half a degree off, and a campaign is of filters alone."""
     capsys.readouterr()
-    wide = ["--set", "filter.extended=true", "--set", "prior.beta=30 arcmin"]
+    wide = ["--set", "model.states=extended", "--set", "prior.beta=30 arcmin"]
     assert simulated("--runs", "5", *wide) == 2
     assert "prior.beta: found 30 arcmin" in capsys.readouterr().err
     assert simulated("--runs", "5", "--set", "rig.heading=unknown") == 2

@@ -39,6 +39,7 @@ SLOW = [
     "docs/theory/angle-of-attack-fusion.md",
     "docs/theory/self-calibration-filters.md",
     "docs/tutorials/angle-of-attack.md",
+    "docs/tutorials/five-years.md",
     "docs/tutorials/self-calibration.md",
     "docs/tutorials/strapdown.md",
     "docs/tutorials/turntable.md",
@@ -138,6 +139,7 @@ def test_a_page_runs_in_processes_of_their_own_too(folder, capsys):
 def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
+    from inercal.laboratory.specification import specification_of
     from inercal.records.maps import read_map
     from inercal.studies.load import (
         load_aoa_study,
@@ -154,6 +156,9 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
         keys = tomllib.loads(text)
         if keys.keys() & {"columns", "file"}:
             read_map(tmp_path / "study.toml")
+            continue
+        if keys.keys() == {"specification"}:
+            specification_of(keys["specification"], "study.toml")
             continue
         kind = keys.get("rig", {}).get("kind", "")
         special = {"": load_imu_study, "three_axis_gimbals": load_selfcal_study, "sting": load_aoa_study}

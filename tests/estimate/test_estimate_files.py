@@ -126,7 +126,9 @@ def test_keys_of_the_contract():
     assert list(data)[: len(contract)] == contract
     assert list(data)[-1] == "result"
     assert list(data["status"]) == ["code", "message"]
-    assert [list(p) for p in data["parameters"]] == [["name", "value", "u", "U", "k", "dof", "unit"]] * 2
+    assert [list(p) for p in data["parameters"]] == [
+        ["name", "value", "u", "U", "k", "dof", "unit", "coverage_probability", "long_name", "unit_dsi"]
+    ] * 2
     assert list(data["covariance"]) == ["names", "matrix"]
     assert list(data["findings"][0]) == ["code", "message", "where", "harm"]
     assert list(data["budget"][0]) == ["source", "type", "u", "unit", "share"]

@@ -20,12 +20,17 @@ from typing import IO
 
 import numpy as np
 import pytest
+from certified import LAB
+from made import result
 from new_studies import FILL
 
 from inercal.cli import main, run
 from inercal.cli.tree import COMMANDS as TREE
+from inercal.estimate.files import save
 from inercal.estimate.runs import Serial
 from inercal.examples import EXAMPLES, FOLDER
+from inercal.laboratory.catalog import results
+from inercal.laboratory.store import open_store
 from inercal.records.read import read
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="forks and signals as on POSIX")
@@ -42,6 +47,7 @@ COMMANDS = {
     "new turntable": "new turntable --out NEW.toml",
     "new selfcal": "new selfcal --out NEW.toml",
     "new aoa": "new aoa --out NEW.toml",
+    "new lab": "new lab --out NEW.toml",
     "inspect": "inspect log.csv --report NEW.html",
     "inspect result": "inspect log.csv --out NEW.json",
     "calibrate imu": "calibrate imu log.csv --study imu.toml --out NEW.json --report NEW.html",
@@ -72,6 +78,9 @@ COMMANDS = {
     "apply parquet": "apply cal.json log.csv --out NEW.parquet",
     "compare": "compare cal.json cal.json --out NEW.json",
     "convert": "convert cal.json --to kalibr --out NEW.yaml",
+    "show": "show KEPT --store store --out NEW.json",
+    "certificate": "certificate ok.json --lab lab.toml --number 1 --out NEW.xml --html NEW.html",
+    "history": "history cal.json --out NEW.json",
     "validate": "validate --out NEW.json",
     "schema": "schema --out NEW.json",
     "completion": "completion bash --out NEW.sh",
@@ -116,7 +125,17 @@ def folder(tmp_path_factory) -> Path:
     done = run(["calibrate", "imu", str(path / "log.csv"), "--study", str(path / "imu.toml"),
                 "--out", str(path / "cal.json"), "--quiet"])  # fmt: skip
     assert done == 0
+    save(result(), path / "ok.json")
+    (path / "lab.toml").write_text(LAB)
+    store = ["--store", str(path / "store")]
+    assert run(["store", "init", *store, "--quiet"]) == 0
+    assert run(["keep", str(path / "cal.json"), "--instrument", "17", *store, "--quiet"]) == 0
     return path
+
+
+def kept(folder: Path) -> str:
+    """Identity of the result in the store of the folder."""
+    return results(open_store(str(folder / "store")))[0].id
 
 
 def fork(spoil) -> tuple[list[IO[bytes]], int]:
@@ -233,7 +252,7 @@ def test_the_old_file_or_the_new_one(name, folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("inercal.validate.run.SYSTEMS", {"foundation": "the quickest"})
     monkeypatch.setattr("inercal.validate.run.executor", Serial)
-    arguments = shlex.split(COMMANDS[name])
+    arguments = shlex.split(COMMANDS[name].replace("KEPT", kept(folder) if name == "show" else ""))
     old = None if arguments[0] in CREATING else OLD
     parent, written = os.getpid(), []
     begin = tempfile.mkstemp

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import loadmat, savemat
 
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.records.read import read
+from inercal.records.read import read, read_runs
 
 XSENS_MAP = (FOLDER / "xsens-map.toml").read_text("utf-8")
 
@@ -103,8 +103,8 @@ TRUE_OF = {
 @pytest.mark.parametrize("example", EXAMPLES.values(), ids=EXAMPLES)
 def test_recordings_as_they_are(example):
     record_map = FOLDER / example.map if example.map else None
-    record = read([FOLDER / name for name in example.records], record_map)
-    assert said(record) == TRUE_OF.get(example.name, set())
+    records = read_runs([FOLDER / name for name in example.records], record_map)
+    assert all(said(record) == TRUE_OF.get(example.name, set()) for record in records)
 
 
 def test_stamps_as_they_are(tmp_path):

@@ -313,7 +313,7 @@ def test_the_only_matrix_of_a_v7_3_file_needs_no_name(tmp_path):
 
 @pytest.mark.parametrize("chunks", [None, (7, 2), (50_000, 4)])
 def test_a_large_matrix_is_read_by_blocks(tmp_path, chunks):
-    """Packed by the CF conventions, with a fill value and an infinite one: what h5py gives column by column."""
+    """Packed by the CF conventions, with a fill value, in one piece or in chunks: the numbers that were stored."""
     rng = np.random.default_rng(4)
     n = 70_001
     table = np.column_stack([np.arange(n), rng.integers(-30_000, 30_000, (n, 3))]).astype(np.int32)

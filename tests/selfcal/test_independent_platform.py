@@ -105,7 +105,8 @@ def test_an_ordinary_ramp_is_nothing_to_be_said(ramp, measured, tmp_path):
     (tmp_path / "study.toml").write_text(platform.study())
     found = calibrate(read([tmp_path / "record.csv"]), load_selfcal_study(tmp_path / "study.toml")).estimate
     assert found.status is Status.OK
-    assert {finding.code for finding in found.findings} == {"stated_exact"}
+    assert {finding.code for finding in found.findings} <= {"stated_exact", "at_prior"}
+    assert not any(finding.harm for finding in found.findings)
 
 
 def test_faults_do_what_their_words_say():
@@ -150,7 +151,8 @@ def test_faults_do_what_their_words_say():
 @pytest.mark.slow
 def test_a_careful_rig_with_1_f_noise_is_calibrated(tmp_path):
     """Geometry of some seconds of arc, K2, delays of 0.2 ms, levers of 3 cm, and 1/f noise of 1 ug, which is no process
-    of first order: of 18 coefficients of 4 runs none is beyond 4.5 u, as chance has it in 1 of 2000 such tests."""
+    of first order: of 18 coefficients of 4 runs none is beyond 4.5 u, as chance has it in 1 of 2000 such tests. Without
+    biases that walk among the states it is told that some noise is not what is stated."""
     rng = np.random.default_rng(20261123)
     for seed in range(4):
         rig = Faults(
@@ -167,12 +169,14 @@ def test_a_careful_rig_with_1_f_noise_is_calibrated(tmp_path):
         platform.simulated(np.random.default_rng([20261123, seed]), drive, faults=rig).write(
             tmp_path / "record.csv"
         )
-        more = '[model]\nstates = ["rig", "k2", "levers"]\n'
-        (tmp_path / "study.toml").write_text(platform.study(more=more))
-        settings = load_selfcal_study(tmp_path / "study.toml")
-        found = calibrate(read([tmp_path / "record.csv"]), settings).estimate
-        assert found.status in (Status.OK, Status.SUSPECT)
-        assert np.abs((found.values[:18] - TRUTH) / found.u[:18]).max() < 4.5
+        found = {}
+        for states in ('["rig", "k2", "levers"]', '["rig", "k2", "levers", "bias_walk"]'):
+            (tmp_path / "study.toml").write_text(platform.study(more=f"[model]\nstates = {states}\n"))
+            settings = load_selfcal_study(tmp_path / "study.toml")
+            found[states] = calibrate(read([tmp_path / "record.csv"]), settings).estimate
+        constant, walking = found.values()
+        assert (constant.status, walking.status) == (Status.SUSPECT, Status.OK)
+        assert np.abs((walking.values[:18] - TRUTH) / walking.u[:18]).max() < 4.5
 
 
 def test_sag_drift_by_force_and_by_temperature_are_found(tmp_path):

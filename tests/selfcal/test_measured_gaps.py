@@ -22,7 +22,7 @@ GAPS = {"30 s": ((150.0, 180.0),), "three": ((40.0, 50.0), (150.0, 180.0), (400.
 
 def recorded(folder, seed, gaps, noise=NOMINAL):
     """A recording of measured rates with gaps, and its study."""
-    (folder / "study.toml").write_text(platform.study(noise))
+    (folder / "study.toml").write_text(platform.study(noise, '[model]\nstates = "paper"\n'))
     made = platform.simulated(np.random.default_rng(seed), DRIVE, noise=noise, faults=Faults(gaps=gaps))
     made.write(folder / "record.csv")
     settings = load_selfcal_study(folder / "study.toml")

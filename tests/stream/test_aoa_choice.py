@@ -9,10 +9,12 @@ from independent.aoa import CASES, DEG, Tunnel, simulate
 from sting_study import study
 from streams_that_break import lines_out
 
+from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.fusion.band import with_rate
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.fusion.watch import watched
 from inercal.aoa.reading.recording import plain
 from inercal.aoa.settings import Estimator
 from inercal.records.write import number
@@ -52,7 +54,10 @@ def test_where_band_and_snap_are_stated_the_digits_are_those_of_the_file(low_pas
     shown = np.degrees(np.column_stack([filtered.theta, filtered.u, filtered.rate]))
     assert np.array_equal(out[:, 1:4], shown, equal_nan=True)
     assert np.isfinite(shown[200:]).all()
-    assert not (out[:, 4] == 1.0).any()
+    assert not (out[:, 5] == 1.0).any()
+    gate = problem(settings).constants.gate
+    nis = np.where(np.isfinite(filtered.theta), watched(run.t, filtered.innovations, gate), np.nan)
+    assert np.array_equal(out[:, 4], nis, equal_nan=True)
 
 
 @pytest.mark.slow
@@ -63,8 +68,8 @@ def test_a_stream_decides_within_15_s_and_says_until_when(tmp_path):
     whole, of, said = streamed(text, study())
     out = table(whole)
     after = run.t > 15.0
-    assert set(out[~after, 4]) <= {1.0, 2.0, 3.0}
-    assert set(out[after, 4]) == {0.0}
+    assert set(out[~after, 5]) <= {1.0, 2.0}
+    assert set(out[after, 5]) == {0.0}
     error, u = out[after, 1] - run.theta[after] / DEG, out[after, 2]
     assert np.sqrt(np.mean(error**2)) < 0.05
     assert np.sqrt(np.mean((error / u) ** 2)) < 2.0
@@ -73,6 +78,7 @@ def test_a_stream_decides_within_15_s_and_says_until_when(tmp_path):
     problem_ = of._problem
     filtered = estimate(plain(run.t, run.acc, run.gyro), problem_)
     assert np.array_equal(out[after, 1], np.degrees(filtered.theta[after]))
+    assert np.array_equal(out[after, 4], watched(run.t, filtered.innovations, problem_.constants.gate)[after])
     saving, given = Saving(tmp_path / "state", 100), []
     for kill in (2000, 4450, 4600, 5500, None):
         given += streamed(text, study(), saving, kill)[0]
@@ -83,6 +89,25 @@ def test_a_stream_that_contradicts_the_model_ends_with_that():
     run = simulate(Tunnel(duration=6.0), 0)
     run = replace(run, gyro=-run.gyro)
     out, of, _ = streamed(text_of(run), study())
-    assert table(out)[-1, 4] == 2.0
+    assert table(out)[-1, 5] == 1.0
     assert "contradicts the model: mean NIS" in of.failure
-    assert table(out)[-1, 5] > 2.0
+    assert table(out)[-1, 4] > 2.0
+
+
+def test_angles_beyond_the_limits_are_said_as_they_come():
+    """15 deg + 10 deg at 0.25 Hz: each of two excursions above 24 deg once, and the rows of each in their column."""
+    run = simulate(Tunnel(duration=7.0, frequency=0.25), 0)
+    settings = study(
+        band=Band(np.inf), estimator=Estimator(snap=1e8), alarm=Alarm(lowest=-5.0 * DEG, highest=24.0 * DEG)
+    )
+    out, of, said = streamed(text_of(run), settings)
+    assert out[0].endswith(",nis [1],status [1],alarm [1]")
+    rows = table(out)
+    known = np.isfinite(rows[:, 1])
+    assert np.array_equal(rows[known, 6], 1.0 * (rows[known, 1] > 24.0))
+    told = [each for each in said if each.code == "beyond_limits"]
+    assert len(told) == 2
+    assert "theta is 24.01 deg, above the study's 24 deg" in told[0].message
+    first = run.t[np.flatnonzero(run.theta > 24.0 * DEG)[0]]
+    assert abs(float(told[0].where.split()[2]) - first) < 0.02
+    assert of.failure == ""

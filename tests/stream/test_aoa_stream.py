@@ -9,6 +9,7 @@ import pytest
 from sting_study import BASE, DEG, G, study
 from streams_that_break import lines_out
 
+from inercal.aoa.band import Band
 from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
@@ -16,7 +17,7 @@ from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.result.columns import angles_record
 from inercal.aoa.result.systematic import by_fusion
-from inercal.aoa.settings import Attitude, Calibration, Zero
+from inercal.aoa.settings import Attitude, Calibration, Estimator, Timing, Zero
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
 from inercal.errors import InputError, RecordError, StudyError
@@ -58,8 +59,14 @@ def recorded(tmp_path, settings, seed=1, change=lambda rows: rows, **columns):
 
 
 def live(text, settings, every=0.0, saving=None, kill=None, said=None):
-    """Lines out for such a file, without status and NIS."""
-    return [line.rsplit(",", 2)[0] for line in whole_lines(text, settings, every, saving, kill, said)]
+    """Lines out for such a file, without their status, which is 1 until a stream has decided."""
+    return [without_status(line) for line in whole_lines(text, settings, every, saving, kill, said)]
+
+
+def without_status(line):
+    """A line of angles less its sixth field."""
+    fields = line.split(",")
+    return ",".join(fields[:5] + fields[6:])
 
 
 def whole_lines(text, settings, every=0.0, saving=None, kill=None, said=None):
@@ -76,7 +83,7 @@ def of_file(text, settings, tmp_path):
     of = problem(settings, recording.spatial)
     angles = by_fusion(recording, settings, of, estimate(recording, of))
     write_record(angles_record(recording, angles, settings), tmp_path / "angles.csv")
-    return (tmp_path / "angles.csv").read_text().splitlines()
+    return [without_status(line) for line in (tmp_path / "angles.csv").read_text().splitlines()]
 
 
 def flawed(rows):
@@ -103,9 +110,9 @@ def test_lines_are_those_of_the_whole_file_to_the_last_digit(states, tmp_path):
     text = recorded(tmp_path, settings, change=flawed)
     out = live(text, settings)
     assert out == of_file(text, settings, tmp_path)
-    assert out[0] == "t [s],theta [deg],u_theta [deg],rate [deg/s]"
+    assert out[0] == "t [s],theta [deg],u_theta [deg],rate [deg/s],nis [1]"
     assert len(out) == len(text.splitlines())
-    assert out[1] == ",,,"  # a row without a time has its line, and no angle
+    assert out[1] == ",,,,"  # a row without a time has its line, and no angle
 
 
 @pytest.mark.parametrize(
@@ -174,7 +181,8 @@ def test_a_prior_from_a_turntable_puts_the_sensors_right_as_in_the_file(tmp_path
     whole = measure(read(tmp_path / "whole.csv"), second)
     assert abs(whole.settings.layout.angle - settings.layout.angle).max() > 5e-4
     write_record(angles_record(whole.recording, whole.angles, whole.settings), tmp_path / "angles.csv")
-    assert live(text, second) == (tmp_path / "angles.csv").read_text().splitlines()
+    whole_file = (tmp_path / "angles.csv").read_text().splitlines()
+    assert live(text, second) == [without_status(line) for line in whole_file]
 
 
 def test_a_model_on_its_side_is_refused():
@@ -311,8 +319,11 @@ def test_a_gyro_that_falls_silent_is_said(tmp_path):
 
 @pytest.mark.parametrize("killed", [False, True])
 def test_innovations_that_contradict_the_model_are_said_once(killed, tmp_path):
-    """A gyro of the wrong sign, or more noise than stated: also after a restart it is said no second time."""
-    settings = study(motion=LONG)
+    """A gyro of the wrong sign, or more noise than stated: also after a restart it is said no second time.
+
+    Where the stream decides on nothing: else it is said once it has decided.
+    """
+    settings = study(motion=LONG, band=Band(math.inf), estimator=Estimator(snap=1e8))
     loud = replace(settings, noise=replace(settings.noise, accelerometer=0.4 * settings.noise.accelerometer))
 
     def turned(rows):
@@ -320,7 +331,7 @@ def test_innovations_that_contradict_the_model_are_said_once(killed, tmp_path):
 
     for text, of in (
         (recorded(tmp_path, settings, change=turned), settings),
-        (recorded(tmp_path, settings), replace(loud, estimator=replace(loud.estimator, states=8))),
+        (recorded(tmp_path, settings), replace(loud, estimator=Estimator(8, snap=1e7))),
     ):
         said, saving = [], Saving(tmp_path / f"state{of.estimator.states}", 10)
         if killed:
@@ -328,6 +339,16 @@ def test_innovations_that_contradict_the_model_are_said_once(killed, tmp_path):
         live(text, of, saving=saving, said=said)
         assert [finding.code for finding in said] == ["excess_scatter"]
         assert said[0].where == "t = 4 s"
+
+
+def test_while_a_stream_has_not_decided_no_contradiction_is_said(tmp_path):
+    settings = study(motion=LONG)
+    said = []
+    out = whole_lines(recorded(tmp_path, settings), replace(settings, timing=Timing(0.02)), said=said)
+    fields = [line.split(",") for line in out[1:]]
+    assert float(fields[-1][4]) > 2.0
+    assert {each[5] for each in fields} <= {"1.0", "2.0"}
+    assert said == []
 
 
 def test_sound_innovations_and_spikes_are_not_said(tmp_path):

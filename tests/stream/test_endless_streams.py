@@ -85,6 +85,8 @@ def test_memory_is_flat(name, folder):
         process.stdin.close()
         reader.join()
     print(name, [round(each, 1) for each in memory], taken)
-    assert process.returncode in (0, 1)  # repeated rows jump, which a verdict may say
+    assert process.returncode in (
+        (0, 1) if name == "aoa" else (0,)
+    )  # repeated rows jump, which the verdict may say
     assert taken >= 0.9 * ROWS or name == "selfcal"
     assert max(memory[2:]) < memory[1] + SPARE

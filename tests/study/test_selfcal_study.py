@@ -19,7 +19,7 @@ from inercal.instruments.terms import term
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
-from inercal.selfcal.platform.states import ALL, BIAS_WALK, RIG, STATES, TEMPERATURE
+from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, PAPER, RIG, STATES, TEMPERATURE
 from inercal.selfcal.settings import Gating
 from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
 from inercal.studies.schema import json_schema
@@ -95,7 +95,7 @@ def test_the_study_of_the_contract(write):
     assert found.noise.accelerometer == pytest.approx(nominal.accelerometer)
     assert found.noise.encoder == pytest.approx(nominal.encoder)
     assert found.goal == pytest.approx(dict.fromkeys(NAMES[:3], 0.002 * PER_HOUR))
-    assert (found.filter.kind, found.filter.gating, found.states.names) == ("error-state", None, NAMES)
+    assert (found.filter.kind, found.filter.gating, found.kinds) == ("error-state", None, RIG)
     assert found.disturbances.dropouts == 0.0
     assert json.loads(json.dumps(found.given)) == tomllib.loads(CONTRACT)
     VALIDATOR.validate(tomllib.loads(CONTRACT))
@@ -370,7 +370,7 @@ def test_states_of_the_rig():
     """A word or a list; what map leaves out; the prior of a walk is how far biases are from their means."""
     noise = tomllib.loads(CONTRACT)["noise"]
     asked = study(model={"states": ["rig", "k2"]}, noise=noise | {"accelerometer_walk": "1 ug/sqrt(s)"})
-    assert asked.kinds == (*RIG[:-2], "k2", "gyro_walk", "accelerometer_walk")
+    assert asked.kinds == (*RIG, "k2")
     sigma = dict(zip(ALL, asked.priors, strict=True))["ka0_walk_y"]
     assert sigma == pytest.approx(1e-6 * 9.80665 * math.sqrt(30.0))
     waves = [{"axis": "z", "order": 8, "amplitude": "0(2) arcsec"}]
@@ -393,10 +393,16 @@ def test_states_of_the_rig():
     assert known["sag_y"] == pytest.approx(3.0 * ARCSEC / 9.80665)
     assert known["G_zx"] == pytest.approx(math.radians(0.1) / 3600 / 9.80665)
     assert known["ka1_x_T1"] == pytest.approx(20e-6)
-    batch = study(
-        model={"states": "rig"}, filter={"kind": "map"}, noise=noise | {"gyro_walk": "1 deg/h/sqrt(s)"}
-    )
-    assert batch.kinds == tuple(kind for kind in RIG if kind not in BIAS_WALK)
+    assert study(model={"states": ["rig", "bias_walk"]}).kinds == (*RIG, *BIAS_WALK)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_states_are_those_of_the_rig_where_the_estimator_has_them(kind):
+    """And the paper's where it does not."""
+    kinds = RIG if kind in ("error-state", "mukf", "map") else PAPER
+    assert study(filter={"kind": kind}).kinds == kinds
+    assert study(filter={"kind": kind, "extended": True}).kinds == EXTENDED_MODEL
+    assert study(filter={"kind": kind}, model={"states": "paper"}).kinds == PAPER
 
 
 def test_the_table_of_terms_knows_every_coefficient_with_its_unit():

@@ -109,8 +109,8 @@ def keys_of(schema, path=""):
 
 @pytest.mark.parametrize("kind", READ)
 def test_every_key_is_there(kind):
-    """All but chains, errors that a table of two axes does not have, more sensors, and a second table of the same
-    keys."""
+    """All but chains, errors that a table of two axes does not have, more sensors, the laboratory, and a second table
+    of the same keys."""
     shown = {f"{table}.{key}".lstrip(".") for table, _, key, _ in lines_of(template(kind))}
     known = set(keys_of(SCHEMA["$defs"][f"{kind.capitalize()}StudyFile"]))
     assert {key for key in shown - known if not key.startswith("instrument.coefficients.")} == set()
@@ -118,6 +118,7 @@ def test_every_key_is_there(kind):
         r"sensors\.(a[2-9]|a\d\d|gyro_\w+)\..*|prior\.axial\..*|imu\.aided\.rig\.(errors|base|limits)\..*|"
     )
     alike += r"(imu\.aided\.)?rig\.chain"
+    alike += r"|laboratory\..*"  # those of `inercal new lab`
     alike += r"|goal\.(?!DX_F|drift).*|cost\.(?!default|position).*"
     two, three = (
         {slot.name for slot in slots(each)} for each in ("two_axis_turntable", "three_axis_turntable")

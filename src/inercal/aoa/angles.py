@@ -143,7 +143,8 @@ class Angles:
     ``theta`` pitch and its standard uncertainty ``u`` [rad]; ``rate`` and ``rate_u`` [rad/s]. ``roll`` and ``roll_u``
     [rad] where gyros for roll and yaw track it. Where the study states a roll with an uncertainty, ``own_u`` is u
     without the part of the roll (`inercal.aoa.angles.alpha_beta` takes it), and ``by_roll`` the change of theta per
-    change of the roll.
+    change of the roll. ``nis`` of the fusion is its mean squared innovation of the last seconds
+    (`inercal.aoa.fusion.watch`).
     """
 
     method: str
@@ -155,6 +156,7 @@ class Angles:
     roll_u: Array | None = None
     own_u: Array | None = None
     by_roll: Array | None = None
+    nis: Array | None = None
 
     @property
     def known_u(self) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -43,9 +44,11 @@ class Layout:
     def of(self, *chosen: int) -> Layout:
         """The layout of some of the accelerometers, by number from 0."""
         k = list(chosen)
+        if k == list(range(len(self.names))):
+            return self
         return Layout(tuple(self.names[i] for i in k), self.angle[k], self.r[k], self.z[k])
 
-    @property
+    @cached_property
     def turned(self) -> Array:
         """(N, N) rad: lambda of the column less that of the row, within (-pi, pi]."""
         apart = self.angle[None, :] - self.angle[:, None]
@@ -67,7 +70,7 @@ class Layout:
         """Pairs (i, j) at which ``off`` (N, N) [rad] is 0."""
         return [(int(i), int(j)) for i, j in np.argwhere(np.abs(off) < LIMITS.parallel_axes)]
 
-    @property
+    @cached_property
     def spans(self) -> bool:
         """True where two axes are not parallel, so that one sample tells the angle all around."""
         return bool((np.abs(np.sin(self.turned)) > LIMITS.parallel_axes).any())
@@ -96,6 +99,7 @@ def _arms(length: Array) -> Array:
     return np.where(np.abs(length) < _ROUNDING, 0.0, length)
 
 
+@lru_cache(maxsize=64)
 def pair_weights(layout: Layout, level: float = 1.0) -> Array | None:
     """(N,) d [1/m] for the paper's dual accelerometer, al = d . A with A free of w^2; None without such a pair.
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.disturbances import SIZE, Disturbances
 from inercal.aoa.layout import AXES, Layout
@@ -381,6 +382,7 @@ class AoaSettings:
     attitude: Attitude = field(default_factory=Attitude)
     zero: Zero | None = None
     points: PointPlan = field(default_factory=PointPlan)
+    alarm: Alarm = field(default_factory=Alarm)
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
     design: Design = field(default_factory=Design)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.diagnosis.choice import decided, of_delay, of_rectification, of_vibration
+from inercal.aoa.diagnosis.choice import decided_with, of_delay, of_rectification, of_vibration
 from inercal.aoa.diagnosis.examination import diagnose, implausible
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
@@ -24,6 +24,7 @@ from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.reference.sensor_fit import Verified, fit
 from inercal.aoa.reference.static_fit import at_rests_alone, static_fit
+from inercal.aoa.result.alarms import beyond_limits
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.outcome import assemble, assemble_paper
@@ -125,11 +126,11 @@ def measure(
     recording = recording_of(record, settings)
     if not recording.spatial:
         settings.attitude.check_pitch_shows()
-    stated, settings = settings, decided(recording, settings)
+    delay = relative_delay(recording, settings.layout)
+    stated, settings = settings, decided_with(recording, settings, delay)
     findings = [*implausible(*fused_case(recording, settings)), *of_vibration(stated, settings)]
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior if known is None else known)
-    delay = relative_delay(recording, settings.layout)
     filtered: FilterResult | None = None
     if methods is None:
         progress("smoothing" if settings.estimator.smooth else "filtering")
@@ -137,9 +138,7 @@ def measure(
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
-        # between the samples of a slower sensor there are no spectra of both
-        if not any(each.code == "other_clock" for each in recording.findings):
-            findings += of_delay(delay, of, filtered)
+        findings += of_delay(delay, of, filtered)
         known_u = angles.u[np.isfinite(angles.u)]
         if len(known_u):
             findings += of_rectification(recording, settings, float(np.median(known_u)))
@@ -147,6 +146,7 @@ def measure(
         progress(label(methods))
         angles = by_methods(recording, settings, methods)
     compared = _compared(zeroed, settings, angles, progress) if compare else {}
+    findings = [*findings, *beyond_limits(angles, recording.t, settings)]
     progress("assembling")
     at_rest = points(recording, angles, settings)
     judged: dict[str, Errors] = {}

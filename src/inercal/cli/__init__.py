@@ -27,6 +27,9 @@ _LONGEST = 900
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 """Control characters but tab and line feed, and marks that turn the direction of writing."""
 
+_LINE: list[str] = []
+"""Arguments of the command that runs."""
+
 EXIT_BAD_VERDICT = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -78,6 +81,7 @@ def run(arguments: list[str] | None = None) -> int:
         if arguments == ["--version"]:  # what installers ask needs no commands
             print(__version__)
             return 0
+        _LINE[:] = arguments
         from inercal.cli.tree import call  # here, so that an interrupt during loading is caught too
 
         code = call(arguments)
@@ -131,6 +135,11 @@ def _say(text: str) -> None:
 
     with contextlib.suppress(OSError, ValueError):
         print(f"inercal: {printable(text)}", file=sys.stderr, flush=True)
+
+
+def command_line() -> list[str]:
+    """Arguments of the command that runs, as they were typed."""
+    return [*_LINE]
 
 
 def printable(text: str) -> str:

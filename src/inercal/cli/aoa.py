@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
+from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError, StudyError
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from inercal.cli.streaming import Estimators
     from inercal.records.record import Record
     from inercal.stream.aoa import Aoa
+    from inercal.stream.aoa_paper import PaperAoa
     from inercal.stream.lines import Lines
     from inercal.stream.run import Recursive
 
@@ -80,10 +81,11 @@ class MethodOptions:
                 option, f"found with {chosen[0]}, expected the fusion or the paper's way, not both"
             )
         whole = {"--compare": self.compare, "--smooth": self.smooth, "--points": self.points}
-        for option in (*(name for name, given in whole.items() if given), *chosen):
+        for option in (name for name, given in whole.items() if given):
             if stream:
                 raise InputError(
-                    option, "found with a stream, expected the causal fusion alone, a line for each sample"
+                    option,
+                    "found with a stream, expected one method that does not look ahead, a line for each sample",
                 )
 
     def methods(self, settings: AoaSettings) -> Methods | None:
@@ -120,7 +122,7 @@ def aoa(
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Measure the angle of attack of a wind-tunnel model."""
     keys = [*(overrides or ()), *how.keys]
@@ -130,8 +132,8 @@ def aoa(
     if runs is not None:
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
-        made: list[Aoa] = []
-        prepare = partial(_live, made)
+        made: list[Aoa | PaperAoa] = []
+        prepare = partial(_live, made, how)
         stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
         failure = made[-1].failure if made else ""
         if failure:
@@ -168,7 +170,7 @@ def _runs(
     stream: bool,
     map_file: Path | None,
     span: Span,
-    output: ReportOutput,
+    output: ResultOutput,
 ) -> int:
     """Measure the runs of a table."""
     from inercal._jit import compiling
@@ -202,13 +204,28 @@ def _runs(
     return give(result, output, 0.0, "runs")
 
 
-def _live(made: list[Aoa], settings: AoaSettings, interval: float, output: ReportOutput) -> Estimators:
+def _live(
+    made: list[Aoa | PaperAoa],
+    how: MethodOptions,
+    settings: AoaSettings,
+    interval: float,
+    output: ResultOutput,
+) -> Estimators:
     """Prepare a measurement row by row; ``made`` receives it."""
     from inercal._jit import compiling
     from inercal.aoa.fusion.live_band import load_kernels
     from inercal.aoa.fusion.problem import problem
     from inercal.stream.aoa import Aoa
+    from inercal.stream.aoa_paper import PaperAoa
 
+    methods = how.methods(settings)
+    if methods is not None:
+
+        def by_paper(lines: Lines) -> Recursive[Any]:
+            made.append(PaperAoa(lines, settings, methods, interval, output.say_finding))
+            return made[-1]
+
+        return by_paper
     if settings.estimator.smooth:
         raise StudyError(
             "estimator.smooth", "found true with a stream, expected false: it knows the past alone"

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from inercal.cli.options import (
     MapFile,
     Overrides,
-    ReportOutput,
+    ResultOutput,
     RunFiles,
     Span,
     StudyFile,
@@ -35,7 +35,7 @@ def calibrate_imu(
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
     from inercal.imu.task import in_rows
@@ -51,7 +51,7 @@ def calibrate_strapdown(
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate a strapdown unit from rests and coarse turns."""
     return _calibrated("strapdown", files, study, map_file, span, overrides, output)
@@ -65,7 +65,7 @@ def calibrate_turntable(
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an instrument that was taken through positions on a turntable."""
     return _calibrated("turntable", files, study, map_file, span, overrides, output)
@@ -78,7 +78,7 @@ def _calibrated(
     map_file: Path | None,
     span: Span,
     overrides: list[str] | None,
-    output: ReportOutput,
+    output: ResultOutput,
     in_rows: Callable[[Any], bool] = lambda _: False,
 ) -> int:
     """Read study and records, calibrate, and hand over; ``in_rows`` of the settings: the rows need no times."""
@@ -114,7 +114,7 @@ def temperature(
     at: Annotated[
         str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
     ] = "25 degC",
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Fit what a sensor's output or its calibration does with temperature."""
     from dataclasses import replace

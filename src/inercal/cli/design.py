@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inercal.cli.options import Overrides, ReportOutput, Study, reading, study_in, working
+from inercal.cli.options import Overrides, ResultOutput, Study, reading, study_in, working
 from inercal.cli.outcome import WHOLE, give
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def design_positions(
     /,
     *,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find the positions of a turntable that calibrate best."""
     from inercal._files import write_text
@@ -43,7 +43,7 @@ def design_tolerances(
     /,
     *,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find the cheapest tolerances of a turntable that reach wanted uncertainties."""
     from inercal._files import write_text
@@ -66,7 +66,7 @@ def design_selfcal(
     /,
     *,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find the path on which a platform calibrates itself best."""
     from inercal._files import write_text
@@ -117,7 +117,7 @@ def design_aoa(
     /,
     *,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find where the accelerometers of a model tell its angle best."""
     from inercal._files import write_text
@@ -162,7 +162,7 @@ def sensitivity(
     /,
     *,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Say which error of a turntable matters."""
     from inercal.face import turntable as system

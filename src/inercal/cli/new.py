@@ -83,6 +83,25 @@ def new_aoa(
     _new("aoa", files or [], overrides or [], output, rate)
 
 
+def new_lab(
+    *,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Write what a laboratory states in its certificates, to be filled in."""
+    from inercal._files import write_text
+    from inercal.estimate.result import without_coefficients
+    from inercal.laboratory.certificate.lab import lab_template
+
+    output.check((".toml",))
+    path = output.out or Path("lab.toml")
+    if path.exists():
+        raise InputError(path, "exists already, expected a new file name (--out)")
+    write_text(path, lab_template(path, overrides or ()))
+    words = f'{path}: fill in each "?" and look it over'
+    emit(without_coefficients("new lab", words, {"lab": str(path)}), words, output)
+
+
 def _described(
     kind: Kind, files: list[Path], rate: str | None
 ) -> tuple[Mapping[str, Unit | None], str | None]:

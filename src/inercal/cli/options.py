@@ -148,6 +148,41 @@ class ReportOutput(FileOutput):
         super().check(suffixes, inputs)
 
 
+StoreOption = Annotated[
+    str | None,
+    Parameter(
+        help="Folder of the store, or URL of its database; INERCAL_STORE, or the user's own, if absent."
+    ),
+]
+
+
+InstrumentOption = Annotated[
+    str | None, Parameter(help='The instrument: its serial number, or "maker, model, serial".')
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class ResultOutput(ReportOutput):
+    """The options of a command whose result can be kept in a store."""
+
+    keep: Annotated[bool, Parameter(help="Keep the result, its files and report in the store.")] = False
+    store: StoreOption = None
+    instrument: InstrumentOption = None
+
+    def check(self, suffixes: Sequence[str], inputs: Iterable[str | Path | None] = ()) -> None:
+        """Fail before any work is done where a result could not be written or kept; raises `InputError`."""
+        super().check(suffixes, inputs)
+        if self.keep:
+            from inercal.laboratory.store import open_store
+
+            open_store(self.store)
+            return
+        for option, text in (("--store", self.store), ("--instrument", self.instrument)):
+            if text is not None:
+                raise InputError(option, "found without --keep, expected with it")
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Span:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inercal.cli import EXIT_BAD_VERDICT, process_age
-from inercal.cli.options import FileOutput, ReportOutput
+from inercal.cli import EXIT_BAD_VERDICT, command_line, process_age
+from inercal.cli.options import Output, ReportOutput, ResultOutput
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -18,7 +18,7 @@ WHOLE = (".json", ".toml")
 """Suffixes of a file that holds the whole result."""
 
 
-def emit(estimate: Estimate, text: str, output: FileOutput) -> None:
+def emit(estimate: Estimate, text: str, output: Output) -> None:
     """The result on standard output: the JSON object with the time of the whole process, or the text for people."""
     from inercal.estimate.files import to_json
 
@@ -44,17 +44,22 @@ def hand_over(
     from inercal.findings import Status
 
     estimate = timed(estimate)
+    estimate = replace(estimate, provenance={**estimate.provenance, "arguments": command_line()})
+    report = None if output.report is None else page()
+    kept = keep(estimate, report, output) if isinstance(output, ResultOutput) and output.keep else ()
     if output.out is not None:
         if write is not None and output.out.suffix.lower() not in whole:
             write(output.out)
         else:
             save(estimate, output.out)
-    if output.report is not None:
-        write_text(output.report, page())
+    if output.report is not None and report is not None:
+        write_text(output.report, report)
     output.say_findings(estimate.findings)
     for written, path in ((what, output.out), ("report", output.report)):
         if path is not None:
             output.say(f"{written}: {path}")
+    for words in kept:
+        output.say(words)
     text = "".join(f"{table}\n\n" for table in tables if table)
     emit(estimate, f"{text}{estimate.status.value}: {estimate.message}", output)
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
@@ -73,6 +78,20 @@ def give(
         write = result.save
     estimate = replace(result.estimate, timing={"read": read_s, **result.estimate.timing})
     return hand_over(estimate, result.view.tables(), result.view.page, output, what, write, whole)
+
+
+def keep(estimate: Estimate, report: str | None, output: ResultOutput) -> list[str]:
+    """Keep a result in the store, and say so; raises `InputError`."""
+    from inercal.laboratory.catalog import SHORT
+    from inercal.laboratory.keep import item_of
+    from inercal.laboratory.keep import keep as kept
+    from inercal.laboratory.store import open_store
+
+    store = open_store(output.store)
+    page = None if report is None else report.encode()
+    done = kept(store, estimate, item_of(estimate, output.instrument), page)
+    there = "kept" if done.new else "was kept before, nothing added"
+    return [f"result: {done.id[:SHORT]} {there} in {store.where}", *done.notes]
 
 
 def timed(estimate: Estimate) -> Estimate:

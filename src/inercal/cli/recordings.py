@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from inercal.cli.options import Files, MapFile, Output, ReportOutput, Span, read_record, working
+from inercal.cli.options import Files, MapFile, Output, ReportOutput, ResultOutput, Span, read_record, working
 from inercal.cli.outcome import WHOLE, emit, give, timed
 from inercal.cli.streaming import Every, StreamFile, StreamOptions, interval_of, run_stream
 
@@ -62,7 +62,7 @@ def allan(
     *,
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Tell the noise of an instrument at rest."""
     from inercal._files import write_text

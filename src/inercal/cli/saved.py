@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import FileOutput, MapFile, ReportOutput, Span, read_record, reading
+from inercal.cli.options import FileOutput, MapFile, ResultOutput, Span, read_record, reading
 from inercal.cli.outcome import WHOLE, emit, give
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.errors import InputError
@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 def apply(
     calibration: Annotated[
-        Path, Parameter(help="Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out.")
+        Path,
+        Parameter(
+            help="Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out, or a certificate."
+        ),
     ],
     files: Annotated[
         list[Path] | None, Parameter(help="Recordings; several files with distinct channels are one record.")
@@ -82,9 +85,9 @@ def apply(
 def _model(calibration: Path, uncertainty: bool) -> tuple[Model, tuple[Finding, ...], Estimate]:
     """The instrument of a calibration that was saved, what to say of that, and the calibration."""
     from inercal.convert.models import model_of, worth_knowing
-    from inercal.estimate.files import load
+    from inercal.face.calibrations import read_estimate
 
-    estimate = load(calibration)
+    estimate = read_estimate(calibration)
     return (
         model_of(estimate, calibration, uncertainty),
         worth_knowing(estimate, calibration),
@@ -92,7 +95,7 @@ def _model(calibration: Path, uncertainty: bool) -> tuple[Model, tuple[Finding, 
     )
 
 
-_CALIBRATION = "Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out."
+_CALIBRATION = "Calibration that `inercal calibrate` or `inercal selfcal` wrote to --out, or a certificate."
 
 
 def compare(
@@ -100,18 +103,17 @@ def compare(
     second: Annotated[Path, Parameter(help="The later one, of the same instrument.")],
     /,
     *,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Compare two calibrations of one instrument."""
     from inercal.estimate.compare import Saved
     from inercal.estimate.compare import compare as compared
-    from inercal.estimate.files import load
-    from inercal.face.calibrations import of_comparison
+    from inercal.face.calibrations import of_comparison, read_estimate
     from inercal.records.read import source_of
 
     output.check(WHOLE, (first, second))
     clock = time.perf_counter()
-    files = [Saved(load(path), str(path)) for path in (first, second)]
+    files = [Saved(read_estimate(path), str(path)) for path in (first, second)]
     inputs = (source_of(first), source_of(second))
     read = time.perf_counter()
     estimate = compared(*files)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, Overrides, ReportOutput, Span, StudyFile, read_repeats, working
+from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError
@@ -46,7 +46,7 @@ def selfcal(
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate a gimbaled platform while it turns."""
     keys = [*(overrides or ()), *([f"filter.kind={kind}"] if kind is not None else [])]
@@ -79,7 +79,7 @@ def selfcal(
     return give(outcome, output, read_s)
 
 
-def _live(settings: SelfcalSettings, interval: float, output: ReportOutput) -> Estimators:
+def _live(settings: SelfcalSettings, interval: float, output: ResultOutput) -> Estimators:
     """Prepare a calibration row by row."""
     from inercal._jit import compiling
     from inercal.selfcal.filters.problem import problem

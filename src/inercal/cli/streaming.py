@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import abandon_output
-from inercal.cli.options import FileOutput, Output, ReportOutput, Span, whole_number
+from inercal.cli.options import FileOutput, Output, ReportOutput, ResultOutput, Span, whole_number
 from inercal.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:
@@ -76,6 +76,7 @@ class StreamOptions:
             "--json": output.json,
             "--out": isinstance(output, FileOutput) and output.out is not None,
             "--report": isinstance(output, ReportOutput) and output.report is not None,
+            "--keep": isinstance(output, ResultOutput) and output.keep,
         }
         for option in (name for name, there in given.items() if there):
             raise InputError(option, "found with a stream, expected its lines on standard output and no more")
@@ -122,7 +123,7 @@ def recorded(
 
 def stream_study(
     kind: str,
-    prepare: Callable[[Any, float, ReportOutput], Estimators],
+    prepare: Callable[[Any, float, ResultOutput], Estimators],
     files: list[Path] | None,
     study: Path,
     keys: list[str],
@@ -130,7 +131,7 @@ def stream_study(
     map_file: Path | None,
     span: Span,
     options: StreamOptions,
-    output: ReportOutput,
+    output: ResultOutput,
 ) -> None:
     """Run the estimator of a study on a stream; ``prepare`` takes its settings, the interval [s] and the output."""
     from inercal.face.study import read_study

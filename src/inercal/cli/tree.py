@@ -11,6 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 from cyclopts.help import PlainFormatter
 
 from inercal import __version__
+from inercal.cli.tree_laboratory import LABORATORY
 from inercal.errors import UsageError
 
 if TYPE_CHECKING:
@@ -54,6 +55,12 @@ COMMANDS = {
         "whose header does not say quantities and units, also a column map guessed from it. The study goes to --out "
         "(aoa.toml if absent), the map beside it (aoa-map.toml). Nothing that exists is overwritten.",
         "inercal new aoa --out aoa.toml",
+    ),
+    ("new", "lab"): (
+        "inercal.cli.new:new_lab",
+        "Write a commented lab.toml: what a laboratory states in its certificates.\n\nIt goes to --out (lab.toml if "
+        "absent). Nothing that exists is overwritten.",
+        "inercal new lab --out lab.toml",
     ),
     ("inspect", ""): (
         "inercal.cli.recordings:inspect",
@@ -247,6 +254,15 @@ COMMANDS = {
         "goes on where it was stopped.",
         "inercal monitor log.csv --every '1 s'",
     ),
+    ("certificate", ""): (
+        "inercal.cli.certificate:certificate",
+        "Write a digital calibration certificate of results of one instrument, or read one.\n\nXML by PTB's schema DCC "
+        "3.2.1, validated before it is written to --out: the coefficients with U, k and covariance in SI, method, "
+        "equipment and conditions, and the results themselves as files. --html writes it as a page. Only results that "
+        "are ok get one. With --read a certificate of anybody is read and its numbers printed; `inercal apply` and "
+        "`inercal compare` take one in the place of a calibration.",
+        "inercal certificate cal.json --lab lab.toml --number 7 --out cal.xml",
+    ),
     ("validate", ""): (
         "inercal.cli.validate:validate",
         "Rerun the published and closed-form cases that ship with inercal, for the validation of software in a "
@@ -255,6 +271,7 @@ COMMANDS = {
         "Exit code 1: a case failed.",
         "inercal validate --report validation.html",
     ),
+    **LABORATORY,
     ("schema", ""): (
         "inercal.cli.package:schema",
         "Print one JSON Schema that covers every kind of study file, for editors and checkers.",
@@ -277,10 +294,11 @@ COMMANDS = {
 }
 
 _GROUPS = {
-    "new": "Write a commented study, and a map guessed from a recording.",
+    "new": "Write a commented study, and a map guessed from a recording; or lab.toml.",
     "calibrate": "Calibrate an instrument from a recording.",
     "design": "Design a test before it is made.",
     "simulate": "Simulate a recording of a test.",
+    "store": "The store of a laboratory: results kept for years.",
 }
 
 

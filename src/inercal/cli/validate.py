@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from inercal.cli import process_age
-from inercal.cli.options import ReportOutput, reading
+from inercal.cli.options import ResultOutput, reading
 from inercal.cli.outcome import WHOLE, hand_over
 
 
-def validate(*, output: ReportOutput = ReportOutput()) -> int:  # noqa: B008  (frozen)
+def validate(*, output: ResultOutput = ResultOutput()) -> int:  # noqa: B008  (frozen)
     """Rerun the published and closed-form cases."""
     from inercal._jit import compiling
     from inercal.report.validation import page, table

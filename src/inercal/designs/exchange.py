@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 Indices = NDArray[np.intp]
 
-_TIE = 1e-9
-"""Relative difference below which values are equal but for rounding."""
 _SINGULAR = 1e-9
 """Smallest singular value, over the largest, of a direction that a start has seen."""
 
@@ -175,8 +173,10 @@ def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: 
 
 def _first_least(values: Array) -> int:
     """Index of the first value that is least but for rounding, so that ties end alike on every machine."""
+    from inercal.designs.exchange_kernel import TIE
+
     least = float(values.min())
-    return int(np.argmax(values <= least + _TIE * abs(least)))
+    return int(np.argmax(values <= least + TIE * abs(least)))
 
 
 def _state(rows: Array, p: int, weights: Array | None, chosen: Indices) -> State:

@@ -15,8 +15,8 @@ from inercal._jit import kernel
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
 
-_GAIN = 1e-9
-"""Relative improvement below which an exchange is rounding."""
+TIE = 1e-9
+"""Relative difference below which values are equal but for rounding."""
 _SINGULAR = 1e-9
 """Factor of the determinant below which a design is singular to working precision."""
 
@@ -99,7 +99,7 @@ def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
                 factors[j] = less[j] / ratio[j]
     least = factors.min()
     for j in range(m):
-        if factors[j] <= least + _GAIN * abs(least):
+        if factors[j] <= least + TIE * abs(least):
             return j, factors[j]
     return 0, np.inf
 
@@ -107,7 +107,7 @@ def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
 @kernel
 def improves(factor: float) -> bool:
     """True if an exchange is more than rounding."""
-    return factor < 1.0 - _GAIN
+    return factor < 1.0 - TIE
 
 
 @kernel

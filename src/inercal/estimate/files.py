@@ -14,9 +14,11 @@ from inercal._files import read_bytes, write_text
 from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
-from inercal.estimate.result import Estimate
+from inercal.estimate.result import COVERAGE, Estimate
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.inputs import Source
+from inercal.instruments.dsi import stated
+from inercal.instruments.terms import term
 from inercal.units import shown
 
 
@@ -25,7 +27,10 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
     from inercal import __version__
 
     parameters = [
-        {"name": p.name, "value": p.value, "u": p.u, "U": p.U, "k": p.k, "dof": p.dof, "unit": p.unit}
+        {
+            **{"name": p.name, "value": p.value, "u": p.u, "U": p.U, "k": p.k, "dof": p.dof, "unit": p.unit},
+            **{"coverage_probability": COVERAGE, "long_name": _long_name(p.name), "unit_dsi": stated(p.unit)},
+        }
         for p in estimate.parameters.values()
     ]
     whole = {
@@ -66,6 +71,12 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
     }
     plain: dict[str, Any] = plain_objects(whole)
     return plain
+
+
+def _long_name(name: str) -> str:
+    """The name of a coefficient in words; empty where the terms do not know it."""
+    found = term(name)
+    return "" if found is None else found.name
 
 
 def plain_objects(value: Any) -> Any:
@@ -149,15 +160,24 @@ def save(estimate: Estimate, path: str | Path) -> None:
 
 def load(path: str | Path) -> Estimate:
     """Read an estimate that `save` wrote; raises `InputError` in one sentence."""
-    expected = "expected a calibration written by inercal (.json or .toml)"
     try:
-        text = read_bytes(path).decode()
+        data = read_bytes(path)
     except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror}), {expected}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start} is not UTF-8 text, {expected}") from error
+        raise InputError(path, f"cannot be read ({error.strerror}), {_EXPECTED}") from error
     except ValueError as error:  # a NUL in the path
-        raise InputError(repr(str(path)), f"{error}, {expected}") from error
+        raise InputError(repr(str(path)), f"{error}, {_EXPECTED}") from error
+    return parse(data, path)
+
+
+_EXPECTED = "expected a calibration written by inercal (.json or .toml)"
+
+
+def parse(content: bytes, path: str | Path) -> Estimate:
+    """The estimate in the bytes of a file, TOML where ``path`` ends so; raises `InputError` as `load`."""
+    try:
+        text = content.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start} is not UTF-8 text, {_EXPECTED}") from error
     try:
         if Path(path).suffix.lower() == ".toml":
             import tomllib
@@ -166,17 +186,17 @@ def load(path: str | Path) -> Estimate:
         else:
             data = json.loads(text)
         if not isinstance(data, Mapping):
-            raise InputError(path, f"holds {shown(text.strip())}, {expected}")
+            raise InputError(path, f"holds {shown(text.strip())}, {_EXPECTED}")
         return from_json(data)
     except KeyError as error:
         hint = "; `inercal convert --from` reads those of other tools"
-        raise InputError(path, f"the key {error} is missing, {expected}{hint}") from error
+        raise InputError(path, f"the key {error} is missing, {_EXPECTED}{hint}") from error
     except json.JSONDecodeError as error:
-        raise InputError(path, f"not valid JSON: {error}, {expected}") from error
+        raise InputError(path, f"not valid JSON: {error}, {_EXPECTED}") from error
     except (TypeError, AttributeError) as error:
-        raise InputError(path, f"does not have the form of one, {expected}") from error
+        raise InputError(path, f"does not have the form of one, {_EXPECTED}") from error
     except (ValueError, OverflowError, RecursionError) as error:
-        raise InputError(path, f"{str(error)[:120]}, {expected}") from error
+        raise InputError(path, f"{str(error)[:120]}, {_EXPECTED}") from error
 
 
 def _toml(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from datetime import date, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,9 @@ def shipped(file: str) -> Source:
 
     return replace(source_of(FOLDER / file), path=f"{FOLDER.name}/{file}")
 
+
+_DAYS = tuple(date(2021, 1, 20) + k * timedelta(days=91) for k in range(20))
+"""Days of the calibrations of the example `five-years`."""
 
 EXAMPLES: dict[str, Example] = {
     example.name: example
@@ -111,6 +115,13 @@ EXAMPLES: dict[str, Example] = {
             "licences/tofupilot.txt",
             "thermal-map.toml",
             verb="temperature",
+        ),
+        Example(
+            "five-years",
+            "gyrowheel tumbled on a table four times a year from 2021 to 2025, simulated: one drift ages, one wanders",
+            tuple(f"gyro-{day}.csv" for day in _DAYS),
+            study="gyro.toml",
+            verb="calibrate turntable",
         ),
         Example(
             "selfcal",

@@ -132,7 +132,7 @@ def worth_saying(record: Record, estimate: Estimate) -> tuple[Finding, ...]:
 
 
 def load(path: str | Path) -> Result:
-    """Read a result that was saved, by `Result.save` or ``--out``.
+    """Read a result that was saved, by `Result.save` or ``--out``, or that a digital calibration certificate states.
 
     Raises
     ------
@@ -149,8 +149,6 @@ def load(path: str | Path) -> Result:
     >>> ic.load(path).status.value
     'ok'
     """
-    from inercal.estimate.files import load as read_estimate
-
     estimate = read_estimate(path)
     match estimate.command:
         case "compare":
@@ -165,10 +163,22 @@ def load(path: str | Path) -> Result:
             return loaded(estimate)
 
 
+def read_estimate(path: str | Path) -> Estimate:
+    """The estimate in a file: a result of inercal, or a digital calibration certificate (.xml).
+
+    Raises `InputError` in one sentence.
+    """
+    if Path(path).suffix.lower() == ".xml":
+        from inercal.laboratory.certificate.reading import estimate_of_certificate
+
+        return estimate_of_certificate(path)
+    from inercal.estimate.files import load as of_file
+
+    return of_file(path)
+
+
 def estimate_of(given: Result | Estimate | str | Path, where: str = "result") -> tuple[Estimate, str]:
     """The estimate of a result, or of the file of one, and what to call it."""
-    from inercal.estimate.files import load as read_estimate
-
     match given:
         case Result():
             return given.estimate, where

@@ -8,14 +8,15 @@ range, or stuck, and a model that moves in the stretch of the study's zero.
 
 Delay, band and snap that the study does not state are decided after `Limits.snap_time`
 (`inercal.aoa.diagnosis.choice`): the fusion begins anew with them, on all rows so far, and from then on the digits are
-those of a study that states them. Each line has a ``status``: 0; 1 until that choice; 2 where the innovations of the
-last seconds contradict the model; 3 without an angle; and ``nis``, the mean squared innovation of these seconds.
+those of a study that states them; each line has the status 1 until then. Angles beyond the study's limits are said as
+they come.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,26 +26,30 @@ from inercal.aoa.fusion.live import Answers
 from inercal.aoa.fusion.live_band import LimitedLive
 from inercal.aoa.fusion.loop import BESIDE
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.fusion.watch import ALL, ALL_COUNT, watched
+from inercal.aoa.fusion.watch import initial as unwatched
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later as later_rows
-from inercal.aoa.reading.from_record import at_range, check_axes, check_unit, indication, of_sensors
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reading.wind_off_zero import angle_at
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
-from inercal.aoa.result.columns import columns, rows
+from inercal.aoa.result.columns import SUSPECT, columns, rows
 from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.result.verdict import nis_limit
-from inercal.aoa.settings import GYROS, AoaSettings
+from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.findings import Finding
-from inercal.records.column import Column
+from inercal.stream.aoa_sensors import Sensors, watched_limits
 from inercal.stream.aoa_state import AoaState, Leaning, choice_of, chosen, kept
 from inercal.stream.lines import Lines, Sample
 from inercal.stream.run import Alarms, Output, Slots
 
 # bits of `AoaState.alarms`; from the last on one for each sensor
 _CONTRADICTION, _SILENCE, _SATURATED = range(3)
+
+_STATUS = 4
+"""Place of the status in a row of `inercal.aoa.result.columns`."""
 
 
 class Aoa:
@@ -83,27 +88,11 @@ class Aoa:
         if (prior := settings.estimator.prior) is not None:
             posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
         self._settings, self._every, self._say, self._where = settings, every, say, lines.where
-        record, names = lines.record, settings.layout.names
-        there = [name for name in names if name in record]
-        check_axes(there, record.columns, settings.layout, lines.where)
-        gyros = [name for name in GYROS if name in record]
-        spatial = all(name in gyros for name in GYROS[1:])
-        if not spatial:
-            settings.attitude.check_pitch_shows()
-        self._remarks = of_sensors(there, gyros, record, settings)
-        places = list(record.columns)
-        used = [*there, *(GYROS if spatial else GYROS[:1])]
-        self._sensors: list[tuple[int, int, Column]] = []
-        for k, name in enumerate((*names, *GYROS)):
-            if name in record and name in used:
-                check_unit(record[name], settings.calibration(name), lines.where)
-                self._sensors.append((k, places.index(name), record[name]))
-        self._temperature = places.index("temperature") if "temperature" in record else -1
-        self._has_gyro = GYROS[0] in record
-        self._posterior, self._spatial = posterior, spatial
-        named = [("t", "s"), *columns(settings.attitude), ("status", "1"), ("nis", "1")]
+        self._sensors = Sensors(lines, settings)
+        self._posterior, self._spatial = posterior, self._sensors.spatial
+        named = [("t", "s"), *columns(settings)]
         self.columns = [f"{name} [{unit}]" for name, unit in named]
-        self._changes = leans(settings, spatial)
+        self._changes = leans(settings, self._spatial)
         self._pose(settings)
         self._after: AoaState | None = None
         self.failure = ""
@@ -122,10 +111,9 @@ class Aoa:
             "stated": repr([(each, gravity_u(settings)) for each in self._changes]),
             "leaning": repr([each.mean.tolist() for each in self._leaning]),
             "geometry": of.geometry,
-            "sensors": repr([(name, settings.calibration(name)) for name in (*of.layout.names, *GYROS)]),
-            "attitude": repr(settings.attitude),
+            **self._sensors.settings,
+            "attitude": repr((settings.attitude, settings.alarm)),
             "zero": repr(settings.zero),
-            "columns": repr([(k, place, column.name) for k, place, column in self._sensors]),
             "every": self._every,
             "band": repr((settings.band, settings.estimator.snap)),
         }
@@ -146,9 +134,8 @@ class Aoa:
                 each.name: Leaning(of.state, np.empty(0))
                 for each, of in zip(self._changes, self._others, strict=True)
             },
-            t=-math.inf, begun=math.nan, temperature=math.nan, heard=math.nan, nis=0.0, scalars=0, window=math.nan,
-            mean_nis=math.nan, all_nis=0.0, all_scalars=0, unanswered=0, rows=0,
-            head=np.empty((64, self._problem.count + BESIDE + 1)), seen=0, choice=np.empty(0),
+            t=-math.inf, begun=math.nan, temperature=math.nan, heard=math.nan, beyond=math.nan, watch=unwatched(),
+            unanswered=0, rows=0, head=np.empty((64, self._problem.count + BESIDE + 1)), seen=0, choice=np.empty(0),
             remarked=False, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
@@ -156,9 +143,12 @@ class Aoa:
         """The state after a row, and the lines of this row and of those that were held until now."""
         if state is not self._after:
             self._go_on_from(state)
-        if self._temperature >= 0 and math.isfinite(sample.values[self._temperature]):
-            state = state._replace(temperature=sample.values[self._temperature])
-        state, values = self._measured(self._remarked(state), sample)
+        state = self._remarked(state)._replace(
+            temperature=self._sensors.temperature(sample, state.temperature)
+        )
+        values, saturated = self._sensors.measured(sample, state.temperature)
+        for k, text in saturated:
+            state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
         n = self._problem.count
         later = sample.t > state.t
         zero_angle = (math.nan, math.nan)
@@ -177,8 +167,7 @@ class Aoa:
         else:
             answers = self._live.feed(*read)
             turned = [each.feed(*read).angles.theta for each in self._others]
-        state = self._judged(state, answers)._replace(live=self._live.state)
-        state, outputs = self._lines(state, answers, self._others, turned)
+        state, outputs = self._lines(state._replace(live=self._live.state), answers, self._others, turned)
         if self._waits(state) and state.t - state.begun >= LIMITS.snap_time:
             state = self._decided(state)
         self._after = state
@@ -187,21 +176,22 @@ class Aoa:
     def finish(self, state: AoaState) -> Sequence[Output]:
         """The lines of rows that were still held."""
         self._go_on_from(state)
-        self.failure = self._bad(state)
         outputs: list[Output] = []
         if self._needs_rate and not state.choice.size:
             state, answers, turned = self._rated(state, last=True)
             state, outputs = self._lines(state, answers, self._others, turned)
         turned = [each.finish().angles.theta for each in self._others]
-        return [*outputs, *self._lines(state, self._live.finish(), self._others, turned)[1]]
+        state, rest = self._lines(state, self._live.finish(), self._others, turned)
+        self.failure = self._bad(state)
+        return [*outputs, *rest]
 
     def _bad(self, state: AoaState) -> str:
         """A sentence on a stream whose angles are not to be used, at its end; empty for good ones."""
         if 2 * state.unanswered >= state.rows:
             return f"{state.unanswered} rows of {state.rows} have no angle"
-        limit = nis_limit(state.all_scalars)
-        if state.all_scalars and state.all_nis > limit * state.all_scalars:
-            mean = state.all_nis / state.all_scalars
+        count, limit = int(state.watch[ALL_COUNT]), nis_limit(int(state.watch[ALL_COUNT]))
+        if count and state.watch[ALL] > limit * count:
+            mean = state.watch[ALL] / count
             return f"the stream contradicts the model: mean NIS {mean:.4g}, expected at most {limit:.3g}"
         return ""
 
@@ -241,16 +231,16 @@ class Aoa:
         for finding in of_vibration(self._settings, settings):
             self._say(finding)
         self._pose(settings)
-        self._live.feed_rows(head)
+        answers = self._live.feed_rows(head)
+        state, _ = self._judged(state._replace(watch=unwatched()), answers)
         beside = {}
         for each, other in zip(self._changes, self._others, strict=True):
             other.feed_rows(head)
             beside[each.name] = Leaning(other.state, np.empty(0))
         none = np.empty((64, head.shape[1]))
         return state._replace(
-            live=self._live.state, beside=beside, head=none, seen=0, choice=choice_of(settings, final=True),
-            nis=0.0, scalars=0, window=math.nan, mean_nis=math.nan, all_nis=0.0, all_scalars=0,
-        )  # fmt: skip
+            live=self._live.state, beside=beside, head=none, seen=0, choice=choice_of(settings, final=True)
+        )
 
     def _go_on_from(self, state: AoaState) -> None:
         """Go on with the fusion, and those under changes, as a state left them."""
@@ -259,26 +249,11 @@ class Aoa:
         changed = zip(self._leaning, state.beside.values(), strict=True)
         self._others = [LimitedLive(of, each.live, self._where) for of, each in changed]
 
-    def _measured(self, state: AoaState, sample: Sample) -> tuple[AoaState, Array]:
-        """Measured values of a row, (N + 3,) in SI, gyros last; NaN where missing or saturated."""
-        values = np.full(self._problem.count + len(GYROS), np.nan)
-        temperature = None if math.isnan(state.temperature) else state.temperature
-        for k, place, column in self._sensors:
-            how = self._settings.calibration(column.name)
-            indicated = indication(column, np.array(sample.values[place]))
-            measured = how.measured(indicated, temperature)
-            if not at_range(indicated, measured, how):
-                values[k] = measured
-                continue
-            text = f"{column.name}: at its range, such samples are left out"
-            state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
-        return state, values
-
     def _remarked(self, state: AoaState) -> AoaState:
         """The state once the findings on the sensors are given."""
         if state.remarked:
             return state
-        for finding in self._remarks:
+        for finding in self._sensors.remarks:
             self._say(finding)
         return state._replace(remarked=True)
 
@@ -293,39 +268,24 @@ class Aoa:
         """The state with the last row of the gyro, or an alarm where it is silent."""
         if math.isfinite(gyro) or math.isnan(state.heard):
             return state._replace(heard=t)
-        if self._has_gyro and t - state.heard > LIMITS.silent_time:
+        if self._sensors.has_gyro and t - state.heard > LIMITS.silent_time:
             text = f"gyro: no number for {LIMITS.silent_time:g} s; angles go on from accelerometers alone, less well"
             return self._alarm(state, _SILENCE, "gyro_missing", text, t)
         return state
 
-    def _judged(self, state: AoaState, answers: Answers) -> AoaState:
-        """The state with innovations counted, and an alarm where a window of them contradicts the model.
-
-        Each counts as far as the gate lets it through, so that a single spike is no alarm.
-        """
-        gate = self._problem.constants.gate
-        for t, innovations in zip(answers.t.tolist(), answers.innovations, strict=True):
-            squared = np.minimum(np.square(innovations[np.isfinite(innovations)]), gate)
-            if not squared.size or t - state.begun < LIMITS.settling_time:
-                continue
-            window = t if math.isnan(state.window) else state.window
-            own = float(squared.sum())
-            nis, scalars = state.nis + own, state.scalars + squared.size
-            state = state._replace(
-                nis=nis, scalars=scalars, window=window,
-                all_nis=state.all_nis + own, all_scalars=state.all_scalars + squared.size,
-            )  # fmt: skip
-            if t - window < LIMITS.watched_time:
-                continue
-            if scalars >= LIMITS.watched_innovations and nis > LIMITS.mean_nis * scalars:
-                text = (
-                    f"NIS is {nis / scalars:.3g} on average over {LIMITS.watched_time:g} s, expected 1 or less: "
-                    "the rows contradict the model or the stated noise"
-                )
-                state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, t)
-            mean = nis / scalars if scalars >= LIMITS.watched_innovations else math.nan
-            state = state._replace(nis=0.0, scalars=0, window=math.nan, mean_nis=mean)
-        return state
+    def _judged(self, state: AoaState, answers: Answers) -> tuple[AoaState, Array]:
+        """The state with innovations counted, and the NIS (k,) of each row; an alarm where it contradicts the model."""
+        watch = state.watch.copy()
+        nis = watched(answers.t, answers.innovations, self._problem.constants.gate, watch)
+        state = state._replace(watch=watch)
+        told = [] if self._waits(state) else np.flatnonzero(nis > LIMITS.mean_nis)[:1].tolist()
+        for k in told:
+            text = (
+                f"NIS is {nis[k]:.3g} on average over {LIMITS.watched_time:g} s, expected 1 or less: the rows "
+                "contradict the model or the stated noise"
+            )
+            state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, float(answers.t[k]))
+        return state, nis
 
     def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
         """The state with an alarm given, once."""
@@ -342,25 +302,21 @@ class Aoa:
             # a filter that has lost theta, or has it anew, alone is out of step until both have it
             changed.append(np.append(theta[:rest], np.full(max(rest - len(theta), 0), np.nan)))
             beside[name] = Leaning(live.state, theta[rest:])
-        angles = widened(answers.angles, self._settings, self._changes, changed)
-        state = state._replace(beside=beside)
-        values = rows(angles, self._settings.attitude)
+        waits = self._waits(state)
+        state, nis = self._judged(state._replace(beside=beside), answers)
+        angles = widened(replace(answers.angles, nis=nis), self._settings, self._changes, changed)
+        values = rows(angles, self._settings)
         for t, row in zip(answers.t.tolist(), values.tolist(), strict=True):
+            if waits and row[_STATUS] == 0.0:
+                row[_STATUS] = SUSPECT
+            state = state._replace(beyond=watched_limits(self._settings, t, row, state.beyond, self._say))
             if self._every > 0.0:
                 slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None
                 if slots is None:
                     continue
                 state = state._replace(slots=slots)
-            outputs.append([t, *row, self._status(state, row[0]), state.mean_nis])
+            outputs.append([t, *row])
         without = int(np.isnan(answers.angles.theta).sum())
         return state._replace(
             unanswered=state.unanswered + without, rows=state.rows + len(answers.t)
         ), outputs
-
-    def _status(self, state: AoaState, theta: float) -> float:
-        """Status of a line: 3 without an angle, 2 for a contradiction, 1 until all is decided, or 0."""
-        if math.isnan(theta):
-            return 3.0
-        if state.mean_nis > LIMITS.mean_nis:
-            return 2.0
-        return 1.0 if self._waits(state) else 0.0

@@ -28,11 +28,11 @@ class AoaState(NamedTuple):
 
     ``live`` is the state of the fusion, ``beside`` those under changes of gravity and roll, by name; ``t`` [s] the
     latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
-    last row with a number of the gyro. ``nis`` and ``scalars``: sum and number of the squared innovations since
-    ``window`` [s]; ``mean_nis`` of the last window; ``all_nis``, ``all_scalars`` of all rows, and of these the
-    ``unanswered``. ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is
-    decided; ``choice`` is that (`choice_of`), empty before. ``remarked``: the findings on the sensors were given;
-    ``slots`` that of the last line.
+    last row with a number of the gyro, ``beyond`` [s] the last one with an angle beyond the limits (NaN before).
+    ``watch`` is that of `inercal.aoa.fusion.watch`; of all ``rows`` that were answered ``unanswered`` have no angle.
+    ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is decided; ``choice``
+    is that (`choice_of`), empty before. ``remarked``: the findings on the sensors were given; ``slots`` that of the
+    last line.
     """
 
     live: LimitedState
@@ -41,12 +41,8 @@ class AoaState(NamedTuple):
     begun: float
     temperature: float
     heard: float
-    nis: float
-    scalars: int
-    window: float
-    mean_nis: float
-    all_nis: float
-    all_scalars: int
+    beyond: float
+    watch: Array
     unanswered: int
     rows: int
     head: Array

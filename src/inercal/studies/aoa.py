@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from inercal._toml import Strict, check
+from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.disturbances import DELAY
 from inercal.aoa.settings import (
@@ -41,6 +42,15 @@ from inercal.studies.common import (
     site_of,
 )
 from inercal.studies.fields import ExactText, QuantityText, refusal
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
 from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
@@ -228,12 +238,19 @@ class AoaStudyFile(Strict):
     points: Stated[PointPlan] = Field(
         default=PointPlan(), title="Points", description="stretches that are test points"
     )
+    alarm: Stated[Alarm] = Field(
+        default=Alarm(), title="Alarm", description="limits of the angle, for live measurements"
+    )
     design: Stated[Design] = Field(
         default=Design(), title="Design", description="where `inercal design aoa` may put accelerometers"
     )
     goal: Stated[Goal] = Field(
         default=Goal(), title="Goal", description="uncertainty that a design is to reach"
     )
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -260,14 +277,24 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
         zero=None if file.zero is None else _zero(file.zero),
         points=file.points,
+        alarm=_alarm(file.alarm, path),
         motion=motion,
         disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
         design=_design(file.design, path),
         goal=file.goal,
-        traceability=file.traceability.model_dump(),
+        traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
+
+
+def _alarm(alarm: Alarm, path: str | Path) -> Alarm:
+    """The limits of the angle; refuses those between which there is nothing."""
+    lowest, highest = alarm.lowest, alarm.highest
+    if lowest is not None and highest is not None and not lowest < highest:
+        found = f"{math.degrees(lowest):g} deg with highest {math.degrees(highest):g} deg"
+        raise StudyError(path, f"alarm.lowest: found {found}, expected it below")
+    return alarm
 
 
 def _design(design: Design, path: str | Path) -> Design:

@@ -71,10 +71,16 @@ class TraceabilityTable(Strict):
     )
 
 
+Humidity = Annotated[
+    Quantity, QuantityText("number", "45(5) %", lambda h: 0.0 <= h <= 1.0, "a humidity from 0 % to 100 %")
+]
+
+
 class ConditionsTable(Strict):
     """Conditions during the recording."""
 
     temperature: Temperature | None = Field(default=None, description="temperature of the instrument")
+    humidity: Humidity | None = Field(default=None, description="relative humidity of the air")
 
 
 # Keys of every kind of study, at its beginning and its end.

@@ -43,6 +43,15 @@ from inercal.studies.common import (
 from inercal.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.studies.fields import QuantityText, refusal
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.rig import RigTable, chain_of
 from inercal.studies.tables import as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_unit, shown
@@ -247,6 +256,10 @@ class ImuStudyFile(Strict):
         title="Disturbances",
         description="what a simulation adds to the model",
     )
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -338,7 +351,7 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),
-        traceability=file.traceability.model_dump(),
+        traceability=traced(file.traceability.model_dump(), file.item),
         method=_method(file.imu, path),
         temperature=file.conditions.temperature,
         exclude=exclusion_of(file.imu.exclude),

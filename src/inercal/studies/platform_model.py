@@ -16,10 +16,10 @@ from inercal.selfcal.estimators import ESTIMATORS
 from inercal.selfcal.platform.states import (
     ADDED,
     ALL,
-    BIAS_WALK,
     EXTENDED_MODEL,
     MOST_WAVES,
     PAPER,
+    RIG,
     STATES,
     USUAL_WAVES,
     WORDS,
@@ -129,9 +129,9 @@ class ModelTable(_MODEL):  # type: ignore[misc]
 
     states: Annotated[str | list[str], BeforeValidator(_kinds)] | None = Field(
         default=None,
-        description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay, and bias_walk, "
-        "which map leaves out), or a list that may begin with one of these, and goes on with kinds of this table, "
-        "temperature (kg0_T1, ka0_T1, ka1_T1) or bias_walk; that of [filter] if absent",
+        description="paper (18), extended (24), rig (extended, gamma, non_orthogonality, zero_y, delay), or a list "
+        "that may begin with one of these, and goes on with kinds of this table, temperature (kg0_T1, ka0_T1, ka1_T1) "
+        "or bias_walk, which map has not; rig if absent, paper for estimators that have no rig",
         examples=[["rig", "k2", "levers"]],
     )
     harmonics: list[StatedHarmonic] | None = Field(
@@ -144,24 +144,20 @@ class ModelTable(_MODEL):  # type: ignore[misc]
 
 
 def model_of(table: Any, filter: Any, where: object) -> Model:
-    """The model that a study states.
+    """The model that a study states, without ``states`` that of the rig for estimators that have it.
 
     Raises `StudyError` for states beside ``extended``, for an estimator that does not have them, and for one that is
     estimated without an uncertainty.
     """
-    states = None
+    states = RIG if ESTIMATORS[filter.kind].rig and not filter.extended else None
     if table.states is not None:
         if filter.extended:
             raise StudyError(where, "model.states: found it beside filter.extended, expected one of them")
         listed = table.states if isinstance(table.states, list) else [table.states]
         kinds = {kind for each in listed for kind in WORDS.get(each) or (*PAPER, *ADDED[each])}
-        if filter.kind == "map":
-            if "bias_walk" in listed:
-                text = (
-                    "model.states: found bias_walk for map, to which biases are constant, expected it without"
-                )
-                raise StudyError(where, text)
-            kinds -= {*BIAS_WALK}
+        if filter.kind == "map" and "bias_walk" in listed:
+            text = "model.states: found bias_walk for map, to which biases are constant, expected it without"
+            raise StudyError(where, text)
         states = tuple(kind for kind in STATES if kind in kinds)
         beyond = [kind for kind in states if kind not in EXTENDED_MODEL]
         if beyond and not ESTIMATORS[filter.kind].rig:

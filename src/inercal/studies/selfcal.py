@@ -36,6 +36,15 @@ from inercal.studies.common import (
     site_on_earth,
 )
 from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.platform import GimbalsTable, PlanTable, base_of, gimbals_of, limits_of, plan_of
 from inercal.studies.platform_model import ModelTable, model_of, on_rig, true_errors
 from inercal.studies.rig import Angle
@@ -159,6 +168,10 @@ class SelfcalStudyFile(Strict):
         default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
     )
     design: Stated[Search] = Field(default=Search(), title="Design", description="the search for a path")
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -185,7 +198,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         model=model_of(file.model, file.filter, path),
         disturbances=_disturbances(file.disturbances),
         search=file.design,
-        traceability=file.traceability.model_dump(),
+        traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )

@@ -45,6 +45,15 @@ from inercal.studies.fields import (
     refusal,
 )
 from inercal.studies.instrument import Typed, check_symbol, coefficient_of
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_unit, shown
 
@@ -195,6 +204,10 @@ class StrapdownStudyFile(Strict):
     motion: Stated[Motion] = Field(
         default=Motion(), title="Motion", description="motion in a simulated recording"
     )
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -227,7 +240,7 @@ def strapdown_study(data: Mapping[str, Any], path: str | Path) -> StrapdownSetti
         plan=None if file.plan is None else _plan(file.plan, path),
         motion=file.motion,
         truth=truth,
-        traceability=file.traceability.model_dump(),
+        traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )

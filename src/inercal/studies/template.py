@@ -210,7 +210,7 @@ def _hidden() -> str:
     symbols = "|".join(symbol for symbols in SYMBOLS.values() for symbol in symbols if symbol != "DX_F")
     others = "|".join(sorted(three - two))
     of_rig = rf"(imu\.aided\.)?rig\.chain|imu\.aided\.rig\.(errors|base|limits)|rig\.errors\.({others})"
-    return rf"{_HIDDEN}|cost\.({each})|goal\.({symbols})|{of_rig}"
+    return rf"{_HIDDEN}|laboratory|cost\.({each})|goal\.({symbols})|{of_rig}"
 
 
 def _with_instrument(body: str, lines: str, given: Mapping[str, Any]) -> str:

@@ -23,6 +23,15 @@ from inercal.studies.common import (
 )
 from inercal.studies.fields import QuantityText
 from inercal.studies.instrument import InstrumentTable, instrument_of
+from inercal.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
 from inercal.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
 from inercal.studies.tables import as_typed, settings_of, table_of
@@ -237,6 +246,10 @@ class TurntableStudyFile(Strict):
     cost: CostsTable = Field(
         default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
     )
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
+    specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
 
@@ -264,7 +277,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         step_test=None if file.step_test is None else _step_test(file.step_test, chain, path),
         disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
         tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
-        traceability=file.traceability.model_dump(),
+        traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )

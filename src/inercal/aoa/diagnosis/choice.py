@@ -44,7 +44,12 @@ LOW_PASSES = (100.0, 70.0, 50.0, 35.0)
 
 
 def decided(recording: Recording, settings: AoaSettings) -> AoaSettings:
-    """The study with the delay, band and snap that the recording shows, each where the study does not state it.
+    """The study with the delay, band and snap that the recording shows, each where the study does not state it."""
+    return decided_with(recording, settings, relative_delay(recording, settings.layout))
+
+
+def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | None) -> AoaSettings:
+    """As `decided`, with the ``delay`` of the gyro that the spectra of the recording show.
 
     Where it states band and snap it is as it was: a stream, which cannot look ahead, gives the same digits.
 
@@ -54,7 +59,7 @@ def decided(recording: Recording, settings: AoaSettings) -> AoaSettings:
     stated = settings.band.low_pass is not None
     if stated and settings.estimator.snap is not None:
         return settings
-    settings = _with_delay(recording, _with_offsets(recording, settings))
+    settings = _with_delay(delay, _with_offsets(recording, settings))
     plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
     stretches = [_part(recording, rows) for rows in _liveliest(recording)]
     if not stretches:
@@ -188,14 +193,14 @@ def _with_snap(settings: AoaSettings, density: float) -> AoaSettings:
     )
 
 
-def _with_delay(recording: Recording, settings: AoaSettings) -> AoaSettings:
+def _with_delay(delay: Delay | None, settings: AoaSettings) -> AoaSettings:
     """The study with the delay that the spectra show, where it is estimated and as far as its prior goes.
 
     The filter alone may learn a delay from noise, or a far one that its series does not hold for.
     """
+    prior = settings.prior
     if settings.timing.gyro_delay is not None:
         return settings
-    delay, prior = relative_delay(recording, settings.layout), settings.prior
     if delay is None or abs(delay.value) > LIMITS.prior_sigmas * prior.gyro_delay:
         return settings
     u = max(LIMITS.spectral_delay_sigmas * delay.u, LIMITS.least_delay_u)

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inercal.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, of_rows, stretch
+from inercal.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, stretch
 from inercal.aoa.diagnosis.gross import OTHER_CHANNEL, gross_faults
 from inercal.aoa.diagnosis.noise_check import misstated
 from inercal.aoa.diagnosis.small import small_errors
@@ -133,7 +133,7 @@ def _upright(quality: FitQuality) -> float:
 
 def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
     """``not_stated``: a model that seems to fly on its back all the time, which no sensor contradicts."""
-    now = fit_quality(of_rows(recording, later(recording.t)), settings, 8)
+    now = fit_quality(recording.of(later(recording.t)), settings, 8)
     if _upright(now) > LIMITS.upside_down_cosine:
         return []
     middle = math.degrees(float(np.nanmedian(np.remainder(now.theta, 2.0 * math.pi))))

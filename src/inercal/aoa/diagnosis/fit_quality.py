@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem, problem
@@ -90,7 +89,7 @@ def stretch(recording: Recording) -> Recording:
         lively = [float((_scatter(read[k : k + most]) / scale).sum()) for k in starts]
         first = int(starts[int(np.argmax(lively))])
         taken = taken[first : first + most]
-    part = of_rows(recording, taken)
+    part = recording.of(taken)
     for column in (*part.acc.T, part.gyro, *part.turns.T):
         # mirrored at the ends, where a sample has one neighbour
         wild = outlying(np.concatenate([column[1:2], column, column[-2:-1]])) - 1
@@ -103,12 +102,6 @@ def _scatter(read: Array) -> Array:
     finite = np.isfinite(read)
     each = [float(c[k].std()) if k.any() else 0.0 for c, k in zip(read.T, finite.T, strict=True)]
     return np.array([one or 1.0 for one in each])
-
-
-def of_rows(recording: Recording, rows: NDArray[np.int64]) -> Recording:
-    """The sensors' part of some rows."""
-    t, acc, gyro, turns = recording.t[rows], recording.acc[rows], recording.gyro[rows], recording.turns[rows]
-    return Recording(t, acc, gyro, turns, recording.zero_angle[rows])
 
 
 def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19) -> FitQuality:

@@ -15,6 +15,7 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.band import WHOLE
@@ -24,7 +25,7 @@ from inercal.aoa.fusion.band import BandFilter
 from inercal.aoa.fusion.loop import MOTION, NO_MOTIONS, OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.run import Start, State, Trace, advance, initial
-from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.fusion.smoother import BLOCK, smooth
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
@@ -137,28 +138,28 @@ def _estimate(
     """Angles of a recording without a band; ``motions`` as of `inercal.aoa.fusion.run.advance`."""
     clock = time.perf_counter()
     taken = later(recording.t, where=where)
-    t, rows = recording.t[taken], recording.rows[taken]
+    whole = len(taken) == len(recording.t)
+    t = recording.t if whole else recording.t[taken]
     every = max(1, len(t) // KEPT)
-    if problem.spatial and not smoothed:
-        state, trace, kept, rolls = _with_roll(problem, t, rows, every, motions)
-    else:
-        rolls = None
-        kept = np.full(((len(t) + every - 1) // every, 2 * problem.size), np.nan)
-        state, trace = advance(initial(problem), problem, t, rows, kept, every, last=True, motions=motions)
-    angles = trace.out[:, :OUTPUTS]
+    kept = np.full(((len(t) + every - 1) // every, 2 * problem.size), np.nan)
     if smoothed:
-        kept[:] = np.nan
-        angles = smooth(problem, t, rows, trace.starts, kept, every)
-    n = len(recording.t)
-    motion, innovations = np.full((n, OUTPUTS), np.nan), np.full((n, problem.count + 1), np.nan)
-    motion[taken], innovations[taken] = angles, trace.out[:, OUTPUTS:]
-    roll = np.full((n, 2), np.nan)
-    if rolls is not None:
-        roll[taken] = rolls
+        rows, rolls = (recording.rows if whole else recording.rows[taken]), None
+        state, trace = advance(initial(problem), problem, t, rows, last=True, motions=motions, block=BLOCK)
+        angles = smooth(problem, t, rows, trace, kept, every)
+    else:
+        chosen = recording if whole else recording.of(taken)
+        state, trace, rolls = _causal(chosen, problem, kept, every, motions)
+        angles = trace.out[:, :OUTPUTS]
     seconds = time.perf_counter() - clock
-    settled = t - t[:1] >= (min(LIMITS.settling_time, (t[-1] - t[0]) / 2.0) if len(t) else 0.0)
-    judged = innovations[taken][settled]
-    squared = _without_spikes(judged, problem.constants.gate)
+    innovations = trace.out[:, OUTPUTS:]
+    settled = int(np.argmax(t - t[:1] >= min(LIMITS.settling_time, (t[-1] - t[0]) / 2.0))) if len(t) else 0
+    # column by column, which is a few copies of one and not of all
+    squared = [_without_spikes(each[settled:], problem.constants.gate) for each in innovations.T]
+    count = sum(map(len, squared))
+    motion = angles
+    if not whole:
+        motion, innovations = _at(taken, len(recording.t), angles), _at(taken, len(recording.t), innovations)
+        rolls = None if rolls is None else _at(taken, len(recording.t), rolls)
     m = problem.size
     return FilterResult(
         theta=motion[:, 0],
@@ -171,21 +172,28 @@ def _estimate(
         states=kept[:, :m],
         states_u=kept[:, m:],
         state=state,
-        nis_mean=float(squared.mean()) if squared.size else float("nan"),
-        nis_count=squared.size,
+        nis_mean=float(sum(map(np.sum, squared))) / count if count else float("nan"),
+        nis_count=count,
         starts=tuple(int(taken[each.row]) for each in trace.starts),
         smoothed=smoothed,
         seconds=seconds,
-        roll=None if rolls is None else roll[:, 0],
-        roll_u=None if rolls is None else roll[:, 1],
+        roll=None if rolls is None else rolls[:, 0],
+        roll_u=None if rolls is None else rolls[:, 1],
     )
 
 
+def _at(taken: NDArray[np.int64], n: int, values: Array) -> Array:
+    """Columns (n, k) that hold ``values`` (m, k) in the rows ``taken``, NaN elsewhere."""
+    out = np.full((n, values.shape[1]), np.nan)
+    out[taken] = values
+    return out
+
+
 def _without_spikes(innovations: Array, gate: float) -> Array:
-    """Squared innovations, of single spikes as far as the gate lets them through: they say nothing against the rest."""
+    """Squared innovations (n,), of single spikes as far as the gate lets them: they say nothing against the rest."""
     with np.errstate(invalid="ignore"):
         squared = np.square(innovations)
-        beyond = np.pad(squared > gate, ((1, 1), (0, 0)))
+        beyond = np.pad(squared > gate, 1)
     squared[beyond[1:-1] & ~beyond[:-2] & ~beyond[2:]] = gate
     return np.asarray(squared[np.isfinite(squared)])
 
@@ -196,30 +204,32 @@ def roll_of(problem: FilterProblem, kept: Array) -> Array:
     return np.column_stack([principal(kept[:, k]), kept[:, problem.size + k]])
 
 
-def _with_roll(
-    problem: FilterProblem, t: Array, rows: Array, every: int, motions: Array
-) -> tuple[State, Trace, Array, Array]:
-    """The causal filter's state and trace, states kept at each ``every``-th row, and roll (n, 2) at each.
+def _causal(
+    recording: Recording, problem: FilterProblem, kept: Array, every: int, motions: Array
+) -> tuple[State, Trace, Array | None]:
+    """The causal filter's state and trace, and roll (n, 2) where it is tracked; ``kept`` as of `advance`.
 
-    The states of all rows would fill the memory: they are held for some rows at a time.
+    Rows, and where the roll is tracked all states, are held for some rows at a time: else they would fill the memory.
     """
-    state, done = initial(problem), 0
+    state, done, t = initial(problem), 0, recording.t
     starts: list[Start] = []
-    parts = []
+    out = np.empty((len(t), OUTPUTS + problem.count + 1))
+    rolls = np.empty((len(t), 2)) if problem.spatial else None
     for a in range(0, max(1, len(t)), _BLOCK):
         b, held = min(a + _BLOCK, len(t)), len(state.held)
-        states = np.full((held + b - a, 2 * problem.size), np.nan)
-        state, trace = advance(
-            state, problem, t[a:b], rows[a:b], states, last=b == len(t), motions=motions[a - held : b]
-        )
-        answered = len(trace.out)
+        rows, last, moved = recording.of(slice(a, b)).rows, b == len(t), motions[a - held : b]
+        if rolls is None:
+            state, trace = advance(state, problem, t[a:b], rows, kept, every, last, moved, first=done)
+        else:
+            states = np.full((held + b - a, 2 * problem.size), np.nan)
+            state, trace = advance(state, problem, t[a:b], rows, states, 1, last, moved)
+            each = states[-done % every : len(trace.out) : every]
+            kept[-(-done // every) :][: len(each)] = each
+            rolls[done : done + len(trace.out)] = roll_of(problem, states[: len(trace.out)])
         starts += [each._replace(row=each.row + done) for each in trace.starts]
-        parts.append(
-            (trace.out, states[-done % every : answered : every], roll_of(problem, states[:answered]))
-        )
-        done += answered
-    out, kept, rolls = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return state, Trace(out, tuple(starts)), kept, rolls
+        out[done : done + len(trace.out)] = trace.out
+        done += len(trace.out)
+    return state, Trace(out[:done], tuple(starts)), rolls
 
 
 def of_fusion(filtered: FilterResult, states: int) -> Angles:

@@ -21,10 +21,9 @@ from inercal.aoa.fusion.filter_result import roll_of
 from inercal.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.clock import later, set_back
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
-from inercal.errors import RecordError
 
 
 class LiveState(NamedTuple):
@@ -176,11 +175,7 @@ class Live:
         else:
             late = rest = self._late + len(waiting)
         if late >= LIMITS.backward_rows:
-            raise RecordError(
-                self._where,
-                f"t: {late} rows in a row are not later than {self._fusion.t:.10g} s, the last at "
-                f"{waiting[-1]:.10g} s, expected time to increase",
-            )
+            raise set_back(self._where, late, self._fusion.t, float(waiting[-1]))
         return rest
 
 

@@ -19,9 +19,10 @@ from inercal.aoa.fusion.band import BandState
 from inercal.aoa.fusion.live import Answers, Live, LiveState
 from inercal.aoa.fusion.loop import BESIDE, MOTION, OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.fusion.watch import watched
 from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import set_back
 from inercal.arrays import Array
-from inercal.errors import RecordError
 from inercal.geometry.rotations import principal
 
 _EMPTY = BandState(np.empty((0, 2, 0)), *np.empty((4, 0)))
@@ -120,11 +121,7 @@ class LimitedLive:
         late = self._state.late + 1
         self._state = self._state._replace(late=late)
         if late >= LIMITS.backward_rows:
-            raise RecordError(
-                self._where,
-                f"t: {late} rows in a row are not later than {self._state.t:.10g} s, the last at {t:.10g} s, expected "
-                "time to increase",
-            )
+            raise set_back(self._where, late, self._state.t, t)
 
 
 def load_kernels(problem: FilterProblem) -> None:
@@ -134,6 +131,7 @@ def load_kernels(problem: FilterProblem) -> None:
     row[0, 0] = 0.0
     LimitedLive(replace(problem, band=Band(np.inf, (1.0,), 10.0))).feed_rows(row)
     carried_on(np.zeros((1, MOTION)), np.zeros(1), problem.constants)
+    watched(np.zeros(1), row[:, : problem.count + 1], problem.constants.gate)
 
 
 def _apart(state: LimitedState) -> LimitedState:

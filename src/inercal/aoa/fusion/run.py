@@ -66,12 +66,22 @@ class Start(NamedTuple):
     since: float
 
 
+class Head(NamedTuple):
+    """The state before a block of ``rows``, counted in the trace, after the fading ``F`` (n, n) of the constants there,
+    None where nothing fades: what a smoother goes back from."""
+
+    rows: slice
+    belief: Belief
+    F: Array | None
+
+
 class Trace(NamedTuple):
-    """Estimates of the filter at m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.fusion.loop.advance`, and its
-    ``starts``."""
+    """Estimates of the filter at m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.aoa.fusion.loop.advance`, its
+    ``starts``, and the ``heads`` of blocks where they were asked for."""
 
     out: Array
     starts: tuple[Start, ...]
+    heads: tuple[Head, ...] = ()
 
 
 def initial(problem: FilterProblem) -> State:
@@ -90,13 +100,16 @@ def advance(
     every: int = 1,
     last: bool = False,
     motions: Array = loop.NO_MOTIONS,
+    block: int = 0,
+    first: int = 0,
 ) -> tuple[State, Trace]:
     """Go on by rows at the times ``t`` (m,) [s], increasing; ``rows`` (m, N + 5) as of
     `inercal.aoa.fusion.loop.advance`.
 
     The state handed in is used up. Rows that are held have no row in the trace yet: it comes with a later block, or at
     the end, if ``last``. ``kept`` receives states and their standard deviations at each ``every``-th row of the
-    trace, ``motions`` (m, `loop.MOTION`) what the angle is carried on from.
+    trace, ``motions`` (m, `loop.MOTION`) what the angle is carried on from. The trace has heads of blocks of so many
+    rows, or fewer; of ``block`` 0 none. ``first`` is the number of the first row of the trace for ``every``.
     """
     if kept is None:
         kept = np.empty((0, 2 * problem.size))
@@ -105,9 +118,10 @@ def advance(
     rows = np.ascontiguousarray(rows)
     m, at = len(t), 0
     out = np.empty((m, OUTPUTS + problem.count + 1))
-    x, P, turns, before, running, _, since = state
-    dt, starts = np.diff(t, prepend=before), []
+    x, P, turns, earlier, running, _, since = state
+    dt, starts, heads = np.diff(t, prepend=earlier), [], []
     while at < m:
+        F = None
         if not running:
             end = min(at + LIMITS.starting_rows, m)
             if end - at < LIMITS.starting_rows and not last:
@@ -122,17 +136,26 @@ def advance(
             since = float(t[at]) if anew or math.isnan(since) else since
             starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew, since))
             dt[at] = 0.0
-        elif steps := fading_steps(float(t[at - 1]) if at else before, float(t[at]), since):
-            fade(x, P, problem, steps)
+        elif steps := fading_steps(float(t[at - 1]) if at else earlier, float(t[at]), since):
+            F = fade(x, P, problem, steps)
         stop = next_fading(t, at, since)
+        stop = min(stop, at + block) if block else stop
         part = Rows(dt[at:stop], rows[at:stop])
-        belief, keep = Belief(x, P, turns), Kept(kept, every, at)
+        belief, keep = Belief(x, P, turns), Kept(kept, every, first + at)
+        before = _apart(belief) if block else belief
         done = loop.advance(belief, part, problem.model, out[at:stop], keep, motions=motions[at:stop])
+        if block:
+            heads.append(Head(slice(at, at + done), before, F))
         # an angle that is lost in the row of its start is none
         at, running = (at + done, at + done == stop) if done or running else (end, False)
-    before = float(t[at - 1]) if at else before
+    latest = float(t[at - 1]) if at else earlier
     held = np.column_stack([t[at:], rows[at:]])
-    return State(x, P, turns, before, running, held, since), Trace(out[:at], tuple(starts))
+    return State(x, P, turns, latest, running, held, since), Trace(out[:at], tuple(starts), tuple(heads))
+
+
+def _apart(belief: Belief) -> Belief:
+    """A belief in arrays of its own."""
+    return Belief(*(each.copy() for each in belief))
 
 
 def unknown(problem: FilterProblem) -> list[int]:

@@ -8,8 +8,8 @@ filter's rows are gone through backward, each scalar with the row, gain and vari
 
 and between the row's last scalar and the next row x_s = x - P lam, P_s = P - P Lam P, of the filter's x and P after
 the row: those before it are so wide where the filter starts that digits would be lost. No covariance is inverted. The
-filter is run once to keep its state at the head of each block of rows, and again over each block, last block first, for
-its rows; so memory grows with the block and not with the recording. Constants fade between blocks
+filter keeps its state at the head of each block of rows, and is run again over each block, last block first, for its
+rows; so memory grows with the block and hardly with the recording. Constants fade between blocks
 (`inercal.aoa.fusion.run`), lam := F^T lam there too.
 """
 
@@ -25,7 +25,7 @@ from inercal.aoa.fusion import loop
 from inercal.aoa.fusion.loop import NOT_KEPT, OUTPUTS, Belief, Kept, Memory, Rows, congruent, root, write
 from inercal.aoa.fusion.model import Model
 from inercal.aoa.fusion.problem import FilterProblem
-from inercal.aoa.fusion.run import Start, fade, fading_steps, next_fading, unknown
+from inercal.aoa.fusion.run import Head, Trace, unknown
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -34,73 +34,45 @@ BLOCK = 256
 
 
 def smooth(
-    problem: FilterProblem,
-    t: Array,
-    rows: Array,
-    starts: tuple[Start, ...],
-    kept: Array | None = None,
-    every: int = 1,
+    problem: FilterProblem, t: Array, rows: Array, trace: Trace, kept: Array | None = None, every: int = 1
 ) -> Array:
     """Angles from all rows: (m, 5) theta, u [rad], rate, u [rad/s], acceleration [rad/s^2].
 
-    ``t`` and ``rows`` as `inercal.aoa.fusion.run.advance` took them; ``starts`` of the filter, across which the motion
-    is not continuous, but the errors of the sensors are. NaN before the first start, and where theta was lost, until
-    the next. ``kept`` (k, 2 n) receives states and standard deviations at each ``every``-th row.
+    ``t`` and ``rows`` as `inercal.aoa.fusion.run.advance` took them, with blocks of `BLOCK`, and its ``trace``; across
+    its starts the motion is not continuous, but the errors of the sensors are. NaN before the first start, and where
+    theta was lost, until the next. ``kept`` (k, 2 n) receives states and standard deviations at each ``every``-th row.
     """
-    n = problem.size
-    out = np.full((len(t), OUTPUTS), np.nan)
+    n, model = problem.size, problem.model
+    out, dt = np.full((len(t), OUTPUTS), np.nan), np.diff(t, prepend=t[:1])
     states = NOT_KEPT.states if kept is None else kept
     rows = np.ascontiguousarray(rows)
     lam, Lam, new = np.zeros(n), np.zeros((n, n)), unknown(problem)
-    end = len(t)
-    for begin in reversed(starts):
-        part = slice(begin.row, end)
-        _stretch(problem, begin, t[part], rows[part], (lam, Lam), out[part], Kept(states, every, begin.row))
-        forgotten = slice(None) if begin.anew else new
-        lam[forgotten] = 0.0
-        Lam[forgotten, :] = 0.0
-        Lam[:, forgotten] = 0.0
-        end = begin.row
+    starts = {each.row: each for each in trace.starts}
+    dt[list(starts)] = 0.0
+    longest = max((head.rows.stop - head.rows.start for head in trace.heads), default=0)
+    memory = loop.memory(longest, n, len(model.places.moving), problem.count)
+    causal = np.empty((longest, OUTPUTS + problem.count + 1))
+    for block, before, F in reversed(trace.heads):
+        belief = Belief(*(each.copy() for each in before))
+        done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal, memory=memory)
+        _backward(lam, Lam, memory, done, model, out[block], Kept(states, every, block.start))
+        if F is not None:
+            with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
+                lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
+        if (begin := starts.get(block.start)) is not None:
+            forgotten = slice(None) if begin.anew else new
+            lam[forgotten] = 0.0
+            Lam[forgotten, :] = 0.0
+            Lam[:, forgotten] = 0.0
     return out
 
 
 def load_kernels(problem: FilterProblem) -> None:
     """Load, or compile, the kernels."""
     x, P = problem.mean.copy(), problem.covariance.copy()
-    start = Start(0, x, P, np.zeros(problem.count + 3), True, 0.0)
-    smooth(problem, np.zeros(1), np.full((1, problem.count + loop.BESIDE), np.nan), (start,))
-
-
-def _stretch(
-    problem: FilterProblem, begin: Start, t: Array, rows: Array, adjoint: tuple[Array, Array], out: Array, kept: Kept
-) -> None:  # fmt: skip
-    """Smooth from one start on; the ``adjoint`` lam, Lam goes from the end of the stretch to its beginning."""
-    (lam, Lam), model, dt = adjoint, problem.model, np.diff(t, prepend=t[0])
-    memory = loop.memory(min(BLOCK, len(dt)), problem.size, len(model.places.moving), problem.count)
-    causal = np.empty((BLOCK, OUTPUTS + problem.count + 1))
-    belief = _apart(begin.x, begin.P, begin.turns)
-    heads = []
-    a = 0
-    while a < len(dt):
-        steps = fading_steps(float(t[a - 1]), float(t[a]), begin.since) if a else 0
-        F = fade(belief.x, belief.P, problem, steps) if steps else None
-        block = slice(a, min(a + BLOCK, next_fading(t, a, begin.since)))
-        heads.append((block, _apart(*belief), F))
-        done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal)
-        if done < len(dt[block]):
-            break
-        a = block.stop
-    for block, belief, F in reversed(heads):
-        done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal, memory=memory)
-        _backward(lam, Lam, memory, done, model, out[block], kept._replace(first=kept.first + block.start))
-        if F is not None:
-            with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
-                lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
-
-
-def _apart(x: Array, P: Array, turns: Array) -> Belief:
-    """A belief in arrays of its own."""
-    return Belief(x.copy(), P.copy(), turns.copy())
+    head = Head(slice(0, 1), Belief(x, P, np.zeros(problem.count + 3)), None)
+    none = np.full((1, problem.count + loop.BESIDE), np.nan)
+    smooth(problem, np.zeros(1), none, Trace(np.empty((1, 0)), (), (head,)))
 
 
 @kernel

@@ -41,6 +41,9 @@ _SETTLED = 1e-2
 
 _ROUNDING = 1e-6
 
+_PART = 50_000
+"""Rows that are interpolated at a time."""
+
 
 @dataclass(frozen=True)
 class Delay:
@@ -58,7 +61,8 @@ class Delay:
 
 def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     """The delay; None where nothing moves, there is no gyro, the axes do not show angular acceleration, either is
-    missing now and then all along, as in saturation, or the phases are not those of a delay within 0.1 s.
+    missing now and then all along, as in saturation, sensors have clocks of their own, between whose samples there are
+    no spectra of all, or the phases are not those of a delay within 0.1 s.
 
     The phase at a frequency of n segments has the variance (1 - gamma^2) / (2 n gamma^2), hence
 
@@ -69,7 +73,7 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     """
     weights = all_weights(layout)
     taken = later(recording.t)
-    if weights is None or len(taken) < 2:
+    if weights is None or len(taken) < 2 or any(each.code == "other_clock" for each in recording.findings):
         return None
     t, gyro = recording.t[taken], recording.gyro[taken]
     used = np.flatnonzero(weights)
@@ -172,9 +176,17 @@ def aligned(recording: Recording, delay: float) -> Recording:
 
 def _interpolated(t: Array, values: Array, at: Array) -> Array:
     """Lagrange's cubic through the two samples on either side, else a straight line, NaN where neither is there."""
-    n = len(t)
-    if n < 2 or not np.isfinite(values).any():
+    if len(t) < 2 or not np.isfinite(values).any():
         return np.full(len(at), np.nan)
+    step = float(np.median(np.diff(t)))
+    # some rows at a time: their many terms stay near
+    parts = (at[k : k + _PART] for k in range(0, len(at), _PART))
+    return np.concatenate([np.empty(0), *(_interpolated_part(t, values, part, step) for part in parts)])
+
+
+def _interpolated_part(t: Array, values: Array, at: Array, step: float) -> Array:
+    """As `_interpolated`, of few rows; ``step`` [s] is the usual one of ``t``."""
+    n = len(t)
     j = np.clip(np.searchsorted(t, at, side="right") - 1, 0, n - 2)
     before, after = t[j], t[j + 1]
     gap = after - before
@@ -190,5 +202,5 @@ def _interpolated(t: Array, values: Array, at: Array) -> Array:
             others = [y for i, y in enumerate(x) if i != m]
             cubic += values[k] * math.prod((s - y) / (x[m] - y) for y in others)
     curve = np.where(inside & np.isfinite(cubic), cubic, line)
-    usable = (s > -_ROUNDING) & (s < 1.0 + _ROUNDING) & (gap < LIMITS.gyro_gap * np.median(np.diff(t)))
+    usable = (s > -_ROUNDING) & (s < 1.0 + _ROUNDING) & (gap < LIMITS.gyro_gap * step)
     return np.where(usable, curve, np.nan)

@@ -67,15 +67,19 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
         There is no gyro where the methods need one, or time does not go on.
     """
     settings.attitude.check_pitch_shows()
-    level = settings.attitude.level
-    _needs(recording, settings, methods, level)
-    taken = later(recording.t)
+    check_sensors(settings, methods, not len(recording.t) or bool(np.isfinite(recording.gyro).any()))
     gyro_delay = settings.timing.gyro_delay
     if gyro_delay is None:
         shown = relative_delay(recording, settings.layout)
         plain = shown is not None and abs(shown.value) > LIMITS.delay_sigmas * shown.u
         gyro_delay = shown.value if shown is not None and plain else 0.0
-    t, acc, gyro = recording.t[taken], recording.acc[taken], aligned(recording, gyro_delay).gyro[taken]
+    return each_row(aligned(recording, gyro_delay), settings, methods)
+
+
+def each_row(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
+    """As `measure`, of rows whose gyro is prompt, by sensors that `check_sensors` has passed."""
+    level, taken = settings.attitude.level, later(recording.t)
+    t, acc, gyro = recording.t[taken], recording.acc[taken], recording.gyro[taken]
     noise = settings.noise
     acc, compensated = lever.centrifugal(
         methods.centrifugal, t, acc, gyro, settings.layout, level, noise.gyro
@@ -122,14 +126,14 @@ def low_passed(angles: Angles, t: Array, cutoff: float = LOW_PASS) -> Angles:
     return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=theta)
 
 
-def _needs(recording: Recording, settings: AoaSettings, methods: Methods, level: float) -> None:
-    """Refuse methods that lack sensors in all rows."""
-    layout = settings.layout
+def check_sensors(settings: AoaSettings, methods: Methods, has_gyro: bool) -> None:
+    """Refuse methods that lack sensors in all rows: raises `StudyError`, and `RecordError` without a gyro."""
+    layout, level = settings.layout, settings.attitude.level
     if methods.tangential == "dual":
         lever.dual(layout, level)
     static.angle(methods.static, np.zeros((0, len(layout.names))), layout, settings.site.gravity, level)
     without_gyro = methods.centrifugal in ("none", "low-pass") and methods.tangential != "differentiated"
-    if not without_gyro and len(recording.t) and np.isnan(recording.gyro).all():
+    if not (without_gyro or has_gyro):
         raise RecordError(
             "gyro", f"missing, which {label(methods)} needs: without it none, none or none, dual work"
         )

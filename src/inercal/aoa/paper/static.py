@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -201,6 +202,7 @@ def _axes(layout: Layout, level: float) -> Array:
     return axes(layout, level)
 
 
+@lru_cache(maxsize=64)
 def _pairs(layout: Layout, level: float, way: Static) -> Array:
     """(K, 2, N): for each pair of square axes the matrix from readings over g to (sin theta, cos theta)."""
     h, square = axes(layout, level), layout.square()

@@ -30,6 +30,14 @@ def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.
     return taken
 
 
+def set_back(where: object, late: int, last: float, t: float) -> RecordError:
+    """The error of a stream of which ``late`` rows in a row, the last at ``t`` [s], are not later than ``last`` [s]."""
+    return RecordError(
+        where,
+        f"t: {late} rows in a row are not later than {last:.10g} s, the last at {t:.10g} s, expected time to increase",
+    )
+
+
 def shortened(t: Array, longest: float) -> Array:
     """Times ``t`` (n,) [s], increasing, with gaps above ``longest`` [s] shortened to it: a clock that jumped, or runs
     hours apart, must not make hours of an even grid."""

@@ -69,13 +69,14 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         findings += _left_out(name, out, stuck, settings.calibration(name))
     findings += of_sensors(there, gyros, record, settings)
     both = all(name in gyros for name in GYROS[1:])
-    turns = np.column_stack([values[name] if both else none for name in GYROS[1:]])
+    nowhere = np.broadcast_to(np.nan, (len(t), 2))  # takes no memory
+    turns = np.column_stack([values[name] for name in GYROS[1:]]) if both else nowhere
     return Recording(
         t=t,
         acc=np.column_stack([values.get(name, none) for name in names]),
         gyro=values.get(GYROS[0], none),
         turns=turns,
-        zero_angle=np.full((len(t), 2), np.nan),
+        zero_angle=nowhere,
         point=rows.held("point"),
         trigger=rows.held("trigger"),
         # without jumps of a turn, which would be interpolated over, and spoil means

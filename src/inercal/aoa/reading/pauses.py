@@ -58,16 +58,16 @@ def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]
     at = np.arange(n) - 0.5 * (n - 1)
     overall = float(at @ theta / (at @ at)) if n > 1 else 0.0
     x = theta - theta.mean() - overall * at
-    sums = [np.concatenate([[0.0], np.cumsum(each)]) for each in (x, x * at, x * x)]
-    s0, s1, s2 = (each[w:] - each[:-w] for each in sums)
+    s0, s1, s2 = _sums(x, w), _sums(x * at, w), _sums(x * x, w)
+    del x
     middle = at[: n - w + 1] + 0.5 * (w - 1)
     spread = w * (w * w - 1.0) / 12.0
     slope = (s1 - middle * s0) / spread
-    left = s2 - s0**2 / w - slope**2 * spread
-    scatter = np.sqrt(np.maximum(left, 0.0) / (w - 2))
+    scatter = np.sqrt(np.maximum(s2 - s0**2 / w - slope**2 * spread, 0.0) / (w - 2))
+    reach = float(np.ptp(s0 / w + overall * middle))
+    del at, s0, s1, s2, middle  # of millions of rows these are most of the memory
     centred = np.clip(np.arange(n) - w // 2, 0, n - w)
     change, scatter = np.abs(slope + overall)[centred] * w, scatter[centred]
-    reach = float(np.ptp(s0 / w + overall * middle))
     buffet = np.clip(LIMITS.resting_share * reach, LIMITS.least_resting_scatter, LIMITS.most_resting_scatter)
     allowed = np.maximum(LIMITS.resting_sigmas * u, buffet)
     still = (change < LIMITS.resting_sigmas * np.hypot(scatter, u)) & (scatter < 2.0 * allowed)
@@ -75,6 +75,12 @@ def at_rest(t: Array, theta: Array, u: Array) -> tuple[NDArray[np.bool_], Array]
     starts = np.flatnonzero(np.diff(still, prepend=not still[0]))
     power, most = (np.add.reduceat(np.square(each), starts) for each in (scatter, allowed))
     return still & np.repeat(power < most, np.diff(starts, append=n)), scatter
+
+
+def _sums(x: Array, w: int) -> Array:
+    """Sums (n - w + 1,) of ``x`` (n,) over windows of ``w``."""
+    sums = np.concatenate([[0.0], np.cumsum(x)])
+    return np.asarray(sums[w:] - sums[:-w])
 
 
 def _step(t: Array) -> float:

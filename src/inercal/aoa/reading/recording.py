@@ -43,6 +43,12 @@ class Recording:
         """(n, N + 5) as `inercal.aoa.fusion.loop.advance` takes them."""
         return np.column_stack([self.acc, self.gyro, self.zero_angle, self.turns])
 
+    def of(self, rows: slice | NDArray[np.int64]) -> Recording:
+        """These rows, less all that no filter takes."""
+        return Recording(
+            self.t[rows], self.acc[rows], self.gyro[rows], self.turns[rows], self.zero_angle[rows]
+        )
+
     @property
     def spatial(self) -> bool:
         """True where roll and yaw gyros are there."""

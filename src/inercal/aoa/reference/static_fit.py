@@ -146,12 +146,12 @@ def _solve(sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array,
         rows.append(weighted[:, :-1])
         rights.append(weighted[:, -1])
         determinant += 2.0 * float(np.log(u[seen]).sum() + np.log(common))
-    Q, R = np.linalg.qr(np.concatenate(rows))
-    right = np.concatenate(rights)
+    left, right = np.concatenate(rows), np.concatenate(rights)
+    Q, R = np.linalg.qr(left)
     inverse = np.linalg.inv(R)
     solution = inverse @ (Q.T @ right)
-    left = right - np.concatenate(rows) @ solution
-    chi2 = float(left @ left)
+    misfit = right - left @ solution
+    chi2 = float(misfit @ misfit)
     used = len(wide) - float(np.sum(inverse**2))
     likelihood = -0.5 * (determinant + 2.0 * float(np.log(np.abs(np.diag(R))).sum()) + chi2)
     count = len(right) - len(wide)

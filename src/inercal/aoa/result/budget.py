@@ -22,7 +22,7 @@ from inercal.aoa.fusion.band import fused
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as stated_problem
 from inercal.aoa.fusion.run import advance, initial
-from inercal.aoa.fusion.smoother import smooth
+from inercal.aoa.fusion.smoother import BLOCK, smooth
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
@@ -193,8 +193,8 @@ def _run(
     problem: FilterProblem, t: Array, rows: Array, smoothed: bool, judged: Mask
 ) -> tuple[float, Array, Array, Array]:
     """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are ``judged`` (n,)."""
-    state, trace = advance(initial(problem), problem, t, rows, last=True)
-    out = smooth(problem, t, rows, trace.starts) if smoothed else trace.out
+    state, trace = advance(initial(problem), problem, t, rows, last=True, block=BLOCK if smoothed else 0)
+    out = smooth(problem, t, rows, trace) if smoothed else trace.out
     u = out[judged & np.isfinite(out[:, 1]), 1]
     return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
 

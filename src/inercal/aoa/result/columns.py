@@ -2,11 +2,15 @@
 
     theta, u_theta [deg]              pitch, and its standard uncertainty
     rate [deg/s]                      of pitch, nose-up
+    nis [1]                           mean squared innovation of the last seconds; 1 or less where all is well
+    status [1]                        0 sound; 1 the last seconds contradict the model; 2 no angle
     alpha, u_alpha [deg]              angle of attack
     beta, u_beta [deg]                sideslip, the wind from the right
+    alarm [1]                         1 above, -1 below the limits of the study, 0 within
 
 Alpha and beta need the attitude of the model in the stream, stated in the study; without it theta is not called alpha.
-A row of the recording that was left out has no numbers.
+The paper's methods have no nis and no status; alarm is there where the study states limits. A row of the recording that
+was left out has no other numbers than its status.
 """
 
 from __future__ import annotations
@@ -17,10 +21,11 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.aoa.angles import Angles, gives_alpha, stated_roll
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.balance import Joined
 from inercal.aoa.result.points import Point
-from inercal.aoa.settings import AoaSettings, Attitude
+from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.inputs import Source
 from inercal.records.column import Column
@@ -29,28 +34,44 @@ from inercal.records.titles import name_and_unit
 from inercal.units import Unit, parse_unit
 
 _PITCH = (("theta", "deg"), ("u_theta", "deg"), ("rate", "deg/s"))
+_SOUND = (("nis", "1"), ("status", "1"))
 _FLOW = (("alpha", "deg"), ("u_alpha", "deg"), ("beta", "deg"), ("u_beta", "deg"))
 _NUMBERS = (("point", "1"), ("trigger", "1"), ("last_trigger", "1"))
 _POINT = (*_NUMBERS, ("begin", "s"), ("end", "s"), ("rows", "1"), *_PITCH, ("scatter", "deg"))
 
+SUSPECT, LOST = 1.0, 2.0
+"""Statuses of a row that is not sound."""
 
-def columns(attitude: Attitude) -> tuple[tuple[str, str], ...]:
+
+def columns(settings: AoaSettings) -> tuple[tuple[str, str], ...]:
     """Names and units, after ``t``."""
-    return _PITCH + (_FLOW if gives_alpha(attitude) else ())
+    flow = _FLOW if gives_alpha(settings.attitude) else ()
+    return _PITCH + _SOUND + flow + ((("alarm", "1"),) if settings.alarm.stated else ())
 
 
-def rows(angles: Angles, attitude: Attitude) -> Array:
-    """The columns (n, 3 or 7), in their units, of angles (n,); the uncertainty of a stated roll is in theirs."""
-    values = [angles.theta, stated_roll(angles, attitude).u, angles.rate]
+def rows(angles: Angles, settings: AoaSettings) -> Array:
+    """The columns (n, 5 to 10), in their units, of angles (n,); the uncertainty of a stated roll is in theirs."""
+    attitude, nis, alarm = settings.attitude, angles.nis, settings.alarm
+    degrees = np.degrees([angles.theta, stated_roll(angles, attitude).u, angles.rate])
+    lost = np.isnan(angles.theta)
+    if nis is None:
+        sound = [np.full(len(lost), np.nan)] * 2
+    else:
+        sound = [np.where(lost, np.nan, nis), np.where(lost, LOST, (nis > LIMITS.mean_nis) * SUSPECT)]
+    values = [*degrees, *sound]
+    watched = angles.theta
     if gives_alpha(attitude):
         flow = angles.in_stream(attitude)
-        values += [flow.alpha, flow.u_alpha, flow.beta, flow.u_beta]
-    return np.degrees(np.column_stack(values))
+        watched = flow.alpha
+        values += list(np.degrees([flow.alpha, flow.u_alpha, flow.beta, flow.u_beta]))
+    if alarm.stated:
+        values.append(alarm.beyond(watched))
+    return np.column_stack(values)
 
 
 def angles_record(recording: Recording, angles: Angles, settings: AoaSettings) -> Record:
     """Angles with the time stamps of the recording, row by row."""
-    names, values = columns(settings.attitude), rows(angles, settings.attitude)
+    names, values = columns(settings), rows(angles, settings)
     return _record(names, values, recording.t, recording, Source(f"angles of {angles.method}", ""))
 
 

@@ -96,11 +96,13 @@ def assemble(
     result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
     model = SPATIAL if problem.spatial else MODEL + FLAT
     basis = _basis(recording, settings, angles, model, REFERENCES + _OF_FUSION)
-    rms = _of(_rms, filtered.innovations[np.isfinite(filtered.innovations)])
-    dof = float(max(int(np.isfinite(filtered.innovations).sum()) - len(names), 1))
+    squares = [(np.isfinite(each).sum(), np.nansum(np.square(each))) for each in filtered.innovations.T]
+    count, power = (float(sum(each)) for each in zip(*squares, strict=True))
+    rms = math.sqrt(power / count) if count else math.nan
+    dof = float(max(count - len(names), 1))
     statistics = _statistics(recording, angles) | {
         "dof": dof,
-        "residual_rms": math.nan if rms is None else rms,
+        "residual_rms": rms,
         "nis_mean": filtered.nis_mean,
         "starts": float(len(filtered.starts)),
         "snap": settings.estimator.density,

@@ -18,6 +18,7 @@ import numpy as np
 from inercal.aoa.angles import Angles, stated_roll
 from inercal.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.fusion.watch import watched
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.methods import measure
 from inercal.aoa.reading.recording import Recording
@@ -86,7 +87,8 @@ def by_fusion(
     recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
 ) -> Angles:
     """The angles of the fusion, with the roll where gyros track it; stated inputs count in their uncertainty."""
-    angles = of_fusion(filtered, settings.estimator.states)
+    nis = watched(recording.t, filtered.innovations, problem.constants.gate)
+    angles = replace(of_fusion(filtered, settings.estimator.states), nis=nis)
     if (tracked := tracked_roll(recording, problem, filtered)) is not None:
         angles = replace(angles, roll=tracked[0], roll_u=tracked[1])
 
@@ -96,12 +98,17 @@ def by_fusion(
     return _with_stated(angles, settings, run)
 
 
-def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
-    """The angles of the paper's methods (`inercal.aoa.paper.methods.measure`) after a tare by the study's zero; stated
-    inputs count in their uncertainty."""
+def by_methods(
+    recording: Recording,
+    settings: AoaSettings,
+    methods: Methods,
+    by: Callable[[Recording, AoaSettings, Methods], Angles] = measure,
+) -> Angles:
+    """The angles of the paper's methods, ``by`` those of `inercal.aoa.paper.methods`, after a tare by the study's zero;
+    stated inputs count in their uncertainty."""
 
     def angles(chosen: AoaSettings) -> Angles:
-        return measure(tare(recording, chosen), chosen, methods)
+        return by(tare(recording, chosen), chosen, methods)
 
     def run(lean: Lean) -> Array:
         attitude, site = settings.attitude, replace(settings.site, gravity=lean.gravity)
@@ -115,6 +122,8 @@ def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) ->
 def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Array]) -> Angles:
     """The angles with stated inputs in their uncertainty; ``run`` gives theta under a change."""
     changes = leans(settings, angles.roll is not None)
+    if not changes:
+        return angles
     with ThreadPoolExecutor() as pool:
         return widened(angles, settings, changes, list(pool.map(run, changes)))
 

@@ -147,8 +147,9 @@ def _columns(dataset: Any, attributes: Mapping[str, Any], columns: Sequence[int]
     numbers = [np.empty(len(dataset), dataset.dtype) for _ in columns]
     chunk = dataset.chunks[0] if dataset.chunks else 1  # unpacked once
     step = chunk * max(1, _BLOCK // (dataset.shape[1] * chunk))
+    stored = _stored(dataset)
     for start in range(0, len(dataset), step):
-        block = _stored(dataset)[start : start + step]
+        block = stored[start : start + step]
         for column, out in zip(columns, numbers, strict=True):
             out[start : start + step] = block[:, column]
     return [unpacked(each, attributes) for each in numbers]

@@ -1,4 +1,4 @@
-"""Plain rows of text, compiled: fields of digits, read to the nearest float64 as Python reads them.
+"""Plain rows of text, compiled: fields of digits, read to the nearest float64 as Python reads them, or empty, NaN.
 
 A number of up to 19 digits is w 10^q. Where w and the power of ten are floats themselves one operation rounds it; else
 it is the product of w and a power of five of 128 bits. Source: D. Lemire, Number parsing at a gigabyte per second,
@@ -163,8 +163,9 @@ def _row(
     bits: NDArray[Bits],
     row: Array,
 ) -> bool:
-    """Read the line from ``at`` to ``end`` into a ``row`` (k,): true if it is a plain one."""
+    """Read the line from ``at`` to ``end`` into a ``row`` (k,): true if it is a plain one, with a number."""
     delimiter, mark = marks[0], marks[1]
+    filled = False
     at = _blank(data, at, end, delimiter)
     for comment in marks[2:]:
         if at < end and data[at] == comment:
@@ -172,7 +173,10 @@ def _row(
     width = len(places)
     for field in range(width):
         at = _blank(data, at, end, delimiter)
-        if places[field] >= 0:
+        if places[field] >= 0 and delimiter and (at == end or data[at] == delimiter):
+            row[places[field]] = np.nan
+        elif places[field] >= 0:
+            filled = True
             at = _number(data, at, end, mark, powers, value, bits)
             if at < 0 or not abs(value[0]) < largest:
                 return False
@@ -199,7 +203,7 @@ def _row(
     at = _blank(data, at, end, delimiter)
     if delimiter and at < end and data[at] == delimiter:  # behind the last field there may be one more
         at = _blank(data, at + 1, end, delimiter)
-    return at == end
+    return filled and at == end
 
 
 @kernel

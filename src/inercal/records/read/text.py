@@ -33,6 +33,7 @@ UNENDED = "no line end follows: the last number"
 
 _FEW = 4  # blocks that take NumPy, where nothing is missing, no longer than loading what is compiled
 _MOST_ODD = 4096
+_NO_LINES = np.empty(0, np.int64)
 _HEADER_LINES = 50
 _LAYOUT_LINES = 400
 
@@ -174,7 +175,7 @@ def contents(layout: Layout) -> str:
 
 
 def _gone_through(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
-    """All rows (n, k) of a block by compiled code, those lines apart that are not full of plain numbers."""
+    """All rows (n, k) of a block by compiled code, those lines apart that hold other than plain numbers."""
     from inercal.records.read.plain_rows import plain_rows
 
     places = np.full(layout.width, -1)
@@ -189,6 +190,9 @@ def _gone_through(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
     while at < len(data):
         count, end = plain_rows(data, at, "".join(marks).encode(), places, LARGEST, rows)
         pieces.append(rows[:count].copy())
+        empty = np.isnan(rows[:count])
+        if empty.any():
+            flaws.append(_Flaws(_NO_LINES, tuple(line + np.flatnonzero(column) for column in empty.T)))
         line += count
         odd = 1 if count > odd else min(2 * odd, _MOST_ODD)
         at = end
@@ -287,8 +291,7 @@ def _findings(
     flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, layout: Layout, indices: Collection[int]
 ) -> tuple[Finding, ...]:
     """Findings on rows that cannot be read, and on a file that ends too soon."""
-    none = np.empty(0, np.int64)
-    bad = np.concatenate([none, *(flaw.bad for flaw in flaws)])
+    bad = np.concatenate([_NO_LINES, *(flaw.bad for flaw in flaws)])
     findings = []
     if last.cut and bad.size and bad[-1] == last.last:
         bad = bad[:-1]
@@ -301,7 +304,7 @@ def _findings(
         text = f"{counted(bad.size, 'row')} other than {layout.width} fields with numbers, left as NaN"
         findings.append(Finding("bad_row", text, places("line", bad)))
     for index, name in enumerate(names):
-        lines = np.concatenate([none, *(flaw.missing[index] for flaw in flaws)])
+        lines = np.concatenate([_NO_LINES, *(flaw.missing[index] for flaw in flaws)])
         if lines.size and not may_be_empty(name):
             findings.append(
                 Finding("nan", f"{name}: {counted(lines.size, 'missing value')}", places("line", lines))

@@ -20,6 +20,8 @@ from inercal.selfcal.platform.states import ALL, BIAS_WALK, KIND_OF, RIG, STATES
 from inercal.selfcal.settings import Noise
 from inercal.units import parse_quantity
 
+_TOGETHER: Final = "several errors of the rig together"
+
 #: kinds of states that are tried, and how they are named
 _TRIED: Final[tuple[tuple[tuple[str, ...], str, str], ...]] = (
     (("delay",), "sensors that are late", "delay"),
@@ -27,7 +29,8 @@ _TRIED: Final[tuple[tuple[tuple[str, ...], str, str], ...]] = (
     (("accelerometer_walk",), "accelerometer biases that wander", "bias_walk"),
     (("gyro_walk",), "gyro biases that wander", "bias_walk"),
     (BIAS_WALK, "biases that wander", "bias_walk"),
-    ((*RIG, "k2", "levers"), "several errors of the rig together", '"rig", "k2", "levers"'),
+    ((*RIG, "k2", "levers"), _TOGETHER, '"rig", "k2", "levers"'),
+    ((*RIG, "k2", "levers", *BIAS_WALK), _TOGETHER, '"rig", "k2", "levers", "bias_walk"'),
 )
 
 _FACTORS: Final = (1.0, 2.0, 4.0, 8.0)

@@ -153,9 +153,7 @@ PAPER: Final[tuple[str, ...]] = tuple(STATES)[:6]
 EXTENDED_MODEL: Final[tuple[str, ...]] = tuple(STATES)[:8]
 TEMPERATURE: Final[tuple[str, ...]] = ("kg0_T1", "ka0_T1", "ka1_T1")
 BIAS_WALK: Final[tuple[str, ...]] = ("gyro_walk", "accelerometer_walk")
-RIG: Final[tuple[str, ...]] = (
-    *EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay", *BIAS_WALK,
-)  # fmt: skip
+RIG: Final[tuple[str, ...]] = (*EXTENDED_MODEL, "gamma", "non_orthogonality", "zero_y", "delay")
 
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {"paper": PAPER, "extended": EXTENDED_MODEL, "rig": RIG}
 """Word for a set of states -> their kinds."""

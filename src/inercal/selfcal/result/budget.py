@@ -6,6 +6,7 @@ error-state filter, run again with each changed by one standard uncertainty eith
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,9 +19,10 @@ from inercal.selfcal.before.considered import sensitivities
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import product_slope, to_product
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF, WAVE
+from inercal.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF, WALK, WAVE
 from inercal.selfcal.result.systematic import systematic_inputs
 from inercal.selfcal.settings import Noise, SelfcalSettings
 from inercal.units import parse_quantity, parse_unit
@@ -78,7 +80,25 @@ def considered(
         if shift > exact.get(kind, (1.0, ""))[0]:
             unit, size = shown_unit(UNIT_OF[name])
             exact[kind] = shift, f"{usual / shift / size:.2g} {unit} of {name} ({of.names[worst]})"
+    if not known & {*ALL[WALK:]}:
+        exact |= _wandering(settings.noise, float(np.ptp(recording.t)), dict(zip(of.names, u, strict=True)))
     return sources, {kind: text for kind, (_, text) in exact.items()}
+
+
+def _wandering(noise: Noise, lasts: float, u: Mapping[str, float]) -> dict[str, tuple[float, str]]:
+    """Biases that wander about their means, of which a recording that ``lasts`` [s] has another mean: the variance of
+    the mean of an exponentially correlated process (A. Gelb, Applied Optimal Estimation, 1974, section 3.8)."""
+    x = lasts / LIMITS.walk_time
+    of_mean = math.sqrt(LIMITS.walk_time * (0.5 - x / 6.0 if x < 1e-3 else (1.0 + math.expm1(-x) / x) / x))
+    walks = {"kg0": ("gyro_walk", noise.gyro_walk), "ka0": ("accelerometer_walk", noise.accelerometer_walk)}
+    found = []
+    for bias, (key, usual) in walks.items():
+        name = min((f"{bias}_{i}" for i in "xyz"), key=lambda each: u[each])
+        unit, size = shown_unit(UNIT_OF[name])
+        least = u[name] / of_mean
+        found.append((usual / least, f"{least / size:.2g} {unit}/sqrt(s) of {key} ({name})"))
+    worst = max(found)
+    return {"bias_walk": worst} if worst[0] > 1.0 else {}
 
 
 def systematic(

@@ -1,0 +1,227 @@
+"""``inercal certificate``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from inercal.cli.options import FileOutput, StoreOption
+from inercal.cli.outcome import emit
+from inercal.errors import InputError
+
+if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
+    from inercal.laboratory.certificate.reading import Certificate
+    from inercal.laboratory.store import Store
+
+
+def certificate(
+    results: Annotated[
+        list[str] | None,
+        Parameter(
+            help="Results of one instrument: files that commands wrote to --out, or results of the store."
+        ),
+    ] = None,
+    /,
+    *,
+    lab: Annotated[
+        Path | None, Parameter(help="What the laboratory states (TOML); `inercal new lab` writes one.")
+    ] = None,
+    number: Annotated[str | None, Parameter(help="Number of the certificate.")] = None,
+    supersedes: Annotated[
+        str | None, Parameter(help="Number of the certificate that this one replaces.")
+    ] = None,
+    page: Annotated[
+        list[Path] | None,
+        Parameter(help="Report of a result, put inside; may be repeated, in the order of the results."),
+    ] = None,
+    html: Annotated[Path | None, Parameter(help="Write the certificate as a readable page.")] = None,
+    read: Annotated[Path | None, Parameter(help="Read this certificate, of anybody, and print it.")] = None,
+    store: StoreOption = None,
+    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+) -> None:
+    """Write a digital calibration certificate, or read one."""
+    if html is not None and html.suffix.lower() not in (".html", ".htm"):
+        raise InputError(html, f"found the suffix {html.suffix!r} for --html, expected .html")
+    if read is not None:
+        for option, given in (
+            ("--lab", lab),
+            ("--number", number),
+            ("--out", output.out),
+            ("RESULTS", results),
+        ):
+            if given:
+                raise InputError(option, "found with --read, expected without it")
+        output.check(())
+        _read(read, html, output)
+        return
+    for option, value in (("RESULTS", results), ("--lab", lab), ("--number", number), ("--out", output.out)):
+        if not value:
+            raise InputError(option, "missing, expected it, or --read")
+    assert results is not None
+    assert lab is not None
+    assert number is not None
+    if page is not None and len(page) > len(results):
+        raise InputError(
+            "--page", f"found {len(page)} of {len(results)} results, expected one of each at most"
+        )
+    output.check((".xml",), [*map(Path, results), lab, *(page or [])])
+    _write(results, lab, number, supersedes, page or [], html, store, output)
+
+
+def _write(
+    results: list[str],
+    lab: Path,
+    number: str,
+    supersedes: str | None,
+    pages: list[Path],
+    html: Path | None,
+    store: str | None,
+    output: FileOutput,
+) -> None:
+    """Write the certificate and its page, whole or not at all, and enter it into the store."""
+    from contextlib import AbstractContextManager, nullcontext
+    from datetime import UTC, datetime
+
+    from inercal._files import read_bytes, write_bytes, write_text
+    from inercal.estimate.result import without_coefficients
+    from inercal.laboratory.certificate.lab import read_lab
+    from inercal.laboratory.certificate.page import page
+    from inercal.laboratory.certificate.reading import certificate_of
+    from inercal.laboratory.certificate.written import certificate as written
+    from inercal.laboratory.issue import issuing
+    from inercal.records.places import counted
+    from inercal.records.read import source_of
+
+    stated = read_lab(lab)
+    opened = _store(store)
+    reports: list[bytes | None] = []
+    for path in pages:
+        try:
+            reports.append(read_bytes(path))
+        except OSError as error:
+            raise InputError(path, f"cannot be read ({error.strerror}), expected a report") from error
+    reports += [None] * (len(results) - len(reports))
+    found = [_result(each, opened, report) for each, report in zip(results, reports, strict=True)]
+    estimates = [estimate for estimate, _ in found]
+    given = [report for _, report in found]
+    made = written(estimates, stated, number, datetime.now(UTC).date(), given, supersedes, lab)
+    assert output.out is not None
+    readable = page(certificate_of(made, output.out))
+    entering: AbstractContextManager[None] = nullcontext()
+    if opened is not None:
+        kept = [
+            _kept(opened, each, estimate, report)
+            for each, (estimate, report) in zip(results, found, strict=True)
+        ]
+        entering = issuing(opened, number, made, readable.encode(), kept, supersedes)
+    with entering:
+        write_bytes(output.out, made)
+        if html is not None:
+            write_text(html, readable)
+            output.say(f"page: {html}")
+    count = sum(len(estimate.names) for estimate in estimates)
+    of = f"{counted(count, 'coefficient')} of {counted(len(results), 'result')}"
+    words = f"certificate {number}: {of} in {output.out}"
+    words += f", entered in {opened.where}" if opened is not None else "; no store keeps it or its number"
+    data = {"number": number, "out": str(output.out), "html": None if html is None else str(html)}
+    sources = tuple(source_of(path) for path in (*map(Path, results), lab, *pages) if path.is_file())
+    emit(without_coefficients("certificate", words, data, sources), words, output)
+
+
+def _store(given: str | None) -> Store | None:
+    """The store that is named, by option or environment, or the user's own where there is one."""
+    import os
+
+    from inercal.laboratory.place import VARIABLE, place_of
+    from inercal.laboratory.store import open_store
+
+    folder = place_of(given).folder
+    if (
+        given is None
+        and VARIABLE not in os.environ
+        and (folder is None or not (folder / "store.db").is_file())
+    ):
+        return None
+    return open_store(given)
+
+
+def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Estimate, bytes | None]:
+    """A result of a file or of the store, and its report."""
+    from inercal.estimate.files import load
+
+    if Path(given).is_file() or store is None:
+        return load(given), report
+    from inercal.laboratory.catalog import show
+
+    shown = show(store, given)
+    kept = None if shown.report is None else store.objects.read(shown.report)
+    return shown.estimate, kept if report is None else report
+
+
+def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) -> str:
+    """Identity of a result in the store, where it is kept first if it came as a file."""
+    from inercal.laboratory.catalog import find
+    from inercal.laboratory.keep import item_of, keep
+
+    if Path(given).is_file():
+        return keep(store, estimate, item_of(estimate), report, made_here=False).id
+    return find(store, given)
+
+
+def _read(path: Path, html: Path | None, output: FileOutput) -> None:
+    """Print what a certificate states, and write it as a page where that is asked for."""
+    from inercal._files import write_text
+    from inercal.estimate.result import without_coefficients
+    from inercal.laboratory.certificate.page import page
+    from inercal.laboratory.certificate.reading import read_certificate
+    from inercal.records.read import source_of
+
+    found = read_certificate(path)
+    if html is not None:
+        write_text(html, page(found))
+        output.say(f"page: {html}")
+    checked = "valid by its schema" if found.validated else "not validated"
+    words = (
+        f"certificate {found.number} of {found.laboratory} for {found.item}, DCC {found.version}, {checked}"
+    )
+    if found.signed:
+        words += ", signed (the signature was not verified)"
+    result = {
+        "number": found.number,
+        "laboratory": found.laboratory,
+        "item": found.item,
+        "version": found.version,
+        "validated": found.validated,
+        "signed": found.signed,
+        "results": [
+            {
+                "name": each.name,
+                "quantities": [vars(quantity) for quantity in each.quantities],
+                "covariance": None if each.region is None else vars(each.region),
+            }
+            for each in found.results
+        ],
+    }
+    text = "\n".join([*_table(found), "", words])
+    emit(without_coefficients("certificate", words, result, (source_of(path),)), text, output)
+
+
+def _table(found: Certificate) -> list[str]:
+    """All numbers of a certificate, aligned, to the last digit."""
+    rows = [("", "value", "U", "k", "unit")]
+    for each in found.results:
+        for q in each.quantities:
+            U, k = ("" if math.isnan(number) else repr(number) for number in (q.U, q.k))
+            rows.append((q.label or q.name, repr(q.value), U, k, q.unit))
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    return [
+        "  ".join(
+            cell.ljust(width) if i in (0, 4) else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]

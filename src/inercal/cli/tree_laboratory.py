@@ -1,0 +1,77 @@
+"""The commands of the laboratory: entries of the tree."""
+
+#: as `inercal.cli.tree.COMMANDS`
+LABORATORY = {
+    ("store", "init"): (
+        "inercal.cli.store:store_init",
+        "Make an empty store for the results of a laboratory.\n\nA folder (--store, INERCAL_STORE, else the user's "
+        "data folder), or an empty PostgreSQL database by its URL, with --objects for the files. Results are only ever "
+        "added; every step is an event in a chain of hashes.",
+        "inercal store init --store lab",
+    ),
+    ("store", "upgrade"): (
+        "inercal.cli.store:store_upgrade",
+        "Bring a store that an older inercal made to the version of this one.",
+        "inercal store upgrade --store lab",
+    ),
+    ("store", "check"): (
+        "inercal.cli.store:store_check",
+        "Check that a store is as it was written, and name what was changed, missing or added.\n\nChain of events, "
+        "rows, files, foreign keys. Note the head of the chain: later it shows that nothing was cut off. Exit code 1: "
+        "there are faults.",
+        "inercal store check --store lab",
+    ),
+    ("store", "export"): (
+        "inercal.cli.store:store_export",
+        "Copy a store into a folder, which is a store itself, with rows, chain and files as they are.",
+        "inercal store export copy --store lab",
+    ),
+    ("store", "import"): (
+        "inercal.cli.store:store_import",
+        "Add what the store in a folder has and this one lacks.",
+        "inercal store import copy --store lab",
+    ),
+    ("keep", ""): (
+        "inercal.cli.kept:keep",
+        "Keep a result that was made elsewhere in the store.\n\nThe files it rests on are kept too, where they are "
+        "still as they were. A result that is kept already adds nothing. The option --keep of other commands does this "
+        "at once.",
+        'inercal keep cal.json --report cal.html --instrument "Xsens, MTi, 1234"',
+    ),
+    ("instruments", ""): (
+        "inercal.cli.kept:instruments",
+        "List the instruments of a store, with the number of their results.",
+        "inercal instruments --store lab",
+    ),
+    ("results", ""): (
+        "inercal.cli.kept:results",
+        "List the results of a store, by date.",
+        "inercal results --instrument 1234 --since 2026-01-01 --status ok",
+    ),
+    ("show", ""): (
+        "inercal.cli.kept:show",
+        "Show a result of a store: where it comes from, its coefficients, its verdict.\n\n--out writes the result "
+        "(.json or .toml), --report the page that was kept with it.",
+        "inercal show 6fee8a0a58 --report cal.html",
+    ),
+    ("history", ""): (
+        "inercal.cli.history:history",
+        "Follow the coefficients of an instrument from calibration to calibration.\n\nControl charts, drift and random "
+        "walk, the value to expect at a date with its uncertainty, and with --tolerance conformity and the date of the "
+        "next calibration. --out writes the result (.json or .toml) or all calibrations (.csv), --report a page with "
+        "the charts. Exit code 1: the last calibration alarms, or is outside a tolerance.",
+        "inercal history 1234 --tolerance spec.toml --report history.html",
+    ),
+    ("supersede", ""): (
+        "inercal.cli.kept:supersede",
+        "Say that a result takes the place of another of the same instrument, and why.\n\nBoth stay in the store; "
+        "histories leave the superseded one out.",
+        'inercal supersede 6fee8a0a58 b1946ac924 --reason "wrong gravity"',
+    ),
+    ("rerun", ""): (
+        "inercal.cli.kept:rerun",
+        "Make a kept result once more by this inercal, from the files that were kept with it.\n\nSays of each "
+        "coefficient whether it is equal to the last digit, within u, or changed. Exit code 1: something changed.",
+        "inercal rerun 6fee8a0a58",
+    ),
+}

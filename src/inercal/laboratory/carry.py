@@ -1,0 +1,181 @@
+"""Stores carried elsewhere: a copy as a folder, and the results of such a folder added to another store."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Table, insert, select
+
+from inercal.errors import InputError
+from inercal.laboratory.chain import digest_of, happened
+from inercal.laboratory.check import check
+from inercal.laboratory.database import engine_of, migrate, reading, writing
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.place import place_of
+from inercal.laboratory.store import Store, open_store
+from inercal.laboratory.tables import (
+    Base,
+    Certificate,
+    Certified,
+    Coefficient,
+    Instrument,
+    Recording,
+    Reference,
+    Result,
+    Setting,
+    SourceOf,
+    Supersession,
+    Used,
+)
+
+Progress = Callable[[int, int], None] | None
+
+
+def export_store(store: Store, folder: Path, progress: Progress = None) -> Store:
+    """Copy a store into a folder that is new or empty, which is a store itself: rows, chain and objects as they are.
+
+    Raises `InputError` where the folder holds something, or cannot be made.
+    """
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        if folder.exists() and any(folder.iterdir()):
+            raise InputError(folder, "holds something, expected a new or empty folder")
+        made = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    except OSError as error:
+        raise InputError(folder, f"cannot be made ({error.strerror})") from error
+    try:
+        _copy(store, made, progress)
+        made.chmod(0o777 & ~_mask())
+        made.replace(folder)
+    except OSError as error:
+        raise InputError(folder, f"cannot be made ({error.strerror})") from error
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+    return open_store(str(folder))
+
+
+def _mask() -> int:
+    """The process's file mode mask."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _copy(store: Store, folder: Path, progress: Progress) -> None:
+    """Rows and objects into a folder."""
+    engine = engine_of(place_of(str(folder)).url, str(folder))
+    migrate(engine, str(folder))
+    # the lock of a writer, so that all tables are of one moment
+    with writing(store.engine, store.where) as source, writing(engine, str(folder)) as target:
+        for table in Base.metadata.sorted_tables:
+            rows = [dict(row) for row in source.execute(select(table)).mappings()]
+            if table.name == Setting.__tablename__:
+                rows = [row for row in rows if row["key"] != "objects"]
+            if rows:
+                target.execute(insert(table), rows)
+    engine.dispose()
+    _copy_objects(store.objects, Objects(str(folder / "objects")), store.objects.names(), progress)
+
+
+def _copy_objects(source: Objects, target: Objects, names: set[str], progress: Progress) -> None:
+    """Objects from one place to another."""
+    for done, sha256 in enumerate(sorted(names), start=1):
+        target.add(source.read(sha256))
+        if progress is not None:
+            progress(done, len(names))
+
+
+@dataclass(frozen=True)
+class Added:
+    """Numbers of results, supersessions and certificates that an import added, and of results that were there."""
+
+    results: int
+    supersessions: int
+    certificates: int
+    there: int
+
+
+def import_store(store: Store, folder: Path, progress: Progress = None) -> Added:
+    """Add what the store in a folder has and this one lacks; its chain must be whole.
+
+    Raises `InputError` where the folder is no store, or was changed.
+    """
+    other = open_store(str(folder))
+    checked = check(other)
+    if checked.faults:
+        raise InputError(folder, f"{checked.faults[0]}, expected a store as it was written")
+    _copy_objects(other.objects, store.objects, other.objects.names(), progress)
+    with reading(other.engine, other.where) as source:
+        theirs = {table.name: _rows(source, table) for table in Base.metadata.sorted_tables}
+    with writing(store.engine, store.where) as target:
+        return _merged(target, theirs, checked.head)
+
+
+def _rows(connection: Connection, table: Table) -> list[dict[str, Any]]:
+    """All rows of a table."""
+    return [dict(row) for row in connection.execute(select(table)).mappings()]
+
+
+def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: str) -> Added:
+    """The rows of another store that are new, added with an event each."""
+    numbers = {
+        row["id"]: _number(target, Instrument, row, ("maker", "model", "serial"))
+        for row in theirs["instrument"]
+    }
+    references = {
+        row["id"]: _number(target, Reference, row, ("name", "serial", "certificate", "valid_until"))
+        for row in theirs["reference"]
+    }
+    files = set(target.execute(select(Recording.sha256)).scalars())
+    _insert(target, Recording, [row for row in theirs["recording"] if row["sha256"] not in files])
+    there = set(target.execute(select(Result.id)).scalars())
+    new = [row for row in theirs["result"] if row["id"] not in there]
+    _insert(target, Result, [{**row, "instrument_id": numbers.get(row["instrument_id"])} for row in new])
+    names = {row["id"] for row in new}
+    for table in (SourceOf, Coefficient):
+        _insert(target, table, [row for row in theirs[table.__tablename__] if row["result_id"] in names])
+    used = [{**row, "reference_id": references[row["reference_id"]]} for row in theirs["used"]]
+    _insert(target, Used, [row for row in used if row["result_id"] in names])
+    told = {(row["kind"], row["subject"]): row["digest"] for row in theirs["event"]}
+    for row in new:
+        happened(target, "keep", row["id"], told["keep", row["id"]])
+    superseded = set(target.execute(select(Supersession.result_id)).scalars())
+    later = [row for row in theirs["supersession"] if row["result_id"] not in superseded]
+    _insert(target, Supersession, later)
+    for row in later:
+        happened(target, "supersede", row["result_id"], told["supersede", row["result_id"]])
+    issued = set(target.execute(select(Certificate.number)).scalars())
+    certificates = [row for row in theirs["certificate"] if row["number"] not in issued]
+    certificates.sort(key=lambda row: row["issued"])
+    _insert(target, Certificate, certificates)
+    fresh = {row["number"] for row in certificates}
+    _insert(target, Certified, [row for row in theirs["certified"] if row["number"] in fresh])
+    for row in certificates:
+        happened(target, "certificate", row["number"], told["certificate", row["number"]])
+    happened(target, "import", head, digest_of([len(new), len(later), len(certificates)]))
+    return Added(len(new), len(later), len(certificates), len(theirs["result"]) - len(new))
+
+
+def _insert(connection: Connection, table: type[Base], rows: list[dict[str, Any]]) -> None:
+    """Add rows, if there are any."""
+    if rows:
+        connection.execute(insert(table), rows)
+
+
+def _number(
+    connection: Connection, table: type[Instrument | Reference], row: dict[str, Any], keys: tuple[str, ...]
+) -> int:
+    """The number in this store of a row of another, which is added where it is new."""
+    columns = table.__table__.columns
+    same = [columns[key] == row[key] for key in keys]
+    number: int | None = connection.execute(select(columns["id"]).where(*same)).scalar()
+    if number is None:
+        own = {key: value for key, value in row.items() if key != "id"}
+        number = connection.execute(insert(table).values(**own).returning(columns["id"])).scalar_one()
+    return number

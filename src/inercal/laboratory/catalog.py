@@ -1,0 +1,265 @@
+"""Contents of a store: instruments, results, one result whole."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import func, select
+
+from inercal.errors import InputError
+from inercal.estimate.files import from_json
+from inercal.estimate.result import Estimate
+from inercal.laboratory.database import reading
+from inercal.laboratory.keep import Item
+from inercal.laboratory.store import Store
+from inercal.laboratory.tables import (
+    Certified,
+    Coefficient,
+    Instrument,
+    Recording,
+    Reference,
+    Result,
+    SourceOf,
+    Supersession,
+    Used,
+)
+
+SHORT = 10
+"""Digits of an identity that are shown."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A result in a list: its row, instrument, and the identity of the one that supersedes it."""
+
+    id: str
+    command: str
+    status: str
+    message: str
+    made: str
+    measured: str
+    operator: str
+    version: str
+    instrument: Item | None
+    superseded_by: str | None
+
+    @property
+    def date(self) -> str:
+        """When it was measured, where that was stated, else when it was kept: the day."""
+        return str(self.measured or self.made)[:10]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A result whole: its row, estimate, files with their places, reason where it is superseded, certificates."""
+
+    listed: Listed
+    estimate: Estimate
+    object: str
+    report: str | None
+    program: str
+    files: tuple[tuple[str, str, str | None], ...]
+    references: tuple[str, ...]
+    reason: str
+    certificates: tuple[str, ...]
+
+
+def instruments(store: Store) -> list[dict[str, Any]]:
+    """All instruments, with the number of their results and the date of the last."""
+    last = func.max(Result.made)
+    query = (
+        select(Instrument, func.count(Result.id).label("results"), last.label("last"))
+        .outerjoin(Result, Result.instrument_id == Instrument.id)
+        .group_by(Instrument.id)
+        .order_by(Instrument.maker, Instrument.model, Instrument.serial)
+    )
+    with reading(store.engine, store.where) as connection:
+        return [dict(row) for row in connection.execute(query).mappings()]
+
+
+def results(
+    store: Store,
+    instrument: str | None = None,
+    since: str | None = None,
+    status: str | None = None,
+) -> list[Listed]:
+    """Results in the order of their dates.
+
+    Parameters
+    ----------
+    store : Store
+    instrument : str, optional
+        Serial number, or maker, model and serial number in words.
+    since : str, optional
+        First day, ISO 8601.
+    status : str, optional
+
+    Raises
+    ------
+    InputError
+        No instrument of that name, or several.
+    """
+    query = _listed()
+    if instrument is not None:
+        query = query.where(Result.instrument_id.in_(numbers_of(store, instrument)))
+    if status is not None:
+        query = query.where(Result.status == status)
+    with reading(store.engine, store.where) as connection:
+        found = [_row(row, store.where) for row in connection.execute(query).mappings()]
+    found = [each for each in found if since is None or each.date >= since]
+    return sorted(found, key=lambda each: (each.date, each.made, each.id))
+
+
+def _listed() -> Any:
+    """The query of all results."""
+    return (
+        select(
+            Result.id,
+            Result.command,
+            Result.status,
+            Result.message,
+            Result.made,
+            Result.measured,
+            Result.operator,
+            Result.version,
+            Instrument.maker,
+            Instrument.model,
+            Instrument.serial,
+            Instrument.owner,
+            Instrument.kind,
+            Supersession.by_id,
+        )
+        .outerjoin(Instrument, Instrument.id == Result.instrument_id)
+        .outerjoin(Supersession, Supersession.result_id == Result.id)
+    )
+
+
+def _row(row: Any, where: str) -> Listed:
+    """A row of that query; raises `InputError` for one that no store writes."""
+    item = (
+        None
+        if row["serial"] is None
+        else Item(row["maker"], row["model"], row["serial"], row["owner"], row["kind"])
+    )
+    own = ("id", "command", "status", "message", "made", "measured", "operator", "version")
+    if any(row[key] is None for key in own):
+        raise InputError(
+            where,
+            "a row of the results was damaged, expected one as it was written: see `inercal store check`",
+        )
+    return Listed(**{key: row[key] for key in own}, instrument=item, superseded_by=row["by_id"])
+
+
+def numbers_of(store: Store, name: str) -> list[int]:
+    """The rows of the instrument of that serial number, or of that maker, model and serial number.
+
+    Raises `InputError` where there is none, or several share the serial number.
+    """
+    words = name.replace(",", " ").split()
+    query = select(Instrument.id, Instrument.maker, Instrument.model, Instrument.serial)
+    with reading(store.engine, store.where) as connection:
+        rows = connection.execute(query).all()
+    named = {
+        row.id: str(Item(row.maker, row.model, row.serial))
+        for row in rows
+        if row.serial == name or f"{row.maker} {row.model} {row.serial}".split() == words
+    }
+    if not named:
+        some = ", ".join(sorted({row.serial for row in rows})[:4])
+        raise InputError(
+            name,
+            f"no such instrument in {store.where}, expected a serial number such as {some or 'none yet'}",
+        )
+    if len(named) > 1:
+        raise InputError(
+            name, f"found {' and '.join(sorted(named.values()))}, expected maker, model and serial number"
+        )
+    return list(named)
+
+
+def find(store: Store, identity: str) -> str:
+    """The whole identity of a result of which the beginning is given; raises `InputError` where none or several are."""
+    with reading(store.engine, store.where) as connection:
+        query = select(Result.id).where(Result.id.startswith(identity.lower(), autoescape=True)).limit(3)
+        found: Sequence[str] = connection.execute(query).scalars().all()
+    if len(found) == 1 and len(identity) >= 4:
+        return found[0]
+    what = "several results begin so" if len(found) > 1 else f"no such result in {store.where}"
+    if len(identity) < 4:
+        what = "found fewer than 4 digits"
+    raise InputError(identity, f"{what}, expected the identity of one, as `inercal results` lists them")
+
+
+def show(store: Store, identity: str) -> Shown:
+    """A result whole; raises `InputError` where there is none, or its object is missing or was changed."""
+    identity = find(store, identity)
+    with reading(store.engine, store.where) as connection:
+        listed = _row(
+            connection.execute(_listed().where(Result.id == identity)).mappings().one(), store.where
+        )
+        row = connection.execute(select(Result).where(Result.id == identity)).mappings().one()
+        files = connection.execute(
+            select(SourceOf.path, SourceOf.sha256, Recording.place)
+            .join(Recording, Recording.sha256 == SourceOf.sha256)
+            .where(SourceOf.result_id == identity)
+            .order_by(SourceOf.position)
+        ).all()
+        references = connection.execute(
+            select(Reference.name, Reference.serial, Reference.certificate)
+            .join(Used, Used.reference_id == Reference.id)
+            .where(Used.result_id == identity)
+        ).all()
+        reason = connection.execute(
+            select(Supersession.reason).where(Supersession.result_id == identity)
+        ).scalar()
+        certificates = connection.execute(
+            select(Certified.number).where(Certified.result_id == identity).order_by(Certified.number)
+        ).scalars()
+        numbers = tuple(certificates)
+    return Shown(
+        listed,
+        estimate_in(store, row["object"]),
+        row["object"],
+        row["report"],
+        row["program"],
+        tuple((path, sha256, place) for path, sha256, place in files),
+        tuple(", ".join(filter(None, row)) for row in references),
+        reason or "",
+        numbers,
+    )
+
+
+def estimate_in(store: Store, sha256: str) -> Estimate:
+    """The estimate of an object; raises `InputError`."""
+    return from_json(json.loads(store.objects.read(sha256)))
+
+
+def values_of(store: Store, instrument: str) -> list[dict[str, Any]]:
+    """All coefficients of an instrument's results that nothing supersedes, a row each, in the order of dates."""
+    query = (
+        select(
+            Result.id,
+            Result.command,
+            Result.status,
+            Result.made,
+            Result.measured,
+            Coefficient.position,
+            Coefficient.name,
+            Coefficient.value,
+            Coefficient.u,
+            Coefficient.expanded,
+            Coefficient.k,
+            Coefficient.dof,
+            Coefficient.unit,
+            Coefficient.common,
+        )
+        .join(Coefficient, Coefficient.result_id == Result.id)
+        .outerjoin(Supersession, Supersession.result_id == Result.id)
+        .where(Result.instrument_id.in_(numbers_of(store, instrument)), Supersession.by_id.is_(None))
+    )
+    with reading(store.engine, store.where) as connection:
+        rows = [dict(row) for row in connection.execute(query).mappings()]
+    return sorted(rows, key=lambda row: (row["measured"] or row["made"], row["id"], row["position"]))

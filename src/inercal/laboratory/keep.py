@@ -1,0 +1,283 @@
+"""Keeping a result: its JSON, page and files as objects, its coefficients as rows; whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, insert, select
+
+from inercal.errors import InputError
+from inercal.estimate.files import plain_objects, to_json
+from inercal.estimate.result import Estimate
+from inercal.laboratory.chain import digest_of, happened, now
+from inercal.laboratory.database import writing
+from inercal.laboratory.store import Store
+from inercal.laboratory.tables import Coefficient, Instrument, Recording, Reference, Result, SourceOf, Used
+
+LARGE = 1 << 30
+"""Bytes beyond which a file is kept by reference: its path and SHA-256."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """An instrument by its maker, model and serial number; ``owner`` and ``kind`` where they are known."""
+
+    maker: str
+    model: str
+    serial: str
+    owner: str = ""
+    kind: str = ""
+
+    def __str__(self) -> str:
+        """In words."""
+        return " ".join(filter(None, (self.maker, self.model, self.serial)))
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A result in a store: its ``id``, ``new`` unless it was there, and ``notes`` on what could not be kept whole."""
+
+    id: str
+    new: bool
+    notes: tuple[str, ...] = ()
+
+
+def item_of(estimate: Estimate, given: str | None = None) -> Item | None:
+    """The instrument of a result: ``given`` as "maker, model, serial", "model, serial" or "serial", else as its study
+    says; None where that says nothing."""
+    said = estimate.traceability
+    if given is None and said.get("serial"):
+        return Item(
+            said.get("maker", ""),
+            said.get("model", ""),
+            said["serial"],
+            said.get("owner", ""),
+            estimate.command,
+        )
+    text = given if given is not None else said.get("instrument", "")
+    parts = [part.strip() for part in text.split(",")]
+    if not parts[-1]:
+        if given is not None:
+            raise InputError("--instrument", f'found {given!r}, expected "maker, model, serial"')
+        return None
+    maker, model, serial = [
+        "",
+        "",
+        *(parts if len(parts) < 4 else [parts[0], ", ".join(parts[1:-1]), parts[-1]]),
+    ][-3:]
+    return Item(maker, model, serial, "", estimate.command)
+
+
+def id_of(data: Mapping[str, Any]) -> str:
+    """SHA-256 of what a result says: all of its JSON but the times of computing and the command line."""
+    provenance = {key: value for key, value in data["provenance"].items() if key != "arguments"}
+    return digest_of({**{k: v for k, v in data.items() if k != "timing_s"}, "provenance": provenance})
+
+
+@cache
+def program() -> str:
+    """SHA-256 of the sources of this program."""
+    import inercal
+
+    digest = hashlib.sha256()
+    root = Path(inercal.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()}\n".encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def keep(
+    store: Store,
+    estimate: Estimate,
+    item: Item | None,
+    report: bytes | None = None,
+    made_here: bool = True,
+) -> Kept:
+    """Keep a result with the files it rests on.
+
+    Parameters
+    ----------
+    store : Store
+    estimate : Estimate
+    item : Item or None
+        Its instrument; a result with coefficients must have one.
+    report : bytes, optional
+        Its page.
+    made_here : bool
+        This program made it, just now: its files must be as they were, and the sources' checksum is kept.
+
+    Raises
+    ------
+    InputError
+        Without an instrument, or a file of the result cannot be read or was changed (``made_here``).
+    """
+    if item is None and estimate.names:
+        raise InputError(
+            "--instrument",
+            'missing, expected "maker, model, serial" (or the serial under [item] in the study)',
+        )
+    data = to_json(estimate)
+    identity = id_of(data)
+    files, notes = _files(store, estimate, made_here)
+    text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+    result = {
+        "id": identity,
+        "object": store.objects.add(text.encode()),
+        "report": None if report is None else store.objects.add(report),
+        "command": data["command"],
+        "version": data["inercal"],
+        "program": program() if made_here else "",
+        "made": now(),
+        "measured": str(data["traceability"].get("date") or ""),
+        "operator": str(data["traceability"].get("operator") or ""),
+        "status": data["status"]["code"],
+        "message": data["status"]["message"],
+    }
+    rows = Rows(
+        result,
+        () if item is None else (item.maker, item.model, item.serial),
+        tuple((source["sha256"], source["path"]) for source in data["inputs"]),
+        coefficients_of(estimate),
+        references_of(data),
+    )
+    with writing(store.engine, store.where) as connection:
+        if connection.execute(select(Result.id).where(Result.id == identity)).first():
+            return Kept(identity, False)
+        number = None if item is None else _instrument(connection, item)
+        for file in files:
+            if not connection.execute(select(Recording).where(Recording.sha256 == file["sha256"])).first():
+                connection.execute(insert(Recording).values(**file))
+        add_rows(connection, rows, number)
+        happened(connection, "keep", identity, rows.digest)
+    return Kept(identity, True, tuple(notes))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows of a result: its own without the instrument's number, instrument, files, coefficients, references."""
+
+    result: Mapping[str, Any]
+    instrument: tuple[str, ...]
+    sources: tuple[tuple[str, str], ...]
+    coefficients: tuple[Mapping[str, Any], ...]
+    references: tuple[Mapping[str, str], ...]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all rows."""
+        more = [[dict(row) for row in many] for many in (self.coefficients, self.references)]
+        return digest_of([dict(self.result), self.instrument, self.sources, *more])
+
+
+def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:
+    """Rows of the coefficients, in order; what is not finite is None."""
+    common = None if estimate.common is None else estimate.common.diagonal()
+    return tuple(
+        {
+            "name": plain_objects(p.name),
+            **{
+                key: _finite(value)
+                for key, value in (("value", p.value), ("u", p.u), ("expanded", p.U), ("k", p.k))
+            },
+            "dof": _finite(p.dof),
+            "unit": plain_objects(p.unit),
+            "common": None if common is None else _finite(math.sqrt(max(float(common[i]), 0.0))),
+        }
+        for i, p in enumerate(estimate.parameters.values())
+    )
+
+
+def references_of(data: Mapping[str, Any]) -> tuple[dict[str, str], ...]:
+    """Rows of the standards, tables and rigs that the study of a result states as ``[equipment.NAME]``, by name."""
+    settings = data["provenance"].get("settings")
+    stated = settings.get("equipment") if isinstance(settings, Mapping) else None
+    keys = ("name", "serial", "certificate", "valid_until")
+    rows = [
+        {key: str(each.get(key) or "") for key in keys}
+        for each in (stated.values() if isinstance(stated, Mapping) else ())
+        if isinstance(each, Mapping)
+    ]
+    return tuple(dict(zip(keys, row, strict=True)) for row in sorted({tuple(row.values()) for row in rows}))
+
+
+def _finite(value: float) -> float | None:
+    """The number, or None where it is not finite."""
+    return value if math.isfinite(value) else None
+
+
+def add_rows(connection: Connection, rows: Rows, instrument_id: int | None) -> None:
+    """Add the rows of a result, in a transaction that writes."""
+    connection.execute(insert(Result).values(**rows.result, instrument_id=instrument_id))
+    identity = rows.result["id"]
+    sources = [
+        {"result_id": identity, "position": i, "sha256": sha256, "path": path}
+        for i, (sha256, path) in enumerate(rows.sources)
+    ]
+    coefficients = [{"result_id": identity, "position": i, **row} for i, row in enumerate(rows.coefficients)]
+    numbers = dict.fromkeys(_reference(connection, row) for row in rows.references)
+    used = [{"result_id": identity, "reference_id": number} for number in numbers]
+    for table, values in ((SourceOf, sources), (Coefficient, coefficients), (Used, used)):
+        if values:
+            connection.execute(insert(table), values)
+
+
+def _instrument(connection: Connection, item: Item) -> int:
+    """The number of an instrument, which is added where it is new."""
+    same = (Instrument.maker == item.maker, Instrument.model == item.model, Instrument.serial == item.serial)
+    number = connection.execute(select(Instrument.id).where(*same)).scalar()
+    if number is None:
+        values = {"kind": item.kind, "owner": item.owner, "notes": ""}
+        row = {"maker": item.maker, "model": item.model, "serial": item.serial, **values}
+        number = connection.execute(insert(Instrument).values(**row).returning(Instrument.id)).scalar_one()
+    return number
+
+
+def _reference(connection: Connection, row: Mapping[str, str]) -> int:
+    """The number of a reference, which is added where it is new."""
+    same = (getattr(Reference, key) == row[key] for key in row)
+    number = connection.execute(select(Reference.id).where(*same)).scalar()
+    if number is None:
+        number = connection.execute(insert(Reference).values(**row).returning(Reference.id)).scalar_one()
+    return number
+
+
+def _files(store: Store, estimate: Estimate, made_here: bool) -> tuple[list[dict[str, Any]], list[str]]:
+    """Rows of the files that a result rests on, which become objects, and notes on those that could not."""
+    rows, notes = [], []
+    for source in {each.sha256: each for each in estimate.inputs}.values():
+        path = _place(source.path)
+        try:
+            size = path.stat().st_size
+            if size > LARGE:
+                rows.append({"sha256": source.sha256, "bytes": size, "place": str(path.absolute())})
+                notes.append(f"{source.path}: {size / 2**30:.1f} GiB, kept by its path and checksum")
+                continue
+            store.objects.add_file(path, source.sha256)
+            rows.append({"sha256": source.sha256, "bytes": size, "place": None})
+        except (OSError, InputError) as error:
+            if made_here:
+                raise (
+                    error
+                    if isinstance(error, InputError)
+                    else InputError(path, f"cannot be read ({error.strerror})")
+                ) from error
+            rows.append({"sha256": source.sha256, "bytes": None, "place": str(path.absolute())})
+            why = error.message if isinstance(error, InputError) else f"cannot be read ({error.strerror})"
+            notes.append(f"{source.path}: {why}; kept by its checksum alone")
+    return rows, notes
+
+
+def _place(path: str) -> Path:
+    """The file of a path: of this machine, or one that ships with the package, as results of `validate` name them."""
+    from inercal.examples import FOLDER
+
+    shipped = FOLDER.parent / path
+    return shipped if not Path(path).exists() and shipped.is_file() else Path(path)

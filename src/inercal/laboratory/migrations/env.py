@@ -1,0 +1,12 @@
+"""The module in which Alembic finds the connection and the tables; `inercal.laboratory.database.migrate` runs it."""
+
+from alembic import context
+
+from inercal.laboratory.tables import Base
+
+context.configure(
+    connection=context.config.attributes["connection"],
+    target_metadata=Base.metadata,
+    transaction_per_migration=False,
+)
+context.run_migrations()

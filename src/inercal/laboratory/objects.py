@@ -1,0 +1,143 @@
+"""Objects of a store: files by the SHA-256 of their bytes, ``ab/abcd...``, written whole and never changed."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from inercal._files import replacing
+from inercal.errors import InputError, MissingExtraError
+
+_PIECE = 1 << 22
+"""Bytes that are read at a time."""
+
+
+@dataclass(frozen=True)
+class Objects:
+    """The folder of objects: a path, or a URL of fsspec such as ``s3://bucket/objects``."""
+
+    where: str
+
+    @cached_property
+    def _folder(self) -> tuple[Any, str]:
+        """File system and path within it."""
+        import fsspec
+
+        try:
+            system, path = fsspec.core.url_to_fs(self.where)
+        except ImportError as error:
+            raise MissingExtraError(f"objects at {self.where.split('://')[0]}://", "s3") from error
+        except ValueError as error:
+            raise InputError(
+                self.where, f"{error}, expected a folder or a URL such as s3://bucket/objects"
+            ) from error
+        return system, path.rstrip("/")
+
+    @property
+    def local(self) -> bool:
+        """True if the objects are files of this machine."""
+        return "://" not in self.where
+
+    def place(self, sha256: str) -> str:
+        """Path or URL of an object."""
+        return f"{self.where.rstrip('/')}/{sha256[:2]}/{sha256}"
+
+    def add(self, data: bytes) -> str:
+        """Keep an object, unless it is there; the SHA-256 of its bytes."""
+        sha256 = hashlib.sha256(data).hexdigest()
+        if not self.has(sha256, len(data)):
+            self._write(sha256, [data])
+        return sha256
+
+    def add_file(self, path: Path, sha256: str) -> int:
+        """Keep a file of that SHA-256, unless it is there; its size.
+
+        Raises `InputError` where it is another file, or cannot be read.
+        """
+        try:
+            size = path.stat().st_size
+            if not self.has(sha256, size):
+                with open(path, "rb") as file:
+                    if hashlib.file_digest(file, "sha256").hexdigest() != sha256:
+                        raise InputError(
+                            path, "was changed after the result was made, expected the file as it was then"
+                        )
+                    file.seek(0)
+                    self._write(sha256, iter(lambda: file.read(_PIECE), b""))
+        except OSError as error:
+            raise InputError(path, f"cannot be read ({error.strerror})") from error
+        return size
+
+    def _write(self, sha256: str, pieces: Iterable[bytes]) -> None:
+        """Write an object whole, read-only."""
+        if not self.local:
+            system, path = self._folder
+            try:
+                system.makedirs(f"{path}/{sha256[:2]}", exist_ok=True)
+                system.pipe_file(f"{path}/{sha256[:2]}/{sha256}", b"".join(pieces))
+            except OSError as error:
+                raise InputError(self.place(sha256), f"cannot be written ({error})") from error
+            return
+        target = Path(self.place(sha256))
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(target.parent, f"cannot be made ({error.strerror})") from error
+        with replacing(target) as file:
+            file.writelines(pieces)
+        with suppress(OSError):  # a file system without modes
+            os.chmod(target, stat.S_IRUSR | stat.S_IRGRP | stat.S_IROTH)
+
+    def has(self, sha256: str, size: int) -> bool:
+        """True if an object of that size is there."""
+        try:
+            found = Path(self.place(sha256)).stat().st_size if self.local else self._size(sha256)
+        except (FileNotFoundError, NotADirectoryError):
+            return False
+        except OSError as error:
+            raise InputError(self.place(sha256), f"cannot be read ({error.strerror or error})") from error
+        return found == size
+
+    def _size(self, sha256: str) -> int:
+        """Size of an object that is not of this machine."""
+        system, path = self._folder
+        return int(system.size(f"{path}/{sha256[:2]}/{sha256}"))
+
+    def read(self, sha256: str) -> bytes:
+        """The bytes of an object; raises `InputError` where it is missing, or is not what its name says."""
+        return b"".join(self.pieces(sha256))
+
+    def pieces(self, sha256: str) -> Iterator[bytes]:
+        """The bytes of an object in pieces; raises `InputError` as `read`, at the end for one that was changed."""
+        system, path = self._folder
+        digest = hashlib.sha256()
+        try:
+            with system.open(f"{path}/{sha256[:2]}/{sha256}", "rb") as file:
+                while piece := file.read(_PIECE):
+                    digest.update(piece)
+                    yield piece
+        except FileNotFoundError as error:
+            raise InputError(self.place(sha256), "is missing, expected an object of the store") from error
+        except OSError as error:
+            raise InputError(self.place(sha256), f"cannot be read ({error.strerror or error})") from error
+        if digest.hexdigest() != sha256:
+            raise InputError(
+                self.place(sha256), f"has the SHA-256 {digest.hexdigest()[:12]}..., expected that of its name"
+            )
+
+    def names(self) -> set[str]:
+        """The SHA-256 of all objects, by their names."""
+        system, path = self._folder
+        try:
+            found = system.find(path)
+        except FileNotFoundError:
+            return set()
+        names = {each.rpartition("/")[2] for each in found}
+        return {name for name in names if not name.startswith(".")}  # left by a writer that was killed
