@@ -91,7 +91,7 @@ def design_strapdown(
     /,
     *,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Say what the turns of a strapdown unit tell, and find better ones."""
     from inercal._files import write_text
